@@ -109,32 +109,30 @@ def sentence(difference: Difference, clock: ClockKind) -> str:
     if difference.aspect is Aspect.CONSTANT:
         what = f"{name} varied {where[0]} and was always {second} {where[1]}"
     else:
-        verb = _VERBS[difference.aspect]
-        what = f"{name} {verb}{first} {where[0]} and {second} {where[1]}"
+        what = f"{name} {_WORDS[difference.aspect][0]}{first} {where[0]} and {second} {where[1]}"
         what += " for the same input" if difference.aspect is Aspect.ANSWER else ""
     return f"the node behaved differently {where[1]}: {what}"
 
 
-#: Text between the name of what differs and the two results.
-_VERBS = {
-    Aspect.SILENT: "had ",
-    Aspect.RATE: "had ",
-    Aspect.VALUE: "was ",
-    Aspect.ANSWER: "was ",
-    Aspect.LOGS: "logged ",
-    Aspect.ENDPOINT: "was ",
-    Aspect.CALLS: "had ",
-    Aspect.END: "",
+#: Text between the name of what differs and the two results, and the unit of a result.
+_WORDS = {
+    Aspect.SILENT: ("had ", " messages"),
+    Aspect.RATE: ("had ", " Hz"),
+    Aspect.VALUE: ("was ", ""),
+    Aspect.CONSTANT: ("", ""),
+    Aspect.ANSWER: ("was ", ""),
+    Aspect.LOGS: ("logged ", " records"),
+    Aspect.ENDPOINT: ("was ", ""),
+    Aspect.CALLS: ("had ", " messages"),
+    Aspect.END: ("", ""),
 }
 
 
 def _shown(value: float | str, aspect: Aspect) -> str:
     if isinstance(value, str):
         return value
-    if aspect is Aspect.RATE:
-        return f"{value:.1f} Hz"
-    unit = {Aspect.SILENT: " messages", Aspect.LOGS: " records", Aspect.CALLS: " messages"}.get(aspect, "")
-    return f"{value:.6g}{unit}"
+    digits = ".1f" if aspect is Aspect.RATE else ".6g"
+    return f"{value:{digits}}{_WORDS[aspect][1]}"
 
 
 def _start(trace: Trace, first_message_on: str) -> int:

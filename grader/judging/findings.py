@@ -245,9 +245,8 @@ def _explain(
     if type_ is not None and typed is not None:
         reason = f"{name}: {quote(typed.node)} {words.typed} {quote(typed.type)}, expected {type_}"
         evidence = {key: name, "type": typed.type, "node": typed.node}
-        return not_met(
-            reason, evidence, hint=words.type_hint.format(name=name, type=type_), problem=ProblemKind.OTHER_TYPE
-        )
+        hint = words.type_hint.format(name=name, type=type_)
+        return not_met(reason, evidence, hint=hint, problem=ProblemKind.OTHER_TYPE)
     others = {n: e for e, n in reversed(named) if n != name}
     other = _most_alike(name, [n for e, n in named if n != name and e.type == type_], list(others))
     if other is None:
@@ -255,12 +254,8 @@ def _explain(
     end = others[other]
     reason = f"{name}: {words.none}; {quote(end.node)} {words.instead} {quote(other)} [{quote(end.type)}]"
     evidence = {key: other, "type": end.type, "node": end.node}
-    return not_met(
-        reason,
-        evidence,
-        hint=f"{words.name_hint.format(name=name)} instead of {quote(other)}",
-        problem=ProblemKind.OTHER_NAME,
-    )
+    hint = f"{words.name_hint.format(name=name)} instead of {quote(other)}"
+    return not_met(reason, evidence, hint=hint, problem=ProblemKind.OTHER_NAME)
 
 
 def _most_alike(name: str, same_type: Sequence[str], others: Sequence[str]) -> str | None:
@@ -286,12 +281,8 @@ def _other_type(messages: list[Message], topic: str, type_: str | None) -> Findi
         return None
     found, count = types.most_common(1)[0]
     reason = f"{topic}: {counted(count, 'message')} of type {quote(found)}, expected {type_}"
-    return not_met(
-        reason,
-        {"topic": topic, "type": found, "messages": count},
-        hint=f"publish {type_} on {topic}",
-        problem=ProblemKind.OTHER_TYPE,
-    )
+    evidence = {"topic": topic, "type": found, "messages": count}
+    return not_met(reason, evidence, hint=f"publish {type_} on {topic}", problem=ProblemKind.OTHER_TYPE)
 
 
 def _other_topic(messages: list[Message], topic: str, type_: str | None) -> Finding | None:

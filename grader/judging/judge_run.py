@@ -57,10 +57,7 @@ def _exercise_report(exercise: Exercise, run: Run, *, pictures: bool) -> Exercis
 
 
 def judge_exercise(
-    exercise: Exercise,
-    traces: Mapping[str, Trace],
-    submission: Submission,
-    sources: Mapping[str, str] | None = None,
+    exercise: Exercise, traces: Mapping[str, Trace], submission: Submission, sources: Mapping[str, str] | None = None
 ) -> ExerciseReport:
     """Return the report of one exercise; pure.
 
@@ -131,11 +128,7 @@ def _edge_count(graph: GraphSnapshot) -> int:
 
 
 _EARNED = (Outcome.MET, Outcome.PARTLY)
-_SAID = {
-    Outcome.NOT_MET: "not met",
-    Outcome.BLOCKED: "not judged",
-    Outcome.UNDECIDED: "undecided",
-}
+_SAID = {Outcome.NOT_MET: "not met", Outcome.BLOCKED: "not judged", Outcome.UNDECIDED: "undecided"}
 
 
 @dataclass(slots=True)

@@ -91,7 +91,7 @@ def _chance(analysis: Analysis) -> Cause:
 
 def _sample(group: Group) -> Group:
     step = max(1, len(group.entries) // _SAMPLE)
-    return Group(group.template, group.pairs, group.entries[::step], group.pair)
+    return Group(group.pairs, group.entries[::step], group.pair)
 
 
 def _few(analysis: Analysis) -> Cause | None:

@@ -150,7 +150,6 @@ class Group:
     `pair` is None if the texts hold fewer than two numbers.
     """
 
-    template: str
     pairs: tuple[Pair, ...]
     entries: tuple[Entry, ...]
     pair: Pair | None = None
@@ -195,7 +194,7 @@ def grouped(texts: Iterable[Text], *, decimal_comma: bool = False) -> list[Group
         if template not in pairs:
             pairs[template] = candidate_pairs(body, numbers)
         members.setdefault(template, []).append(Entry(text.t_ns, text.text, numbers))
-    return [Group(template, pairs[template], tuple(entries)) for template, entries in members.items()]
+    return [Group(pairs[template], tuple(entries)) for template, entries in members.items()]
 
 
 def matched(group: Group, track: Track, wanted: Wanted = position) -> Group:
@@ -206,7 +205,7 @@ def matched(group: Group, track: Track, wanted: Wanted = position) -> Group:
     counts = {pair: sum(pair in h for h in hits) for pair in group.pairs}
     best = max(group.pairs, key=lambda pair: counts[pair])
     entries = tuple(Entry(e.t_ns, e.text, e.numbers, right=best in h) for e, h in zip(group.entries, hits, strict=True))
-    return Group(group.template, group.pairs, entries, best)
+    return Group(group.pairs, entries, best)
 
 
 def _hits(entry: Entry, pairs: Sequence[Pair], track: Track, wanted: Wanted) -> set[Pair]:

@@ -163,17 +163,12 @@ _Wanted = Callable[[Sample], float]
 
 def followed_instead(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Instead:
     """Find what a series follows instead of a formula, if that is clear."""
-    if len(samples) < _FEWEST:
-        return Instead()
-    if not all(math.isfinite(s.value) for s in samples):
+    if len(samples) < _FEWEST or not all(math.isfinite(s.value) for s in samples):
         return Instead()
     if len({s.value for s in samples}) == 1:
         return Instead(f"it is {number(samples[0].value)} in every message", _COUNT_HINT)
-    scaled = _scaled(wanted, samples, tolerance)
-    if scaled is not None:
-        return scaled
     ways = (way for way, other in _ways(wanted) if _follow(samples, other, tolerance))
-    return next(ways, Instead())
+    return _scaled(wanted, samples, tolerance) or next(ways, Instead())
 
 
 def _follow(samples: Sequence[Sample], other: _Wanted, tolerance: float) -> bool:

@@ -38,18 +38,9 @@ def calls_of(trace: Trace, service: str, asker: str) -> tuple[Call, ...]:
 
 #: A decoded parameter.
 ParameterValue = str | float | bool | list[str | float | bool] | None
-#: Number of a type -> its field in rcl_interfaces/msg/ParameterValue, and the name of the type.
-_TYPES: Mapping[int, tuple[str, str]] = {
-    1: ("bool_value", "bool"),
-    2: ("integer_value", "integer"),
-    3: ("double_value", "double"),
-    4: ("string_value", "string"),
-    5: ("byte_array_value", "byte_array"),
-    6: ("bool_array_value", "bool_array"),
-    7: ("integer_array_value", "integer_array"),
-    8: ("double_array_value", "double_array"),
-    9: ("string_array_value", "string_array"),
-}
+#: Types of rcl_interfaces/msg/ParameterValue, whose numbers begin at 1; each has a field such as `bool_value`.
+_SINGLE = ("bool", "integer", "double", "string")
+_TYPES = (*_SINGLE, "byte_array", *(f"{name}_array" for name in _SINGLE))
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +69,6 @@ class ParameterSetting:
     """
 
     t_ns: int
-    node: str
     value: ParameterValue
     answered: bool
     taken: bool
@@ -120,23 +110,22 @@ def settings(trace: Trace, name: str, node: str | None = None) -> list[Parameter
 
 
 def _set(call: Call, place: int, parameter: Mapping[str, object]) -> ParameterSetting:
-    node = call.request.service.rpartition("/")[0]
     value = _typed(parameter.get("value"))[1]
     if call.response is None:
-        return ParameterSetting(call.request.t_ns, node, value, answered=False, taken=False, why="")
+        return ParameterSetting(call.request.t_ns, value, answered=False, taken=False, why="")
     results = _list(call.response.value, "results")
     result = results[place] if place < len(results) else {}
     taken = isinstance(result, Mapping) and result.get("successful") is True
     why = str(result.get("reason", "")) if isinstance(result, Mapping) else ""
-    return ParameterSetting(call.response.t_ns, node, value, answered=True, taken=taken, why=why)
+    return ParameterSetting(call.response.t_ns, value, answered=True, taken=taken, why=why)
 
 
 def _typed(value: object) -> tuple[str, ParameterValue]:
     if not isinstance(value, Mapping):
         return "", None
     number = value.get("type")
-    field, name = _TYPES.get(number, ("", "")) if isinstance(number, int) else ("", "")
-    return name, value.get(field)
+    name = _TYPES[number - 1] if isinstance(number, int) and 1 <= number <= len(_TYPES) else ""
+    return name, value.get(f"{name}_value")
 
 
 def _list(value: Mapping[str, object], name: str) -> list[object]:

@@ -30,14 +30,7 @@ from grader.judging.values import (
 from grader.judging.wording import counted, listed, moment, nearest, number, quote, span
 
 #: Numbers of action_msgs/msg/GoalStatus.
-_STATUSES: Mapping[int, str] = {
-    1: "accepted",
-    2: "executing",
-    3: "canceling",
-    4: "succeeded",
-    5: "canceled",
-    6: "aborted",
-}
+_STATUSES = dict(enumerate(("accepted", "executing", "canceling", "succeeded", "canceled", "aborted"), 1))
 _FINISH_HINTS = {
     "succeeded": "call goal_handle.succeed() before the result is returned",
     "canceled": "look at goal_handle.is_cancel_requested, then call goal_handle.canceled()",
@@ -69,7 +62,6 @@ class ActionResult:
         return f"every goal for {self.action} {self.status}{result}{within}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if all goals end as expected; the reason names the first that does not."""
         goals = calls_of(trace, f"{self.action}/_action/send_goal", "grader")
         if not goals:
             return explain_no_action(trace, self.action)
@@ -146,7 +138,6 @@ class ActionFeedback:
         return f"feedback of {self.action}, at least {self.at_least} for each goal{grows}{each}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the feedback on every accepted goal is right; the reason names the first mistake."""
         goals = calls_of(trace, f"{self.action}/_action/send_goal", "grader")
         if not goals:
             return explain_no_action(trace, self.action)
@@ -163,9 +154,8 @@ class ActionFeedback:
             if flaw:
                 evidence = {"goals": len(accepted), "feedback": counts}
                 hint = "call goal_handle.publish_feedback(...) at each step" if not mine else ""
-                return _unless_crashed(
-                    trace, not_met(f"{self.action}, goal {place}: {flaw}", evidence, hint=hint), goal
-                )
+                finding = not_met(f"{self.action}, goal {place}: {flaw}", evidence, hint=hint)
+                return _unless_crashed(trace, finding, goal)
         reason = f"{self.action}: {', '.join(map(str, counts[:10]))} messages of feedback"
         return met(reason, {"goals": len(accepted), "feedback": counts})
 
@@ -248,24 +238,13 @@ def explain_no_action(trace: Trace, action: str) -> Finding:
     near = nearest(action, seen) or (seen[0] if len(seen) == 1 else None)
     found = f"; seen: {listed(seen)}" if seen else ""
     hint = f"name the action {action} instead of {quote(near)}" if near else ""
-    return not_met(
-        f"{action}: no action server in {span(trace.stop_ns)}{found}",
-        {"seen": seen[:20]},
-        hint=hint,
-        problem=ProblemKind.OTHER_NAME if seen else ProblemKind.ABSENT,
-    )
+    reason = f"{action}: no action server in {span(trace.stop_ns)}{found}"
+    problem = ProblemKind.OTHER_NAME if seen else ProblemKind.ABSENT
+    return not_met(reason, {"seen": seen[:20]}, hint=hint, problem=problem)
 
 
 #: Numbers of lifecycle_msgs/msg/Transition -> label.
-_TRANSITIONS: Mapping[int, str] = {
-    1: "configure",
-    2: "cleanup",
-    3: "activate",
-    4: "deactivate",
-    5: "shutdown",
-    6: "shutdown",
-    7: "shutdown",
-}
+_TRANSITIONS = dict(enumerate(("configure", "cleanup", "activate", "deactivate", *("shutdown",) * 3), 1))
 #: State after each transition.
 _LEADS_TO = {
     "configure": "inactive",
@@ -300,7 +279,6 @@ class LifecycleStates:
         return f"every transition made{states}{topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if all of this holds; the reason names the first violation."""
         changes, asked = (
             sorted(calls_of_node(trace, self.node, service), key=lambda call: call.request.t_ns)
             for service in ("change_state", "get_state")
@@ -362,31 +340,20 @@ class LifecycleStates:
             return None
         if not times:
             return explain_no_message(trace, topic)
-        return not_met(
-            f"{topic}: no message while active from {moment(mute[0])} to {moment(mute[1])}",
-            evidence,
-            problem=ProblemKind.SILENT,
-        )
+        reason = f"{topic}: no message while active from {moment(mute[0])} to {moment(mute[1])}"
+        return not_met(reason, evidence, problem=ProblemKind.SILENT)
 
     def _never_asked(self, trace: Trace) -> Finding:
         if crashed := explain_fault(trace, "no transition could be asked for"):
             return crashed
         nodes = list(dict.fromkeys(n for graph in trace.graphs() for n in graph.nodes))
         if self.node is not None and self.node not in nodes:
-            return not_met(
-                f"{self.node}: not in the ROS graph",
-                {"nodes": nodes[:20]},
-                blocked_by="node_name",
-                problem=ProblemKind.OTHER_NAME,
-            )
+            reason, problem = f"{self.node}: not in the ROS graph", ProblemKind.OTHER_NAME
+            return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=problem)
         if any(e.service.endswith("/change_state") for e in trace.service_ends("service")):
             raise HarnessError("the recording asks for no transition and no state")
-        hint = "derive it from rclpy.lifecycle.Node"
-        return not_met(
-            "no node of the program can be asked for a transition: none has a lifecycle",
-            hint=hint,
-            problem=ProblemKind.ABSENT,
-        )
+        reason = "no node of the program can be asked for a transition: none has a lifecycle"
+        return not_met(reason, hint="derive it from rclpy.lifecycle.Node", problem=ProblemKind.ABSENT)
 
 
 def _label(call: Call) -> str:

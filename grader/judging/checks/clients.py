@@ -70,7 +70,6 @@ class CallsOfClient:
         return f"{text}, {number(seconds(self.period))} ± {number(seconds(self.tolerance))} s apart"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if number and gaps are right; the reason names the first wrong gap."""
         calls = calls_of(trace, self.service, "student")
         if not calls:
             return explain_no_client(trace, self.service)
@@ -90,12 +89,8 @@ class CallsOfClient:
         place, gap = wrong
         wanted = f"{span(self.period or 0)} ± {number(seconds(self.tolerance))} s"
         reason = f"{asked}; {seconds(gap):.3f} s from number {place} to number {place + 1}, expected {wanted}"
-        return not_met(
-            reason,
-            evidence,
-            hint=f"wait {span(self.period or 0)} after each answer before asking again",
-            problem=ProblemKind.WRONG_RATE,
-        )
+        hint = f"wait {span(self.period or 0)} after each answer before asking again"
+        return not_met(reason, evidence, hint=hint, problem=ProblemKind.WRONG_RATE)
 
     def _wrong_gap(self, trace: Trace, calls: Sequence[Call]) -> tuple[int, int] | None:
         """Return the number of the first call whose gap to the next is wrong, and the gap."""
@@ -111,12 +106,8 @@ class CallsOfClient:
     def _miscounted(self, trace: Trace, calls: Sequence[Call], evidence: dict[str, object]) -> Finding:
         reason = f"{self.service}: {counted(len(calls), 'request')}, expected {self.calls}"
         if len(calls) > self.calls:
-            return not_met(
-                reason,
-                evidence,
-                hint=f"ask {self.calls} times: for i in range({self.calls})",
-                problem=ProblemKind.TOO_MANY,
-            )
+            hint = f"ask {self.calls} times: for i in range({self.calls})"
+            return not_met(reason, evidence, hint=hint, problem=ProblemKind.TOO_MANY)
         if crashed := explain_fault(trace, reason, evidence, last=True):
             return crashed
         last = calls[-1]
@@ -150,7 +141,6 @@ class WaitsForService:
         return f"{self.process} waits for {self.service}, logs that it does, and asks once it is there"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for a record before the server appeared and a request after it."""
         starts = trace.marks("server_starts", self.service)
         appears_ns = starts[0].t_ns if starts else trace.stop_ns + 1
         gave_up = self._gave_up(trace, appears_ns)
@@ -258,15 +248,12 @@ class ReactsToResponses:
         return f"{self.process} {text}; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the reaction to every response on this side is right."""
         episodes = _episodes(self, trace)
         if not episodes:
             return _not_asked(trace, self.process, self.service)
-        sides = {"above": (CallKind.GOOD,), "at_or_below": (CallKind.LOW,), "both": (CallKind.GOOD, CallKind.LOW)}[
-            self.side
-        ]
-        mine = [e for e in episodes if e.kind in sides]
-        if not {e.kind for e in mine} >= set(sides):
+        sides = {CallKind.GOOD: self.side != "at_or_below", CallKind.LOW: self.side != "above"}
+        mine = [e for e in episodes if sides.get(e.kind)]
+        if len({e.kind for e in mine}) < sum(sides.values()):
             return _not_reached(trace, self.process, self.service, episodes)
         evidence = self._evidence(episodes)
         wrong = [(e, flaw) for e in mine if (flaw := self._wrong(e, episodes))]
@@ -370,7 +357,6 @@ class NoGoWithoutAnswer:
         return f"{self.process} does not go on where {self.service} gives no answer, no success or no number"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no output that signals continuing follows a useless response."""
         episodes = _episodes(self, trace)
         if not episodes:
             return _not_asked(trace, self.process, self.service)

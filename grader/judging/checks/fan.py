@@ -13,13 +13,8 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Trace
-from grader.judging.charts import (
-    answer_panel,
-    input_panel,
-    time_chart,
-    which_answers,
-)
-from grader.judging.findings import explain_no_message, faulted, first_fault, met, not_met
+from grader.judging.charts import answer_panel, input_panel, time_chart, which_answers
+from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
 from grader.judging.series import lag_ns
 from grader.judging.values import (
     EXACT,
@@ -85,7 +80,6 @@ class ThresholdResponse:
         return f"{number(answer)} on {self.output} for every {self.input} {side} {limit}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every input on this side has the right answer."""
         inputs = held(trace, self.input, heard_from_ns=heard_from_ns(trace, self.input))
         messages = published(trace, self.output)
         if not messages:
@@ -159,11 +153,7 @@ class ThresholdResponse:
         return None if came else during[-1]
 
     def _evidence(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> dict[str, object]:
-        rows = []
-        for asked in inputs:
-            state = [a.value for a in answers if a.t_ns < asked.stop_ns]
-            expected = self._expected(asked.value)
-            rows.append([seconds(asked.start_ns), asked.value, state[-1] if state else None, expected])
+        rows = [[seconds(h.start_ns), h.value, _state(h, answers), self._expected(h.value)] for h in inputs]
         return {"columns": ["t_s", "input", "answer", "expected"], "rows": rows, "answers": len(answers)}
 
     def _violated(
@@ -191,13 +181,9 @@ class ThresholdResponse:
             return not_met(reason + cause, evidence, hint=hint, problem=ProblemKind.CONTRADICTION)
         lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
         if lag is not None:
-            cause = f"; the answers are right for what was published {span(lag)} before"
-            return not_met(
-                reason + cause,
-                evidence | {"lag_s": seconds(lag)},
-                hint=f"answer what has just come on {self.input}",
-                problem=ProblemKind.BEHIND,
-            )
+            reason += f"; the answers are right for what was published {span(lag)} before"
+            hint = f"answer what has just come on {self.input}"
+            return not_met(reason, evidence | {"lag_s": seconds(lag)}, hint=hint, problem=ProblemKind.BEHIND)
         cause, hint = self._diagnosis(violations, inputs, answers)
         kind = ProblemKind.NO_ANSWER if first.got is None else ProblemKind.WRONG_ANSWER
         return not_met(reason + cause, evidence, hint=hint, problem=kind)
@@ -234,11 +220,8 @@ class ThresholdResponse:
         return len(after) > 1 and all(v == self.above for v in after)
 
     def _inverted(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> bool:
-        pairs = []
-        for asked in inputs:
-            state = [a.value for a in answers if a.t_ns < asked.stop_ns]
-            if state:
-                pairs.append((asked.value, state[-1]))
+        states = ((asked.value, _state(asked, answers)) for asked in inputs)
+        pairs = [(value, got) for value, got in states if got is not None]
         flipped = {self.above: self.otherwise, self.otherwise: self.above}
         both = {v > self.threshold for v, _ in pairs} == {True, False}
         # exactly at the threshold, inverted logic may give either answer
@@ -254,24 +237,15 @@ class ThresholdResponse:
         if not ends:
             others = [e.topic for e in student_endpoints(trace, "subscription")]
             instead = f"; it subscribes to {quote(others[0])}" if others else ""
-            hint = f"subscribe to {self.input}"
-            return not_met(
-                f"{why.reason}; nothing subscribes to {self.input}{instead}",
-                why.evidence,
-                hint=hint,
-                problem=ProblemKind.ABSENT,
-            )
-        return not_met(
-            f"{why.reason}; {quote(ends[0].node)} subscribes to {self.input}{_deaf(ends)}",
-            why.evidence,
-            problem=why.problem,
-        )
+            reason, hint = f"{why.reason}; nothing subscribes to {self.input}{instead}", f"subscribe to {self.input}"
+            return not_met(reason, why.evidence, hint=hint, problem=ProblemKind.ABSENT)
+        reason = f"{why.reason}; {quote(ends[0].node)} subscribes to {self.input}{_deaf(ends)}"
+        return not_met(reason, why.evidence, problem=why.problem)
 
     def _nothing_asked(self, trace: Trace) -> Finding:
-        fault = first_fault(trace)
-        if fault is None:
-            raise HarnessError(f"{self.input}: no value on this side of {number(self.threshold)} was published")
-        return faulted(fault, f"no answer on {self.output}")
+        if crashed := explain_fault(trace, f"no answer on {self.output}"):
+            return crashed
+        raise HarnessError(f"{self.input}: no value on this side of {number(self.threshold)} was published")
 
     def chart(self, trace: Trace) -> Chart | None:
         """Return the inputs of a controller with its answers below them, or None without inputs."""
@@ -302,6 +276,11 @@ def _answers_at_once(trace: Trace, topic: str, answers: Sequence[Reading]) -> bo
     prompt = sum(a.t_ns in asked for a in answers)
     enough = trace.clock is ClockKind.VIRTUAL and prompt >= _FEWEST_AT_ONCE and 2 * prompt >= len(asked)
     return enough and prompt >= _SHARE_AT_ONCE * len(answers)
+
+
+def _state(asked: Held, answers: Sequence[Reading]) -> float | None:
+    """Return the last answer before the end of an input; None before the first answer."""
+    return next((a.value for a in reversed(answers) if a.t_ns < asked.stop_ns), None)
 
 
 def _gaps(answers: Sequence[Reading]) -> list[int]:

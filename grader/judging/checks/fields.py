@@ -13,7 +13,7 @@ from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import SLACK, Formula, seconds, within
 from grader.core.trace import Message, Trace
 from grader.judging.charts import plain_topic, points_of, series, time_chart
-from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
+from grader.judging.findings import explain_fault, explain_no_message, met, not_met
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
 from grader.judging.values import (
     JITTER_NS,
@@ -51,7 +51,6 @@ class FieldEqual:
         return f"{rules_text(self.fields)} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no message differs; the reason names the first that does."""
         messages = published(trace, self.topic)
         if len(messages) < max(1, self.at_least):
             return too_few_messages(trace, self.topic, len(messages), self.at_least)
@@ -91,7 +90,6 @@ class FieldInRange:
         return f"{self.field} {FieldRule(low=self.low, high=self.high).wanted} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no value is outside; the reason names the first that is."""
         messages = published(trace, self.topic)
         if len(messages) < max(1, self.at_least):
             return too_few_messages(trace, self.topic, len(messages), self.at_least)
@@ -134,7 +132,6 @@ class FieldMonotone:
         return f"{self.field} on {self.topic} only {self.direction}{', never equal' if self.strictly else ''}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no step goes the other way; the reason names the first that does."""
         messages = published(trace, self.topic)
         if len(messages) < max(2, self.at_least):
             return too_few_messages(trace, self.topic, len(messages), max(2, self.at_least))
@@ -147,16 +144,12 @@ class FieldMonotone:
             k = wrong[0]
             reason = f"{moment(messages[k].t_ns)}, {self.topic}: {self.field} goes from {number(values[k - 1])} to "
             reason += f"{number(values[k])}, expected it {self.direction}; so {counted(len(wrong), 'time')}"
-            return not_met(
-                reason, evidence | {"first_wrong_s": seconds(messages[k].t_ns)}, problem=ProblemKind.WRONG_VALUE
-            )
+            known = evidence | {"first_wrong_s": seconds(messages[k].t_ns)}
+            return not_met(reason, known, problem=ProblemKind.WRONG_VALUE)
         ends = f"from {number(values[0])} to {number(values[-1])} in {counted(len(values), 'message')}"
         if values[0] == values[-1]:
-            return not_met(
-                f"{self.topic}: {self.field} never moves, {ends}, expected it {self.direction}",
-                evidence,
-                problem=ProblemKind.CONSTANT,
-            )
+            reason = f"{self.topic}: {self.field} never moves, {ends}, expected it {self.direction}"
+            return not_met(reason, evidence, problem=ProblemKind.CONSTANT)
         return met(f"{self.topic}: {self.field} only {self.direction}, {ends}", evidence)
 
     def _fine(self, before: float, after: float) -> bool:
@@ -212,7 +205,6 @@ class FieldFunction:
         return f"{self.field} = {self.formula} in every message on {self.topic}, n being 0 in the first one"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no message differs; the reason names the first that does."""
         messages = published(trace, self.topic)
         if not messages:
             return explain_no_message(trace, self.topic)
@@ -259,10 +251,8 @@ class FieldFunction:
 
     def _few(self, trace: Trace, samples: Sequence[Sample], evidence: dict[str, object]) -> Finding:
         found = f"{self.topic}: {counted(len(samples), 'message')}, expected at least {self.at_least}"
-        fault = first_fault(trace)
-        if fault is None:
-            return not_met(found, evidence, blocked_by="topic_rate", problem=ProblemKind.TOO_FEW)
-        return faulted(fault, found, evidence, last=True)
+        few = not_met(found, evidence, blocked_by="topic_rate", problem=ProblemKind.TOO_FEW)
+        return explain_fault(trace, found, evidence, last=True) or few
 
     def _differs(
         self,
@@ -313,18 +303,14 @@ class RandomInRange:
         return f"every value on {self.topic} within {span_}, and drawn at random"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no value is outside and the values may be random."""
         messages = published(trace, self.topic)
         if not messages:
             silent = explain_no_message(trace, self.topic)
             return not_met(silent.reason, silent.evidence, blocked_by="topic_rate", problem=silent.problem)
         values = published_numbers(trace, self.topic)
         if len(values) < len(messages):
-            return not_met(
-                f"{self.topic}: {quote(messages[0].type)} carries no number",
-                {"type": messages[0].type},
-                problem=ProblemKind.NO_NUMBER,
-            )
+            reason = f"{self.topic}: {quote(messages[0].type)} carries no number"
+            return not_met(reason, {"type": messages[0].type}, problem=ProblemKind.NO_NUMBER)
         return self._outside(values) or self._computed(values) or self._drawn(values)
 
     @property
@@ -333,13 +319,8 @@ class RandomInRange:
 
     def _evidence(self, values: Sequence[Reading]) -> dict[str, object]:
         got = [r.value for r in values]
-        return {
-            "messages": len(got),
-            "min": min(got),
-            "max": max(got),
-            "distinct": len(set(got)),
-            "first_values": got[:10],
-        }
+        known = {"messages": len(got), "min": min(got), "max": max(got)}
+        return known | {"distinct": len(set(got)), "first_values": got[:10]}
 
     def _outside(self, values: Sequence[Reading]) -> Finding | None:
         unit = unit_of(self.topic)

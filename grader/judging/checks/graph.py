@@ -35,7 +35,6 @@ class BidirectionalGraph:
         return f"one node reached by {self.forward}, the other by {self.back}, with the types agreeing"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if any snapshot has both directions between the same two processes."""
         snapshots = [g for g in trace.graphs() if g.t_ns < trace.stop_ns]
         for snapshot in snapshots:
             edges = self._both_ways(snapshot)
@@ -149,7 +148,6 @@ class Qos:
         return " and ".join(parts) or "any QoS"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if an endpoint has all of them; the reason lists those of the others."""
         mine = student_endpoints(trace, self.kind, self.topic)
         if not mine:
             return self._absent(trace)
@@ -201,7 +199,6 @@ class NodeName:
         return f"a node named {self.name}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if it ever was; the reason names the nodes that were."""
         wanted = self.name if self.name.startswith("/") else f"/{self.name}"
         nodes = list(dict.fromkeys(node for graph in trace.graphs() for node in graph.nodes))
         if wanted in nodes:
@@ -241,7 +238,6 @@ class TopicNames:
         return f"{self.node or 'the program'} {' and '.join(parts)}{' and nothing else' if self.exactly else ''}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no topic is missing, and none is extra if `exactly` is set."""
         made = [e for e in student_endpoints(trace) if self.node in (None, e.node)]
         out, back = (sorted({e.topic for e in made if e.kind == k}) for k in ("publisher", "subscription"))
         flaws = [*_flaws("published", self.publishes, out, exactly=self.exactly)]
@@ -301,7 +297,6 @@ class GraphEdges:
         return f"{', '.join(map(str, self.edges))} in the ROS graph{' at one moment' if self.at_once else ''}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no edge is missing; the reason names the first that is."""
         graphs = [g for g in trace.graphs() if g.t_ns < trace.stop_ns]
         shown = {g.t_ns: [edge for edge in self.edges if self._has(g, edge)] for g in graphs}
         seen = [edge for edge in self.edges if any(edge in edges for edges in shown.values())]

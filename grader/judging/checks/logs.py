@@ -36,13 +36,8 @@ def no_node(trace: Trace, process: str, evidence: dict[str, object]) -> Finding:
     fault = first_fault(trace, process)
     if fault is not None:
         reason = f"{fault_sentence(fault)}; {reason}"
-    return not_met(
-        reason,
-        evidence,
-        hint="create the node, and log with node.get_logger()",
-        fault=fault,
-        problem=ProblemKind.NO_NODE,
-    )
+    hint = "create the node, and log with node.get_logger()"
+    return not_met(reason, evidence, hint=hint, fault=fault, problem=ProblemKind.NO_NODE)
 
 
 def complained(process: str, bad: Sequence[LogRecord], when: str, more: Mapping[str, object], hint: str) -> Finding:
@@ -73,7 +68,6 @@ class UsesLogger:
         return f"a record of {self.process} through its logger; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for a record, half for printed lines only."""
         records = student_records(trace, self.process)
         lines = printed_lines(trace, self.process)
         evidence = {"process": self.process, "records": len(records), "printed_lines": len(lines)}
@@ -134,7 +128,6 @@ class LogsMatching:
         return f"at least {self.at_least}{most} log records of {self.process}{level}{text}{every}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for records, half for printed lines."""
         records = student_records(trace, self.process)
         mine = [r for r in records if self._of_level(r) and self._matches(r)]
         flaw = self._flaw(mine)
@@ -233,7 +226,6 @@ class LogsEvery:
         )
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for records with that spacing, half for printed lines."""
         messages = published(trace, self.topic)
         if not messages:
             return waiting_for("publishes", explain_no_message(trace, self.topic))
@@ -316,22 +308,16 @@ class LogsEvery:
         return {"messages": len(messages), "logs": len(found.places), "with_message": places, "every": self.every}
 
     def _few(self, trace: Trace, messages: Sequence[Message]) -> Finding:
-        fault = first_fault(trace, self.process)
         reason = f"{self.topic}: {counted(len(messages), 'message')} cannot show one log for every {self.every}"
-        if fault is None:
-            return not_met(reason, {"messages": len(messages)}, blocked_by="topic_rate", problem=ProblemKind.TOO_FEW)
-        return faulted(fault, reason)
+        few = not_met(reason, {"messages": len(messages)}, blocked_by="topic_rate", problem=ProblemKind.TOO_FEW)
+        return explain_fault(trace, reason, process=self.process) or few
 
     def _wrong(self, messages: Sequence[Message], found: Sequence[_Rhythm]) -> Finding:
         if not found:
             first = moment(messages[0].t_ns)
             reason = f"{self.process}: nothing is logged from the first message at {first} on; {self._wanted}"
-            return not_met(
-                reason,
-                {"messages": len(messages), "logs": 0, "every": self.every},
-                hint=LOGGER_HINT,
-                problem=ProblemKind.NOT_LOGGED,
-            )
+            known = {"messages": len(messages), "logs": 0, "every": self.every}
+            return not_met(reason, known, hint=LOGGER_HINT, problem=ProblemKind.NOT_LOGGED)
         flaw = self._flaw(found[0], messages)
         reason = f"{self.process}: {counted(len(found[0].places), 'log')}, {flaw}; {self._wanted}"
         hint = f"count every message that is published, and log when count % {self.every} == 0"

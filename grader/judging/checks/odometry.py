@@ -14,15 +14,7 @@ from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import Fault, Trace
 from grader.judging.charts import series, time_chart
 from grader.judging.checks.logs import complained
-from grader.judging.findings import (
-    fault_hint,
-    fault_sentence,
-    faulted,
-    first_fault,
-    met,
-    not_met,
-    only_printed,
-)
+from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, only_printed
 from grader.judging.output import printed_lines, student_records, written
 from grader.judging.position_causes import cause_of
 from grader.judging.position_logs import (
@@ -84,7 +76,6 @@ class LogsPosition:
         return f"{self.process} logs the x and y that {self.topic} had at that moment; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for right records, half for right printed lines; the reason names what is wrong."""
         track = _track(trace, self.process, self.topic)
         if isinstance(track, Finding):
             return track
@@ -183,7 +174,6 @@ class LogPeriod:
         return f"one log every {number(seconds(self.period))} s ± {share} % on average while {self.topic} is played"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the average is right and there is no long gap."""
         track = _track(trace, self.process, self.topic)
         if isinstance(track, Finding):
             return not_met(track.reason, track.evidence, blocked_by="logs_position", problem=track.problem)
@@ -217,12 +207,8 @@ class LogPeriod:
             return met(f"{average}; {wanted}", evidence)
         fault = first_fault(trace, self.process)
         ended = f"; {fault_sentence(fault)}" if fault else ""
-        return not_met(
-            f"{average}, but none from {span(gap[0])} to {span(gap[1])}{ended}; {wanted}",
-            evidence,
-            fault=fault,
-            problem=ProblemKind.STOPPED,
-        )
+        reason = f"{average}, but none from {span(gap[0])} to {span(gap[1])}{ended}; {wanted}"
+        return not_met(reason, evidence, fault=fault, problem=ProblemKind.STOPPED)
 
     def _off(
         self, track: Track, times: Sequence[int], reason: str, wanted: str, evidence: dict[str, object]
@@ -301,7 +287,6 @@ class WaitsGracefully:
         return f"{self.process} lives through {silence} s without {self.topic}, without an error, and works afterwards"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if nothing failed and something was written after the first message."""
         fault = first_fault(trace, self.process)
         if fault is not None:
             return self._faulted(trace, fault)
@@ -334,11 +319,8 @@ class WaitsGracefully:
         after = min((o.t_ns for o in outputs if o.t_ns >= first_ns and o.text not in before), default=None)
         alive = f"{self.process}: alive through {span(first_ns)} without a message"
         if after is None:
-            return not_met(
-                f"{alive}, but no sign that the data arrived",
-                blocked_by="logs_position",
-                problem=ProblemKind.NOT_LOGGED,
-            )
+            reason = f"{alive}, but no sign that the data arrived"
+            return not_met(reason, blocked_by="logs_position", problem=ProblemKind.NOT_LOGGED)
         evidence = {"silence_s": seconds(first_ns), "first_output_s": seconds(after)}
         return met(f"{alive}, first output with data at {moment(after)}", evidence)
 

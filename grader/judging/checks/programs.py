@@ -65,7 +65,6 @@ class ParameterDeclared:
         return f"the parameter {self.name}{kind}{value}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the first response for the parameter fits."""
         calls = asked_for(trace, self.name, self.node)
         answers = [found for call in calls if (found := reported_parameter(call, self.name)) is not None]
         if not answers:
@@ -103,11 +102,8 @@ def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Fi
         return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=ProblemKind.OTHER_NAME)
     if asked:
         who = node or "the node"
-        return not_met(
-            f"{who}: no answer to the question for {name}",
-            hint="spin the node: rclpy.spin(node)",
-            problem=ProblemKind.NO_ANSWER,
-        )
+        reason, hint = f"{who}: no answer to the question for {name}", "spin the node: rclpy.spin(node)"
+        return not_met(reason, hint=hint, problem=ProblemKind.NO_ANSWER)
     raise HarnessError(f"the recording does not ask for the parameter {name}")
 
 
@@ -143,7 +139,6 @@ class ParameterTakesEffect:
         return f"within {span(self.within)} of setting {self.name}, {what} of {self.topic} has its value"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every value took effect; the reason names the first that did not."""
         tries = settings(trace, self.name, self.node)
         if not any(s.answered for s in tries):
             return _unanswered(trace, self.name, self.node, asked=bool(tries))
@@ -227,7 +222,6 @@ class NoFault:
         return f"{self.process or 'every process'} runs to the end without an exception"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit without faults; the reason names the first."""
         faults = faults_before_stop(trace, self.process)
         if not faults:
             return met(f"{self.process or 'every process'}: no fault in {span(trace.stop_ns)}", {"faults": 0})
@@ -256,7 +250,6 @@ class CleanShutdown:
         return f"{self.process} ends within {number(seconds(self.within))} s of Ctrl-C, without another exception"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if it ended in time; the reason tells what happened instead."""
         signals = trace.marks("stop_signal", self.process)
         faults = trace.faults(self.process)
         if not signals:
@@ -266,10 +259,8 @@ class CleanShutdown:
                 return not_met(reason, hint=fault_hint(first), fault=first)
             ended = trace.marks("exited", self.process)
             if ended:
-                return not_met(
-                    f"{self.process} ended by itself at {moment(ended[0].t_ns)}, before it was stopped",
-                    problem=ProblemKind.ENDED,
-                )
+                reason = f"{self.process} ended by itself at {moment(ended[0].t_ns)}, before it was stopped"
+                return not_met(reason, problem=ProblemKind.ENDED)
             raise HarnessError(f"{self.process}: the scenario has no `shutdown`, so nobody stopped it")
         asked_ns = signals[0].t_ns
         stopped = [m for m in trace.marks("stopped", self.process) if m.t_ns >= asked_ns]
@@ -279,11 +270,8 @@ class CleanShutdown:
             reason = f"{self.process}: ended {seconds(took):.3f} s after Ctrl-C"
             if took <= self.within + LATENESS_NS[trace.clock]:
                 return met(reason, {"took_s": seconds(took)})
-            return not_met(
-                f"{reason}, expected within {number(seconds(self.within))} s",
-                {"took_s": seconds(took)},
-                problem=ProblemKind.TOO_LATE,
-            )
+            reason += f", expected within {number(seconds(self.within))} s"
+            return not_met(reason, {"took_s": seconds(took)}, problem=ProblemKind.TOO_LATE)
         if after:
             reason = f"{moment(after[0].t_ns)}, after Ctrl-C: {fault_sentence(after[0])}"
             hint = "" if after[0].kind is FaultKind.EXCEPTION else _SHUTDOWN_HINT
@@ -325,7 +313,6 @@ class SourceUses(_OfSource):
         return f"in {self.process} {' and '.join([*parts, *(f'a call of {name}' for name in self.calls)])}"
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
-        """Return full credit if everything is there; the reason names what is missing."""
         source = _source(trace, sources, self.process)
         if isinstance(source, Finding):
             return source
@@ -373,7 +360,6 @@ class SourceAvoids(_OfSource):
         return " and ".join([f"no call of {name}" for name in self.calls] + ["no global"] * self.globals)
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
-        """Return full credit if nothing forbidden is there; the reason names the first place."""
         source = _source(trace, sources, self.process)
         if isinstance(source, Finding):
             return source

@@ -41,10 +41,9 @@ class _Measured:
     @property
     def steady(self) -> bool:
         """Whether at least half of the intervals are within half of the average."""
-        gaps = [b - a for a, b in zip(self.times_ns, self.times_ns[1:], strict=False)]
         least, most = 0.5 * self.average_ns, 1.5 * self.average_ns
-        usual = sum(least <= g <= most for g in gaps)
-        return 2 * usual >= len(gaps)
+        usual = sum(least <= b - a <= most for a, b in pairwise(self.times_ns))
+        return 2 * usual >= len(self.times_ns) - 1
 
     def sentence(self) -> str:
         return (
@@ -84,7 +83,6 @@ class TopicRate:
         return text
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full, half or no credit, depending on the difference of the rate."""
         times = [m.t_ns for m in published(trace, self.topic)]
         if not times:
             return explain_no_message(trace, self.topic)
@@ -100,6 +98,10 @@ class TopicRate:
     @property
     def _period_ns(self) -> float:
         return NS_PER_S / self.rate
+
+    @property
+    def _period_s(self) -> str:
+        return number(1 / self.rate)
 
     @property
     def _wanted(self) -> str:
@@ -149,7 +151,7 @@ class TopicRate:
         first, last = found.times_ns[0], found.times_ns[-1]
         seen = f"{self.topic}: {found.sentence()}"
         if not found.steady:
-            hint = f"publish one message every {self._period_text()} rather than several at once"
+            hint = f"publish one message every {self._period_s} s rather than several at once"
             problem = ProblemKind.BURSTS
             return not_met(f"{seen}; the messages come in bursts; {self._wanted}", evidence, hint=hint, problem=problem)
         silence = found.stop_ns - last
@@ -158,20 +160,15 @@ class TopicRate:
             hint = fault_hint(fault) if fault else ""
             reason, problem = f"{seen}; {ended}; {self._wanted}", ProblemKind.STOPPED
             return not_met(reason, evidence, hint=hint, fault=fault, problem=problem)
-        if (
-            self.window is not None
-            and found.stop_ns - first < self.window - self._period_ns - _END_SLACK_NS[trace.clock]
-        ):
-            observed = (
-                f"only {span(found.stop_ns - first)} could be observed, the first message came at {moment(first)}"
-            )
+        length = found.stop_ns - first
+        if self.window is not None and length < self.window - self._period_ns - _END_SLACK_NS[trace.clock]:
+            observed = f"only {span(length)} could be observed, the first message came at {moment(first)}"
             fault = first_fault(trace)
             observed += f"; {fault_sentence(fault)}" if fault else ""
             off = fault is None and not within(found.rate_hz, self.rate, self.tolerance)
             hint = self._hint(found.rate_hz) if off else ""
-            return not_met(
-                f"{seen}; {observed}; {self._wanted}", evidence, hint=hint, fault=fault, problem=ProblemKind.TOO_LATE
-            )
+            reason, problem = f"{seen}; {observed}; {self._wanted}", ProblemKind.TOO_LATE
+            return not_met(reason, evidence, hint=hint, fault=fault, problem=problem)
         return None
 
     def _too_few(self, trace: Trace, times: tuple[int, ...]) -> Finding:
@@ -183,14 +180,11 @@ class TopicRate:
         fault = first_fault(trace)
         if fault is not None:
             return not_met(f"{self.topic}: {found}; {fault_sentence(fault)}; {self._wanted}", evidence, fault=fault)
-        hint = f"publish from a timer: create_timer({self._period_text(bare=True)}, ...) takes the period in seconds"
+        hint = f"publish from a timer: create_timer({self._period_s}, ...) takes the period in seconds"
         return not_met(f"{self.topic}: {found}; {self._wanted}", evidence, hint=hint, problem=ProblemKind.TOO_FEW)
 
-    def _period_text(self, *, bare: bool = False) -> str:
-        return number(1 / self.rate) + ("" if bare else " s")
-
     def _hint(self, rate_hz: float) -> str:
-        period = self._period_text(bare=True)
+        period = self._period_s
         rule = f"create_timer({period}, ...): the argument is the period in seconds, 1/{number(self.rate)} = {period}"
         if rate_hz > 20 * self.rate:
             return f"the loop has no pacing; use {rule}"

@@ -95,7 +95,6 @@ class LogsValues:
         return f"{self.process} logs {products} for each message on {self.topic}; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if enough messages are in log records, half if printed lines are needed."""
         fault = first_fault(trace, self.process)
         subscribed = student_endpoints(trace, "subscription", self.topic)
         if not subscribed and fault is None:
@@ -260,7 +259,6 @@ class LogsReceived:
         return f"{self.process} logs every value that it receives on {self.topic}; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every value is in a log record, half if printed lines are needed."""
         fault = first_fault(trace, self.process)
         values = held(trace, self.topic, heard_from_ns=heard_from_ns(trace, self.topic))
         subscriptions = student_endpoints(trace, "subscription", self.topic)
@@ -297,12 +295,8 @@ class LogsReceived:
         types = [e.type for e in subscriptions]
         if types and not any(carries_number(t) for t in types):
             reason = f"{self.topic}: the subscription takes {quote(types[0])}, which carries no number"
-            return not_met(
-                reason,
-                {"type": types[0]},
-                hint="use a numeric message type, e.g. std_msgs/msg/Float32",
-                problem=ProblemKind.NO_NUMBER,
-            )
+            hint = "use a numeric message type, e.g. std_msgs/msg/Float32"
+            return not_met(reason, {"type": types[0]}, hint=hint, problem=ProblemKind.NO_NUMBER)
         return _nothing(trace, self.process, f"{self.topic}: no number was published on it")
 
     def _sought(self, values: Sequence[Held], trace: Trace) -> list[Sought]:
@@ -373,7 +367,6 @@ def _nothing(trace: Trace, process: str, problem: str) -> Finding:
     Raises:
         HarnessError: The process was running: `problem`.
     """
-    found = explain_fault(trace, "nothing was logged after it", process=process)
-    if found is None:
-        raise HarnessError(problem)
-    return found
+    if crashed := explain_fault(trace, "nothing was logged after it", process=process):
+        return crashed
+    raise HarnessError(problem)

@@ -10,7 +10,7 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, Pattern, ServiceType, seconds, within
 from grader.core.trace import Response, Trace
-from grader.judging.findings import explain_fault, explain_no_server, faulted, first_fault, met, not_met, waiting_for
+from grader.judging.findings import explain_fault, explain_no_server, first_fault, met, not_met, waiting_for
 from grader.judging.output import number_in
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of
 from grader.judging.values import FieldRule, breach, broken_rules, number_at, rules_text, text_at
@@ -36,7 +36,6 @@ class ServiceAvailable:
         return f"the service {self.service} with type {self.type}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for at least one matching server."""
         answers = [r for r in trace.responses(self.service, "student") if r.type == self.type]
         ends = [e for e in trace.service_ends("service", self.service) if e.type == self.type]
         if not answers and not ends:
@@ -67,7 +66,6 @@ class ServiceAnswersAll:
         return f"a response to every request on {self.service} within {number(seconds(self.within))} s"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no response is missing or late; the reason names the first that is."""
         late_ns = self.within + LATENESS_NS[trace.clock]
         fault = first_fault(trace)
         calls = [c for c in calls_of(trace, self.service, "grader") if _due(c, trace, late_ns) or fault is not None]
@@ -122,7 +120,6 @@ class ServiceResponse:
         return f"in every response of {self.service}: {rules_text(self.fields)}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no response differs; the reason names the first that does."""
         found = [r for r in trace.responses(self.service, "student") if r.t_ns < trace.stop_ns]
         if len(found) < max(1, self.at_least):
             return too_few_responses(trace, self.service, len(found), self.at_least)
@@ -134,12 +131,8 @@ class ServiceResponse:
         path = broken_rules(first.value, self.fields)[0]
         reason = f"{moment(first.t_ns)}, {self.service}: {breach(first.value, path, self.fields[path])} in response "
         reason += f"{place}; wrong in {len(wrong)} of {counted(len(found), 'response')}"
-        return not_met(
-            reason,
-            evidence | {"field": path, "first_wrong_s": seconds(first.t_ns)},
-            hint=_hint(first, path),
-            problem=ProblemKind.WRONG_VALUE,
-        )
+        known = evidence | {"field": path, "first_wrong_s": seconds(first.t_ns)}
+        return not_met(reason, known, hint=_hint(first, path), problem=ProblemKind.WRONG_VALUE)
 
 
 def _hint(response: Response, path: str) -> str:
@@ -164,12 +157,11 @@ def never_asked(trace: Trace, service: str) -> Finding:
     Raises:
         HarnessError: The server existed and was running.
     """
-    fault = first_fault(trace)
     if not trace.service_ends("service", service):
         return waiting_for("service_available", explain_no_server(trace, service))
-    if fault is None:
-        raise HarnessError(f"{service}: nothing was asked of it, or too late to be answered")
-    return faulted(fault, f"{service} could not be asked")
+    if crashed := explain_fault(trace, f"{service} could not be asked"):
+        return crashed
+    raise HarnessError(f"{service}: nothing was asked of it, or too late to be answered")
 
 
 _MOST_IN_EVIDENCE = 250
@@ -224,7 +216,6 @@ class ServiceSequence:
         return text + (f", not beyond {number(self.floor)}{again}" if self.floor is not None else "")
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every number is the expected one; the reason names the first that is not."""
         calls = calls_of(trace, self.service, "grader")
         answered = sorted((c for c in calls if c.response is not None), key=_answered_ns)
         if len(answered) < max(1, self.at_least):

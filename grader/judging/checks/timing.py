@@ -77,7 +77,6 @@ class Period:
         return f"gaps of {' and '.join(parts) or 'any length'} between the messages on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no gap is out of bounds; the reason names the first that is."""
         times = [m.t_ns for m in published(trace, self.topic)]
         if len(times) < max(2, self.at_least):
             return too_few_messages(trace, self.topic, len(times), max(2, self.at_least))
@@ -134,12 +133,12 @@ class Latency:
         return f"a message on {self.output} within {_ms(self.within)} of each one on {self.input}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if enough inputs are followed in time; the reason names the first that is not."""
         outputs = [m.t_ns for m in published(trace, self.output)]
         if not outputs:
             return explain_no_message(trace, self.output)
         jitter = JITTER_NS[trace.clock]
-        inputs = self._inputs(trace, jitter)
+        sent = (given.t_ns for given in _inputs(trace, self.input))
+        inputs = [t for t in sent if t + self.within + jitter < trace.stop_ns]
         if not inputs:
             return _no_input(trace, self.input)
         delays = [self._delay(t_ns, outputs, jitter) for t_ns in inputs]
@@ -160,15 +159,15 @@ class Latency:
         problem = ProblemKind.NO_ANSWER if delay is None else ProblemKind.TOO_LATE
         return not_met(reason, evidence | {"first_late_s": seconds(t_ns)}, problem=problem)
 
-    def _inputs(self, trace: Trace, jitter: int) -> list[int]:
-        from_ns = heard_from_ns(trace, self.input)
-        sent = [d.t_ns for d in trace.deliveries(self.input) if d.t_ns >= from_ns]
-        sent = sent or [m.t_ns for m in published(trace, self.input)]
-        return [t for t in sent if t + self.within + jitter < trace.stop_ns]
-
     def _delay(self, t_ns: int, outputs: Sequence[int], jitter: int) -> int | None:
         place = bisect_left(outputs, t_ns - jitter)
         return max(0, outputs[place] - t_ns) if place < len(outputs) else None
+
+
+def _inputs(trace: Trace, topic: str) -> list[Delivery | Message]:
+    """Return the grader's messages on a topic that had a subscriber; without any, those of the student's nodes."""
+    from_ns = heard_from_ns(trace, topic)
+    return [d for d in trace.deliveries(topic) if d.t_ns >= from_ns] or [*published(trace, topic)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +200,6 @@ class Silence:
         return f"no message on {self.topic} {' and '.join(parts).replace('_', ' ')}{grace}".replace("  ", " ")
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the window has no message; the reason names the first one."""
         fault = first_fault(trace)
         start_ns = self._moment(trace, self.after, 0)
         stop_ns = self._moment(trace, self.before, trace.stop_ns)
@@ -281,7 +279,6 @@ class _Asked:
 
     given: Delivery | Message
     case: ReactionCase
-    stop_ns: int
     outputs: tuple[Message, ...]
 
 
@@ -312,7 +309,6 @@ class Reaction:
         return f"within {span(self.within)} of each {self.input} a message on {self.output} that fits it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every input has the right output; the reason names the first that has not."""
         asked = self._asked(trace)
         outputs = published(trace, self.output)
         missing = [case for case in self.cases if not any(a.case is case for a in asked)]
@@ -328,9 +324,7 @@ class Reaction:
 
     def _asked(self, trace: Trace) -> list[_Asked]:
         jitter_ns = JITTER_NS[trace.clock]
-        from_ns = heard_from_ns(trace, self.input)
-        given: list[Delivery | Message] = [d for d in trace.deliveries(self.input) if d.t_ns >= from_ns]
-        given = [g for g in given or published(trace, self.input) if g.t_ns < trace.stop_ns]
+        given = [g for g in _inputs(trace, self.input) if g.t_ns < trace.stop_ns]
         stops = [*(g.t_ns for g in given), trace.stop_ns + jitter_ns][1:]
         outputs = published(trace, self.output)
         found = []
@@ -340,7 +334,7 @@ class Reaction:
             if case is None or last_chance:
                 continue
             during = tuple(o for o in outputs if one.t_ns - jitter_ns <= o.t_ns < stop_ns - jitter_ns)
-            found.append(_Asked(one, case, stop_ns, during))
+            found.append(_Asked(one, case, during))
         return found
 
     def _wrong(self, trace: Trace, asked: _Asked) -> str:

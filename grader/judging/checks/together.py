@@ -13,13 +13,7 @@ from grader.core.chart import Chart, Look
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace
-from grader.judging.charts import (
-    answer_panel,
-    input_panel,
-    plain_topic,
-    time_chart,
-    which_answers,
-)
+from grader.judging.charts import answer_panel, input_panel, plain_topic, time_chart, which_answers
 from grader.judging.findings import FAULT_KEY, explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met
 from grader.judging.series import steps_behind
 from grader.judging.values import (
@@ -86,7 +80,6 @@ class AnswersTogether:
         return f"every {self.input} of the one node answered by the other on {self.output}: {answers}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if all of this holds; the reason names the first violation."""
         sent, answered = published(trace, self.input), published(trace, self.output)
         for topic, messages in ((self.input, sent), (self.output, answered)):
             if not messages:

@@ -33,7 +33,6 @@ class Publishes:
         return f"at least one {self.type} message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for at least one message."""
         messages = [m for m in published(trace, self.topic) if m.type == self.type]
         if not messages:
             return explain_no_message(trace, self.topic, self.type)
@@ -60,7 +59,6 @@ class Subscribes:
         return f"a subscription to {self.topic} with type {self.type} that an ordinary publisher reaches"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for at least one matching subscription."""
         mine = [e for e in student_endpoints(trace, "subscription") if (e.topic, e.type) == (self.topic, self.type)]
         if not mine:
             return explain_no_subscription(trace, self.topic, self.type)
@@ -75,15 +73,9 @@ class Subscribes:
         }
         if fitting:
             return met(f"{self.topic}: {quote(chosen.node)} subscribes with type {self.type}", evidence)
-        reason = (
-            f"{self.topic}: the subscription of {quote(chosen.node)} asks for {_demand(chosen)}: no message arrives"
-        )
-        return not_met(
-            reason,
-            evidence,
-            hint="subscribe with the default durability: pass the queue depth 10 as QoS",
-            problem=ProblemKind.KEPT_APART,
-        )
+        reason = f"{self.topic}: the subscription of {quote(chosen.node)} asks for {_demand(chosen)}"
+        hint = "subscribe with the default durability: pass the queue depth 10 as QoS"
+        return not_met(f"{reason}: no message arrives", evidence, hint=hint, problem=ProblemKind.KEPT_APART)
 
 
 def _demand(subscription: Endpoint) -> str:
@@ -119,7 +111,6 @@ class FieldValues:
         return f"{wanted} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no message differs; the reason names the first that does."""
         messages = published(trace, self.topic)
         if not messages:
             return explain_no_message(trace, self.topic)
@@ -162,9 +153,8 @@ class FieldValues:
         }
         where = f"{moment(first.t_ns)}, {self.topic}"
         if missing:
-            return not_met(
-                f"{where}: {quote(first.type)} has no field {missing[0]}", evidence, problem=ProblemKind.NO_FIELD
-            )
+            reason = f"{where}: {quote(first.type)} has no field {missing[0]}"
+            return not_met(reason, evidence, problem=ProblemKind.NO_FIELD)
         found = ", ".join(f"{p} is {number(g)}" for p, g in fields.items() if g is not None)
         wanted = ", ".join(number(self.values[p]) for p in fields)
         share = f"in all {total} messages" if len(wrong) == total else f"in {len(wrong)} of {total} messages"
@@ -306,7 +296,6 @@ class Transform:
         return {True: ("/tf_static",), False: ("/tf",), None: ("/tf", "/tf_static")}[self.static]
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if it exists and is always right; the reason names the first that is not."""
         found = [_Found(m.t_ns, t) for topic in self._topics for m in published(trace, topic) for t in _transforms(m)]
         wanted = (self.parent.lstrip("/"), self.child.lstrip("/"))
         mine = sorted((f for f in found if f.frames == wanted), key=lambda f: f.t_ns)

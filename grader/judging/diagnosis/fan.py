@@ -150,8 +150,7 @@ def _oldest_compared(late: _Subscriber) -> Clue | None:
 
 def _grows(source: Source, values: ast.expr) -> bool:
     """Return whether new values are added at the end of a list or deque."""
-    calls = (c for c in source.calls("append") if isinstance(c.func, ast.Attribute))
-    return chain(values) != "" and any(chain(c.func) == f"{chain(values)}.append" for c in calls)
+    return chain(values) != "" and any(chain(c.func) == f"{chain(values)}.append" for c in source.calls("append"))
 
 
 @rule(ThresholdResponse, AnswersTogether, given=_late)
@@ -197,8 +196,7 @@ def _compared_mean(case: Case) -> Clue | None:
 
 
 def _sum_by_count(node: ast.BinOp) -> bool:
-    calls = [last_name(side.func) if isinstance(side, ast.Call) else "" for side in (node.left, node.right)]
-    return calls[0] == "sum"
+    return isinstance(node.left, ast.Call) and last_name(node.left.func) == "sum"
 
 
 @rule(ThresholdResponse, AnswersTogether, problem=ProblemKind.NO_NUMBER, given=_controller)

@@ -13,16 +13,7 @@ from grader.judging.checks.fields import FieldFunction, RandomInRange
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues
 from grader.judging.diagnosis.rules import Case, Clue, rule
-from grader.judging.diagnosis.wiring import (
-    Constant,
-    constant,
-    given_leaf,
-    made,
-    made_for,
-    number_at,
-    runs,
-    variable_of,
-)
+from grader.judging.diagnosis.wiring import Constant, constant, given_leaf, made, made_for, number_at, runs, variable_of
 from grader.judging.source import Source, chain, first_line, last_name, words
 from grader.judging.values import field, leaves, published, published_numbers
 from grader.judging.wording import moment, number
