@@ -11,18 +11,20 @@ import argparse
 import collections
 import json
 import multiprocessing
+import threading
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
 
-from grader.app.grade import grade
+from grader.app.grade import grade_in
 from grader.app.request import GradeRequest
 from grader.core.errors import GraderError
+from grader.execution.recording_session import RecordingSession, open_session
 
 SUBMISSIONS = Path(__file__).resolve().parent.parent / "tests" / "submissions"
 MODES = ("virtual", "wall", "auto", "auto-load")
@@ -52,10 +54,32 @@ def print_nothing(step: str) -> None:
     """Hear which step begins, and say nothing."""
 
 
-def judged(folder: str, exercises: tuple[str, ...], how: GradeRequest) -> dict[str, Any]:
+class Sessions:
+    """One recording session for each thread, used for all submissions that the thread grades."""
+
+    def __init__(self) -> None:
+        self._stack = ExitStack()
+        self._own = threading.local()
+
+    def __enter__(self) -> Sessions:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def mine(self, how: GradeRequest) -> RecordingSession:
+        """Return the session of this thread."""
+        if not hasattr(self._own, "session"):
+            self._own.session = self._stack.enter_context(open_session(how.isolation, 1))
+        session: RecordingSession = self._own.session
+        return session
+
+
+def judged(sessions: Sessions, folder: str, exercises: tuple[str, ...], how: GradeRequest) -> dict[str, Any]:
     """Return what one folder was given: outcomes other than `met`, and why it went to the wall clock."""
+    request = replace(how, submission=str(SUBMISSIONS / folder), exercises=exercises)
     try:
-        report = grade(replace(how, submission=str(SUBMISSIONS / folder), exercises=exercises), print_nothing)
+        report = grade_in(sessions.mine(how), request, print_nothing)
     except GraderError as fault:
         return {"outcomes": {"error": fault.message}, "wall": []}
     verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
@@ -78,8 +102,9 @@ def run(  # noqa: PLR0913  one parameter a choice
 ) -> None:
     """Grade every folder that has no result under a mode, and write each result when it is there."""
     left = [folder for folder in expected if folder not in results.setdefault(mode, {})]
-    with busy(2 * multiprocessing.cpu_count() if load else 0), ThreadPoolExecutor(jobs) as pool:
-        futures = {pool.submit(judged, f, tuple(expected[f]["graded"]), how): f for f in left}
+    loops = 2 * multiprocessing.cpu_count() if load else 0
+    with busy(loops), Sessions() as sessions, ThreadPoolExecutor(jobs) as pool:
+        futures = {pool.submit(judged, sessions, f, tuple(expected[f]["graded"]), how): f for f in left}
         for number, future in enumerate(as_completed(futures), 1):
             results[mode][futures[future]] = future.result()
             path.write_text(json.dumps(results, indent=1), encoding="utf-8")

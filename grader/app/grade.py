@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import grader
 from grader.app.request import GradeRequest, reproduction, request_to_json
@@ -113,10 +114,29 @@ def grade(
     """
     started = time.perf_counter()
     with open_session(request.isolation, request.workers, progress) as session:
+        return grade_in(session, request, progress, on_recorded, on_partial_report, pictures=pictures, started=started)
+
+
+def grade_in(  # noqa: PLR0913  as `grade`
+    session: RecordingSession,
+    request: GradeRequest,
+    progress: Progress,
+    on_recorded: Callable[[Run, Sequence[Exercise]], None] | None = None,
+    on_partial_report: Callable[[Report], None] | None = None,
+    *,
+    pictures: bool = True,
+    started: float | None = None,
+) -> Report:
+    """Grade one submission in a session, which others may use before and after it; see `grade`.
+
+    The duration in the report begins at `started`, a reading of `time.perf_counter`; now if it is None.
+    """
+    started = time.perf_counter() if started is None else started
+    with TemporaryDirectory(prefix="submission-", dir=session.folder) as folder:
         progress("reading the submission")
         exercises = read_exercises(request)
-        root = session.folder / "submission"
-        root.mkdir()
+        root = Path(folder)
+        root.chmod(0o755)  # as the folder of the session
         submission = _staged(request, exercises, root)
         if request.every:
             exercises, submission = _begun(exercises, submission)
