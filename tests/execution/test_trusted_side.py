@@ -387,7 +387,7 @@ def workers_of(pid: int) -> list[int]:
         try:
             parent = int((path / "stat").read_text(errors="replace").rpartition(")")[2].split()[1])
             words = (path / "cmdline").read_bytes().split(b"\0")
-        except OSError:
+        except (OSError, IndexError):  # it has ended, before or after its files were opened
             continue
         if b"grader.execution.worker" in words and parent != 1:
             found.append(int(path.name))
@@ -400,7 +400,7 @@ def ancestors(pid: int) -> list[int]:
     while pid > 1:
         try:
             pid = int(Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()[1])
-        except OSError:
+        except (OSError, IndexError):
             break
         above.append(pid)
     return above
