@@ -138,7 +138,7 @@ class _Walk:
             self.left.add(f"the folder cannot be read: {error.strerror}", relative)
             return
         try:
-            marker = next((m for m in GENERATED_MARKERS if os.access(m, os.F_OK, dir_fd=descriptor)), None)
+            marker = next((m for m in GENERATED_MARKERS if _holds(descriptor, m)), None)
             if marker is None:
                 yield from self.files(descriptor, f"{relative}/", depth)
             else:
@@ -150,6 +150,11 @@ class _Walk:
 def _too_much(where: str, limit: str) -> SubmissionError:
     hint = "name the folder that holds only your work"
     return SubmissionError(f"{where}: expected at most {limit}, found more", hint)
+
+
+def _holds(descriptor: int, name: str) -> bool:
+    """Return whether a folder holds a file, or a link, of a name."""
+    return os.access(name, os.F_OK, dir_fd=descriptor, follow_symlinks=False)
 
 
 def _kind(mode: int) -> str:

@@ -205,6 +205,15 @@ def test_folders_of_tools_are_left_out(work: Path, into: Path) -> None:
     )
 
 
+def test_a_link_marks_a_folder_as_made_by_a_tool(work: Path, into: Path) -> None:
+    """Wherever it leads: only its name counts."""
+    put(work, "velocity_publisher.py")
+    put(work, "build/velocity_publisher.py")
+    (work / "build" / "COLCON_IGNORE").symlink_to("nowhere")
+    submission = stage_submission(str(work), WANTED, into)
+    assert submission.notes == ("not copied: build (it holds COLCON_IGNORE, so a tool made it)",)
+
+
 def test_links_and_special_files_are_neither_followed_nor_copied(work: Path, tmp_path: Path, into: Path) -> None:
     """A link to a secret, a link to a folder, a pipe and a socket: notes, no content, no waiting."""
     put(work, "velocity_publisher.py")
