@@ -11,10 +11,9 @@ import argparse
 import collections
 import json
 import multiprocessing
-import threading
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -54,32 +53,11 @@ def print_nothing(step: str) -> None:
     """Hear which step begins, and say nothing."""
 
 
-class Sessions:
-    """One recording session for each thread, used for all submissions that the thread grades."""
-
-    def __init__(self) -> None:
-        self._stack = ExitStack()
-        self._own = threading.local()
-
-    def __enter__(self) -> Sessions:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
-
-    def mine(self, how: GradeRequest) -> RecordingSession:
-        """Return the session of this thread."""
-        if not hasattr(self._own, "session"):
-            self._own.session = self._stack.enter_context(open_session(how.isolation, 1))
-        session: RecordingSession = self._own.session
-        return session
-
-
-def judged(sessions: Sessions, folder: str, exercises: tuple[str, ...], how: GradeRequest) -> dict[str, Any]:
+def judged(session: RecordingSession, folder: str, exercises: tuple[str, ...], how: GradeRequest) -> dict[str, Any]:
     """Return what one folder was given: outcomes other than `met`, and why it went to the wall clock."""
     request = replace(how, submission=str(SUBMISSIONS / folder), exercises=exercises)
     try:
-        report = grade_in(sessions.mine(how), request, print_nothing)
+        report = grade_in(session, request, print_nothing)
     except GraderError as fault:
         return {"outcomes": {"error": fault.message}, "wall": []}
     verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
@@ -103,8 +81,8 @@ def run(  # noqa: PLR0913  one parameter a choice
     """Grade every folder that has no result under a mode, and write each result when it is there."""
     left = [folder for folder in expected if folder not in results.setdefault(mode, {})]
     loops = 2 * multiprocessing.cpu_count() if load else 0
-    with busy(loops), Sessions() as sessions, ThreadPoolExecutor(jobs) as pool:
-        futures = {pool.submit(judged, sessions, f, tuple(expected[f]["graded"]), how): f for f in left}
+    with busy(loops), open_session(how.isolation, jobs) as session, ThreadPoolExecutor(jobs) as pool:
+        futures = {pool.submit(judged, session, f, tuple(expected[f]["graded"]), how): f for f in left}
         for number, future in enumerate(as_completed(futures), 1):
             results[mode][futures[future]] = future.result()
             path.write_text(json.dumps(results, indent=1), encoding="utf-8")

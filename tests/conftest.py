@@ -62,9 +62,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker("fast")
     everything, long = config.getoption("--everything"), config.getoption("--long")
     left_out = {name for name, asked in (("nightly", everything), ("long", everything or long)) if not asked}
-    chosen: dict[bool, list[pytest.Item]] = {True: [], False: []}
-    for item in items:
-        chosen[not any(item.get_closest_marker(name) for name in left_out)].append(item)
-    config.hook.pytest_deselected(items=chosen[False])
-    items[:] = chosen[True]
+    unwanted = {item for item in items if any(item.get_closest_marker(name) for name in left_out)}
+    config.hook.pytest_deselected(items=[item for item in items if item in unwanted])
+    items[:] = [item for item in items if item not in unwanted]
     items.sort(key=lambda item: item.get_closest_marker("ros") is None)

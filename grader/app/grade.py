@@ -132,7 +132,8 @@ def grade_in(  # noqa: PLR0913  as `grade`
     The duration in the report begins at `started`, a reading of `time.perf_counter`; now if it is None.
     """
     started = time.perf_counter() if started is None else started
-    with TemporaryDirectory(prefix="submission-", dir=session.folder) as folder:
+    # What cannot be removed now is removed with the folder of the session.
+    with TemporaryDirectory(prefix="submission-", dir=session.folder, ignore_cleanup_errors=True) as folder:
         progress("reading the submission")
         exercises = read_exercises(request)
         root = Path(folder)

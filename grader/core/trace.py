@@ -250,8 +250,8 @@ class Trace:
     starts: tuple[Start, ...] = ()  # how each process was started; empty in traces of earlier versions
     # Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence
     reached: tuple[str, ...] = ()
-    # On the wall clock, the longest time that a thread of the nodes waited for a processor that other programs used
-    starved_ns: int = 0
+    # On the wall clock, how long the thread of the nodes that waited most waited for processors that others used
+    most_starved_ns: int = 0
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

@@ -60,7 +60,7 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
         "notes": list(trace.notes),
         "harness_problem": trace.harness_problem,
         **({"starts": plain(trace.starts)} if trace.starts else {}),
-        **({"starved_ns": trace.starved_ns} if trace.starved_ns else {}),
+        **({"most_starved_ns": trace.most_starved_ns} if trace.most_starved_ns else {}),
         "observations": [observation_to_json(o) for o in trace.observations],
     }
 

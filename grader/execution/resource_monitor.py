@@ -17,7 +17,7 @@ from grader.core.limits import Limits
 from grader.core.quantities import MIB, size
 from grader.core.trace import ClockKind, Trace
 from grader.execution.student_process import NodeProcess
-from grader.execution.usage import Usage, families, scratch_names, starved_ns, usage
+from grader.execution.usage import Usage, families, scratch_names, threads_starved_ns, usage
 
 #: The polling interval, and the number of polls between two searches for new child processes.
 LOOK_S = 0.025
@@ -67,7 +67,7 @@ class ResourceMonitor:
         self._over = threading.Event()
         self._starved = False
         self._ending = False
-        self._used_ns = self._waited_ns = self._longest_wait_ns = 0
+        self._used_ns = self._waited_ns = self._most_starved_ns = 0
         self._thread = threading.Thread(target=self._watch, name="guard", daemon=True)
 
     def __enter__(self) -> ResourceMonitor:
@@ -79,10 +79,10 @@ class ResourceMonitor:
         self._thread.join()
 
     def reviewed(self, trace: Trace) -> Trace:
-        """Add what the machine did to a trace: the longest wait, and a harness problem if that used up the time."""
-        if trace.clock is ClockKind.WALL and self.starved_ns:
+        """Add to a trace how long a thread waited, and a harness problem if waiting used up the time."""
+        if trace.clock is ClockKind.WALL:
             self._look_for_waiting()
-            trace = replace(trace, starved_ns=self._longest_wait_ns)
+            trace = replace(trace, most_starved_ns=self._most_starved_ns if self.starved_ns else 0)
         if not self._starved or trace.harness_problem:
             return trace
         problem = "the machine was too busy: the nodes waited for a processor until their time was over"
@@ -140,9 +140,9 @@ class ResourceMonitor:
     def _look_for_waiting(self) -> None:
         pids = [pid for family in self._families.values() for pid in family]
         self._used_ns = max(self._used_ns, usage(pids).processor_ns)
-        waits_ns = starved_ns(pids)
-        self._waited_ns = max(self._waited_ns, sum(waits_ns))
-        self._longest_wait_ns = max(self._longest_wait_ns, *waits_ns, 0)
+        waited_ns = threads_starved_ns(pids)
+        self._waited_ns = max(self._waited_ns, sum(waited_ns))
+        self._most_starved_ns = max(self._most_starved_ns, max(waited_ns, default=0))
 
     def _look_for_names(self) -> None:
         for student in self._students:

@@ -92,7 +92,7 @@ def innermost(root: int) -> int:
     return next((pid for pid in pids if pid not in pids.values()), root)
 
 
-def starved_ns(pids: Iterable[int]) -> list[int]:
+def threads_starved_ns(pids: Iterable[int]) -> list[int]:
     """Return how long each thread of processes was ready to run but waited for a processor, in nanoseconds."""
     return [thread_starved_ns(pid, thread) for pid in pids for thread in _names(f"/proc/{pid}/task")]
 

@@ -12,7 +12,7 @@ import threading
 import time
 
 from grader.core.quantities import NS_PER_MS, NS_PER_S
-from grader.execution.usage import innermost, starved_ns, thread_starved_ns
+from grader.execution.usage import innermost, thread_starved_ns, threads_starved_ns
 
 #: Only if a step takes this much longer than its processor time, its waiting time for a processor is read.
 UNEXPLAINED_NS = 2 * NS_PER_MS
@@ -158,7 +158,7 @@ class Workload:
 
     def _starved(self) -> int:
         """Return how long the process's threads and this thread were ready to run but waited for a processor."""
-        return sum(starved_ns([self._pid])) + thread_starved_ns(os.getpid(), threading.get_native_id())
+        return sum(threads_starved_ns([self._pid])) + thread_starved_ns(os.getpid(), threading.get_native_id())
 
 
 def _processor_clock(pid: int) -> int:

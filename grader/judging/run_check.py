@@ -67,9 +67,12 @@ def run_check(
         return Answer(problem=trace.harness_problem)
     answer = _judged(criterion, scenario, trace, sources)
     if answer.finding is not None and answer.finding.credit < 1:
-        faster = (_judged(criterion, scenario, one, sources).finding for one in _without_waiting(trace))
+        faster = (
+            _judged(criterion, scenario, one, sources).finding
+            for one in trace.once("without waiting", lambda: tuple(_without_waiting(trace)))
+        )
         if any(finding is not None and finding.credit > answer.finding.credit for finding in faster):
-            waited = f"{span(trace.starved_ns)} of {span(trace.stop_ns)}"
+            waited = f"{span(trace.most_starved_ns)} of {span(trace.stop_ns)}"
             return Answer(
                 problem=f"the machine was too busy: the nodes waited {waited} for a processor, which can be why"
             )
@@ -80,10 +83,10 @@ def run_check(
 
 def _without_waiting(trace: Trace) -> Iterator[Trace]:
     """Yield what an idle machine may have recorded: the trace at a higher speed, in steps up to no waiting at all."""
-    if trace.starved_ns <= _ORDINARY_WAIT * trace.stop_ns:
+    if trace.most_starved_ns <= _ORDINARY_WAIT * trace.stop_ns:
         return
     for step in range(1, _SPEEDS + 1):
-        left = 1 - min(trace.starved_ns / trace.stop_ns, _LONGEST_WAIT) * step / _SPEEDS
+        left = 1 - min(trace.most_starved_ns / trace.stop_ns, _LONGEST_WAIT) * step / _SPEEDS
         observations = tuple(replace(one, t_ns=round(one.t_ns * left)) for one in trace.observations)
         yield replace(trace, stop_ns=round(trace.stop_ns * left), observations=observations)
 

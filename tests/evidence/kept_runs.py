@@ -105,7 +105,7 @@ TRACES = st.builds(
     clock_reason=_TEXTS,
     notes=_several(_TEXTS),
     harness_problem=_TEXTS,
-    starved_ns=_TIMES,
+    most_starved_ns=_TIMES,
     starts=_several(st.builds(Start, _TEXTS, _TEXTS, st.sampled_from(StartWay), _TEXTS, _several(_TEXTS))),
 )
 

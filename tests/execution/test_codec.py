@@ -88,7 +88,7 @@ TRACES = st.builds(
     clock_reason=TEXTS,
     notes=st.lists(TEXTS, max_size=3).map(tuple),
     harness_problem=TEXTS,
-    starved_ns=TIMES,
+    most_starved_ns=TIMES,
 )
 
 

@@ -178,7 +178,7 @@ def test_a_failed_recording_leaves_everything_undecided() -> None:
 )
 def test_a_rate_that_a_busy_machine_can_have_lowered_is_undecided(rate: float, starved_s: float, outcome: str) -> None:
     """A loop that pauses after its work is slower by the time that it waits for a processor."""
-    trace = replace(velocity(rate, 10.0).trace(starved_ns=round(starved_s * SECOND)), clock=ClockKind.WALL)
+    trace = replace(velocity(rate, 10.0).trace(most_starved_ns=round(starved_s * SECOND)), clock=ClockKind.WALL)
     asked = criterion("rate", CHECKS["topic_rate"]("/cmd_vel", 20.0, 1.0))
     given = judge_exercise(exercise(asked), {"alone": trace}, handed_in(FILE))
     assert outcomes(given) == {"rate": outcome}

@@ -127,7 +127,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("observations", list[Union[tuple(rows)]]),  # type: ignore[misc]  # noqa: UP007
         ("starts", tuple[_row_of(Start), ...], ()),  # type: ignore[misc]
         ("reached", tuple[str, ...], ()),
-        ("starved_ns", int, 0),
+        ("most_starved_ns", int, 0),
     ]
     return msgspec.defstruct("Trace", written)
 
@@ -144,7 +144,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         harness_problem=row.harness_problem,
         starts=tuple(_same(Start, start) for start in row.starts),
         reached=row.reached,
-        starved_ns=row.starved_ns,
+        most_starved_ns=row.most_starved_ns,
     )
 
 
