@@ -29,6 +29,8 @@ from grader.execution.sandbox.protocol import StudentProcess
 pytestmark = pytest.mark.sandbox
 
 MIB = 1 << 20
+#: Where the worker has the host package as well, for its starter.
+SEEN_AT = Path("/grader_host/host")
 
 
 @pytest.fixture(scope="module")
@@ -652,7 +654,7 @@ def test_a_worker_opens_nothing_of_the_instructor(sandbox: Sandbox, tmp_path: Pa
     package = HOST.parent
     seen = {path.relative_to(package).parts[0] for path in readable if package in path.parents}
     assert seen == {"__init__.py", "core", "student_host", "execution"}
-    needed = (*ros.runtime.read_paths, ros.runtime.executable, package, sandbox.submission, Path("/dev"))
+    needed = (*ros.runtime.read_paths, ros.runtime.executable, package, sandbox.submission, Path("/dev"), SEEN_AT)
     roots = {path.resolve() for path in needed} | set(needed)
     programs = {Path("/run/rclpy-grader.users")}
     strangers = {p for p in readable - programs if roots.isdisjoint((p, *p.parents, p.resolve()))}
