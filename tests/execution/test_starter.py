@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from hostile import hostile, record
-from sandboxes import DOMAIN, Sandbox, finish, make_submission, walls
+from sandboxes import DOMAIN, Sandbox, find_sandbox, finish, make_submission
 
 from grader.core.errors import EnvironmentFault
 from grader.core.trace import FaultKind, Trace
@@ -98,7 +98,7 @@ def ros() -> RosInstallation:
 @pytest.fixture(params=["bubblewrap-root", "bubblewrap"])
 def sandbox(request: pytest.FixtureRequest, ros: RosInstallation) -> Iterator[Sandbox]:
     folder = make_submission()
-    found = walls(request.param, ros, folder)
+    found = find_sandbox(request.param, ros, folder)
     if isinstance(found, str):
         shutil.rmtree(folder)
         pytest.skip(found)
