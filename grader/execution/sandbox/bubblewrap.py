@@ -33,8 +33,9 @@ SUBMISSION = Path("/submission")
 HOST = Path("/grader_host/host")
 #: The capabilities that setpriv needs to change the user; it drops them in the process.
 TO_CHANGE_USER = ("CAP_SETUID", "CAP_SETGID", "CAP_SETPCAP")
-#: Where the placeholder is in a sandbox, and the first kernel with setns(2) for the namespaces of a process.
-WAIT = Path("/grader_host/wait")
+#: Where the placeholder is in a sandbox; under its own name, because some systems have one program for many names.
+PLACEHOLDER = Path("/grader_host/cat")
+#: The first kernel with setns(2) for all namespaces of a process.
 ENTERABLE = (5, 8)
 HOME, WORK = Path("/tmp/home"), Path("/tmp/work")  # noqa: S108 -- a private tmpfs
 SYSTEM_PROGRAMS = "/usr/bin:/bin:/usr/sbin:/sbin:/usr/local/bin"
@@ -169,11 +170,11 @@ class Bubblewrap:
             *self._namespaces(()),
             *("--clearenv", "--json-status-fd", str(status_write), "--seccomp"),
             str(filter_fd := _memory_file("filter", seccomp.student_filter())),
-            *self._files(process, limits, ("--ro-bind", str(self.cat), str(WAIT))),
+            *self._files(process, limits, ("--ro-bind", str(self.cat), str(PLACEHOLDER))),
         ]
         options_fd = _memory_file("options", b"".join(os.fsencode(option) + b"\0" for option in options))
         opened = (filter_fd, options_fd, status_write)
-        argv = (str(self.bwrap), "--args", str(options_fd), "--", str(WAIT))
+        argv = (str(self.bwrap), "--args", str(options_fd), "--", str(PLACEHOLDER))
         seconds = limits.processor_s
         restrictions = {
             "folder": str(WORK),
@@ -232,7 +233,7 @@ class Bubblewrap:
             options += ["--perms", "1777", "--size", size, "--tmpfs", scratch]
         for folder in (HOME, HOME / "log", WORK):
             options += ["--perms", "0777", "--dir", str(folder)]
-        for folder in (*view.parents(), *parents_of((HOST, WAIT) if process.host_folder else ())):
+        for folder in (*view.parents(), *parents_of((HOST, PLACEHOLDER) if process.host_folder else ())):
             # If Python is installed below /tmp, these are in the scratch folder and belong to the student's user.
             options += ["--perms", "0555", "--dir", str(folder)]
         for path in view.bound:

@@ -40,7 +40,7 @@ PATIENCE_S = 0.2
 END_S = 4.0
 MARK = (4711, 4711)
 #: The program that keeps a sandbox while no other is in it.
-PLACEHOLDER = "wait"
+PLACEHOLDER = "cat"
 
 
 def main(request: dict[str, Any]) -> None:
