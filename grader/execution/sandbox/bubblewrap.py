@@ -168,7 +168,7 @@ class Bubblewrap:
         status_read, status_write = os.pipe()
         options = [
             *self._namespaces(()),
-            *("--clearenv", "--json-status-fd", str(status_write), "--seccomp"),
+            *("--clearenv", "--as-pid-1", "--json-status-fd", str(status_write), "--seccomp"),
             str(filter_fd := _memory_file("filter", seccomp.student_filter())),
             *self._files(process, limits, ("--ro-bind", str(self.cat), str(PLACEHOLDER))),
         ]
@@ -224,7 +224,7 @@ class Bubblewrap:
     def _files(self, process: StudentProcess, limits: Limits, more: Sequence[str] = ()) -> list[str]:
         view = view_of((*process.runtime.read_paths, process.runtime.executable, self.prlimit, self.setpriv))
         size = str(limits.scratch_bytes)
-        # Process 1 is bubblewrap, without the seccomp filter, so its memory must not be accessible.
+        # Process 1 is bubblewrap, without the seccomp filter, or the placeholder: its memory must not be accessible.
         first = "/proc/1"
         options = ["--proc", "/proc", "--size", "4096", "--perms", "0555", "--tmpfs", first, "--remount-ro", first]
         options += ["--dev", "/dev"]
