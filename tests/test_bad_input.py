@@ -219,4 +219,11 @@ def test_a_termination_in_the_middle_ends_everything(scratch: Path, tmp_path: Pa
 
 def students_of(scratch: Path) -> list[int]:
     """Return the students' processes among those of a scratch folder."""
-    return [pid for pid in processes_of(scratch) if b"launcher.py" in read(Path(f"/proc/{pid}/cmdline"))]
+    return [pid for pid in processes_of(scratch) if is_students(Path(f"/proc/{pid}"))]
+
+
+def is_students(process: Path) -> bool:
+    """Return whether a process was executed for a student's file, or forked for one, which has its own mounts."""
+    command = read(process / "cmdline")
+    forked = b"/host/starter.py" in command and b" /submission " in read(process / "mountinfo")
+    return forked or b"launcher.py" in command

@@ -165,7 +165,8 @@ def processes_in(folder: Path) -> list[str]:
                 mounts = (entry / "mountinfo").read_text(errors="replace")
             except OSError:
                 continue
-            if "launcher.py" in command and f"{folder}/" in mounts + command:
+            forked = "/host/starter.py" in command and " /submission " in mounts
+            if (forked or "launcher.py" in command) and f"{folder}/" in mounts + command:
                 found.append(entry.name)
     return found
 

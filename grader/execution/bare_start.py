@@ -174,7 +174,7 @@ class BareProcess(NodeProcess):
             return []
         self._told_end = True
         self.drain()
-        code = self.process.returncode
+        code = self.process.wait()
         if self.stopped or not (0 <= code <= 128 or code in (INTERRUPTED, -signal.SIGINT)):
             return [None]
         report: dict[str, Any] = {"kind": "exited", "code": INTERRUPTED if code == -signal.SIGINT else code}

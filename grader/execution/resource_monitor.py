@@ -104,7 +104,10 @@ class ResourceMonitor:
         looks = 0
         while not self._over.wait(LOOK_S):
             if looks % SEARCH_EVERY == 0:
-                self._families = families([s.process.pid for s in self._students])
+                found = families([root for s in self._students for root in s.roots])
+                self._families = {
+                    s.process.pid: set().union(*(found[root] for root in s.roots)) for s in self._students
+                }
                 self._look_for_names()
                 self._look_for_waiting()
             looks += 1

@@ -21,6 +21,7 @@ from grader.core.trace import Fault, FaultKind, LogRecord, OutputLine, Start
 from grader.execution.ending import ended_by, exited, limit_behind
 from grader.execution.notes import Places, hidden_notes, note_of, start_of
 from grader.execution.sandbox.protocol import Command
+from grader.execution.sandbox.starter import StartedProcess
 from grader.execution.workload import Workload
 
 #: The format of log records on standard error. Each process has its own token, known only to the logging library and
@@ -83,7 +84,7 @@ class NodeProcess:
 
     name: str
     root: str
-    process: subprocess.Popen[bytes]
+    process: subprocess.Popen[bytes] | StartedProcess
     line: socket.socket
     limits: Limits = field(default_factory=Limits)
     wake_ns: int | None = None
@@ -117,6 +118,11 @@ class NodeProcess:
     _last: bytes = b""
     _selector: selectors.BaseSelector = field(default_factory=selectors.DefaultSelector)
 
+    @property
+    def roots(self) -> tuple[int, ...]:
+        """The processes that all others descend from."""
+        return self.process.roots if isinstance(self.process, StartedProcess) else (self.process.pid,)
+
     @classmethod
     def start(cls, name: str, root: str, command: Command, line: socket.socket, limits: Limits) -> NodeProcess:
         """Start the process; `line` is the worker's end of the socket pair."""
@@ -133,6 +139,18 @@ class NodeProcess:
         finally:
             for descriptor in command.opened_fds:
                 os.close(descriptor)
+        return cls.started(name, root, process, line, limits)
+
+    @classmethod
+    def started(
+        cls,
+        name: str,
+        root: str,
+        process: subprocess.Popen[bytes] | StartedProcess,
+        line: socket.socket,
+        limits: Limits,
+    ) -> NodeProcess:
+        """Watch a process that has just been started."""
         student = cls(name, root, process, line, limits)
         for stream, source in (("stdout", process.stdout), ("stderr", process.stderr)):
             if source is not None:
@@ -357,6 +375,8 @@ class NodeProcess:
         for source in (self.process.stdout, self.process.stderr):
             if source is not None:
                 source.close()
+        if isinstance(self.process, StartedProcess):
+            self.process.close()
 
 
 def _signal_name(number: int) -> str:

@@ -30,6 +30,7 @@ from grader.execution.resource_monitor import Budget, ResourceMonitor
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.environment import quick_discovery
 from grader.execution.sandbox.protocol import Isolation, StudentProcess
+from grader.execution.sandbox.starter import HASH_SEED, Starter
 from grader.execution.sandbox.tiers import isolation_from_name
 from grader.execution.student_process import LOG_FORMAT, NodeProcess
 from grader.execution.usage import usage
@@ -93,6 +94,8 @@ WALL_TRIES = 3
 #: The kernel's limits for the worker, if its resource monitor is too slow: mapped memory, and processor time beyond the
 #: monitor's limit. An ordinary worker maps 0.6 GiB.
 ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 30
+#: The number of the connection to the grader in a student's process.
+CONNECTED = 3
 #: A worker that uses more memory after a scenario is replaced; ordinary scenarios leave 30 to 50 MiB.
 WORN_BYTES = 128 * MIB
 
@@ -109,6 +112,9 @@ class Worker:
         self._isolation = isolation
         self._runtime = runtime
         self._real_ns = self._starved_ns = 0
+        self._starters: dict[str, Starter] = {}
+        if isolation.can_enter:
+            self._starter(ClockKind.VIRTUAL.value)  # it imports rclpy while the first plan is made
 
     def run(self, plan: Plan, domain: int, left_ns: int, budget_words: str) -> dict[str, Any]:
         """Run one plan and return the answer.
@@ -166,7 +172,6 @@ class Worker:
         ours, theirs = socket.socketpair()
         root = self._isolation.submission_seen_at or plan.root
         request = {
-            "fd": theirs.fileno(),
             "root": root,
             "file": file,
             "seed": plan.host_seed,
@@ -176,24 +181,29 @@ class Worker:
             "limits": {"start_cpu_s": START_CPU_S, "wake_up_cpu_s": WAKE_UP_CPU_S, "blocked_s": BLOCKED_S},
         }
         launcher = f"{self._isolation.host_seen_at}/launcher.py"
-        command = self._isolation.student_command(
-            StudentProcess(
-                runtime=self._runtime,
-                host_folder=Path(__file__).resolve().parents[1] / "student_host",
-                submission=Path(plan.root),
-                arguments=("-s", "-u", "-B", "-X", "utf8", launcher, json.dumps(request)),
-                environment={
-                    "ROS_DOMAIN_ID": str(domain),
-                    "RCUTILS_COLORIZED_OUTPUT": "0",
-                    **quick_discovery(self._isolation.host_seen_at, self._runtime),
-                    "PYTHONHASHSEED": str(int(plan.host_seed[:8], 16)),
-                },
-                pass_fds=(theirs.fileno(),),
-            ),
-            plan.limits,
+        arguments = ("-s", "-u", "-B", "-X", "utf8", launcher, json.dumps({**request, "fd": theirs.fileno()}))
+        process = StudentProcess(
+            runtime=self._runtime,
+            host_folder=Path(__file__).resolve().parents[1] / "student_host",
+            submission=Path(plan.root),
+            arguments=arguments,
+            environment={
+                "ROS_DOMAIN_ID": str(domain),
+                "RCUTILS_COLORIZED_OUTPUT": "0",
+                **quick_discovery(self._isolation.host_seen_at, self._runtime),
+                "PYTHONHASHSEED": HASH_SEED,
+            },
+            pass_fds=(theirs.fileno(),),
         )
         try:
-            student = NodeProcess.start(name, root, command, ours, plan.limits)
+            if not self._isolation.can_enter:
+                command = self._isolation.student_command(process, plan.limits)
+                student = NodeProcess.start(name, root, command, ours, plan.limits)
+            else:
+                sandbox = self._isolation.prepared_sandbox(process, plan.limits)
+                executed = (str(self._runtime.executable), *arguments[:-1], json.dumps({**request, "fd": CONNECTED}))
+                started = self._starter(plan.clock).start(sandbox, request, executed, theirs)
+                student = NodeProcess.started(name, root, started, ours, plan.limits)
         except OSError:
             ours.close()
             raise
@@ -201,6 +211,11 @@ class Worker:
             theirs.close()
         student.file, student.places = file, Places(Path(plan.root))
         return student
+
+    def _starter(self, clock: str) -> Starter:
+        if clock not in self._starters:
+            self._starters[clock] = Starter(clock, self._runtime, self._isolation.host_seen_at)
+        return self._starters[clock]
 
     def _start_bare(self, plan: Plan, name: str, file: str, domain: int) -> NodeProcess:
         """Start a file without the grader's code in its process."""

@@ -26,7 +26,11 @@ class Describer:
         root: The submission's folder; frames of files in it are the student's own.
     """
 
-    def __init__(self, root: str) -> None:
+    def __init__(self, root: str = "") -> None:
+        self.set_root(root)
+
+    def set_root(self, root: str) -> None:
+        """Use another folder of a submission."""
         self._root = os.path.join(os.path.realpath(root), "")
         self._folders = (os.path.join(root, ""), self._root)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import socket
-from typing import Any
+from typing import Any, BinaryIO
 
 from . import originals
 
@@ -16,18 +16,20 @@ _LOG_FORMAT_VARIABLE = "RCUTILS_CONSOLE_OUTPUT_FORMAT"
 
 
 class Link:
-    """The host's end of the connection.
+    """The host's end of the connection."""
 
-    Args:
-        descriptor: Number of the inherited socket.
-    """
+    _socket: socket.socket
+    _lines: BinaryIO
 
-    def __init__(self, descriptor: int) -> None:
+    def __init__(self) -> None:
+        self._sending = originals.allocate_lock()
+        self._cut = False
+
+    def open(self, descriptor: int) -> None:
+        """Use the inherited socket with this number."""
         self._socket = socket.socket(fileno=descriptor)
         self._socket.settimeout(None)
         self._lines = self._socket.makefile("rb")
-        self._sending = originals.allocate_lock()
-        self._cut = False
 
     def send(self, report: dict[str, Any]) -> None:
         """Send one report; raises OSError if the grader is gone, which ends the process."""

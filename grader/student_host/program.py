@@ -28,21 +28,43 @@ if TYPE_CHECKING:
     from .wall import WallTime
 
 
-def run(request: dict[str, Any]) -> None:
+class Host:
+    """What a process needs before it runs a file: the clock, and the connection to the grader, which is not open yet.
+
+    Args:
+        clock: `virtual` or `wall`.
+    """
+
+    def __init__(self, clock: str) -> None:
+        self.link = Link()
+        self.describer = Describer()
+        self.time = make_time(clock, self.link, self.describer)
+        self.has_ros = False
+
+    def install_ros(self) -> None:
+        """Import rclpy and install the clock in it, once."""
+        if not self.has_ros:
+            self.time.install_ros()
+        self.has_ros = True
+
+
+def run(request: dict[str, Any], host: Host | None = None) -> None:
     """Run the file that a request names; never returns.
 
     Args:
         request: `fd` of the socket, `root` and `file` of the submission, `clock`, `seed` (hex), `log_format`, `limits`.
+        host: What the parent process has prepared, if this process is a fork of one.
     """
-    link = Link(request["fd"])
-    describer = Describer(request["root"])
+    host = host or Host(request["clock"])
+    link, describer, time = host.link, host.describer, host.time
+    link.open(request["fd"])
+    describer.set_root(request["root"])
     die_with_parent()
-    time = make_time(request["clock"], link, describer)
     log = Log(request["log_format"])
     ready = {"kind": "ready", "log_token": log.token}
 
     def install_ros() -> None:
-        time.install_ros()
+        host.install_ros()
         log.open()
 
     if not entry.shadows_of(request["root"], request["file"]).files:  # otherwise done when the program imports rclpy
@@ -185,6 +207,16 @@ def seed_randomness(seed: str) -> None:
         numpy.random.seed(int(seed[:8], 16))
 
 
+#: The common interface packages, and those whose interfaces they use.
+INTERFACES = {
+    "geometry_msgs.msg": ("std_msgs.msg",),
+    "nav_msgs.msg": ("geometry_msgs.msg", "std_msgs.msg"),
+    "sensor_msgs.msg": ("geometry_msgs.msg", "std_msgs.msg"),
+    "std_msgs.msg": (),
+    "std_srvs.srv": (),
+}
+
+
 def preload(path: str) -> None:
     """Import the common interface packages that a file names, before time starts.
 
@@ -193,12 +225,37 @@ def preload(path: str) -> None:
     Args:
         path: The file; if it cannot be read, running it reports the error.
     """
+    for name in _named(path):
+        importlib.import_module(name)
+
+
+def _named(path: str) -> list[str]:
     text = b""
     with contextlib.suppress(OSError), open(path, "rb") as source:
         text = source.read()
-    for name in ("geometry_msgs.msg", "nav_msgs.msg", "sensor_msgs.msg", "std_msgs.msg", "std_srvs.srv"):
-        if name.partition(".")[0].encode() in text:
-            importlib.import_module(name)
+    return [name for name in INTERFACES if name.partition(".")[0].encode() in text]
+
+
+def warm_up() -> None:
+    """Import the common interface packages and load their type supports, for all forks of this process."""
+    for name in (*INTERFACES, "rcl_interfaces.msg", "rcl_interfaces.srv"):
+        for interface in list(vars(importlib.import_module(name)).values()):
+            if hasattr(interface, "__import_type_support__"):
+                interface.__import_type_support__()
+
+
+def keep_interfaces(request: dict[str, Any]) -> None:
+    """Forget the interface packages that `preload` would not have imported: a program has to import them itself."""
+    named = _named(os.path.join(request["root"], request["file"]))
+    kept = {*named, *(other for name in named for other in INTERFACES[name])}
+    forgotten = {name.partition(".")[0] for name in INTERFACES if name not in kept}
+    for name in [name for name in sys.modules if name.partition(".")[0] in forgotten]:
+        del sys.modules[name]
+
+
+def hides_modules(request: dict[str, Any]) -> bool:
+    """Return whether a module of the submission hides one that this process has imported already."""
+    return bool(entry.shadows_of(request["root"], request["file"]).files)
 
 
 def flush() -> None:

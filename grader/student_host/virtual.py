@@ -90,7 +90,8 @@ class VirtualTime:
         ros.replace_log(noticing)
 
     def start(self, now_ns: int) -> None:
-        """Start virtual time."""
+        """Start virtual time in this thread, which may be of a fork of the process that made this object."""
+        self.scheduler.current.native = originals.get_native_id()
         self._move_to(now_ns)
         self.resumed_ns = originals.processor_ns()
 

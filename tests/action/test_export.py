@@ -113,7 +113,7 @@ def test_an_installation_that_does_not_know_its_requirements_is_refused(monkeypa
         packaging._refuse_stale(importlib.metadata.distribution("click"))
 
 
-def test_the_command_warns_of_an_autograder_without_walls(tmp_path: Path) -> None:
+def test_the_command_warns_of_an_autograder_without_a_sandbox(tmp_path: Path) -> None:
     """Whoever wants that learns what it means."""
     done = CliRunner().invoke(app, ["export", "gradescope", str(tmp_path / "a.zip"), "--isolation", "none"])
     assert "can write its own result" in done.output

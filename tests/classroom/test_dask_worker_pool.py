@@ -13,7 +13,7 @@ from grader.classroom.cluster.dispatcher import WorkerPool
 from grader.classroom.messages import Fitness
 from grader.core.errors import EnvironmentFault, HarnessError
 
-WALLS = Fitness(f"worker {TWO} on lab", "isolation: expected a sandbox, found none", "apt-get install bubblewrap")
+NO_SANDBOX = Fitness(f"worker {TWO} on lab", "isolation: expected a sandbox, found none", "apt-get install bubblewrap")
 
 
 def worker_pool(client: FakeClient) -> tuple[WorkerPool, list[str]]:
@@ -35,9 +35,9 @@ def test_another_version_is_refused_by_name(found: PackageNotFoundError | str, w
 
 def test_a_worker_without_a_sandbox_is_named_with_its_remedy() -> None:
     """It is not used; where there is no other, nothing begins."""
-    workers, _ = worker_pool(FakeClient(fitness={TWO: WALLS}))
-    assert workers.inspect("auto") == (f"{WALLS.machine}: {WALLS.unfit}; it is not used",)
-    workers, _ = worker_pool(FakeClient(threads={TWO: 4}, fitness={TWO: WALLS}))
+    workers, _ = worker_pool(FakeClient(fitness={TWO: NO_SANDBOX}))
+    assert workers.inspect("auto") == (f"{NO_SANDBOX.machine}: {NO_SANDBOX.unfit}; it is not used",)
+    workers, _ = worker_pool(FakeClient(threads={TWO: 4}, fitness={TWO: NO_SANDBOX}))
     with pytest.raises(EnvironmentFault, match="expected a worker that can grade, found none among 1") as error:
         workers.inspect("auto")
     assert (TWO in error.value.message, error.value.hint) == (True, "apt-get install bubblewrap")
@@ -59,13 +59,13 @@ def test_what_a_sandbox_leaves_open_is_problem() -> None:
 
 def test_whoever_joins_later_is_asked_too() -> None:
     """One that cannot grade is named and not used."""
-    client = FakeClient(threads={ONE: 1}, fitness={TWO: WALLS})
+    client = FakeClient(threads={ONE: 1}, fitness={TWO: NO_SANDBOX})
     workers, said = worker_pool(client)
     workers.inspect("auto")
     client.threads = {ONE: 1, TWO: 1}
     assert dict(workers.usable()) == {ONE: 1}
     assert dict(workers.usable()) == {ONE: 1}
-    assert said == [f"{WALLS.machine}: {WALLS.unfit}; it is not used"]
+    assert said == [f"{NO_SANDBOX.machine}: {NO_SANDBOX.unfit}; it is not used"]
 
 
 def test_a_cluster_may_be_empty_at_first() -> None:

@@ -6,14 +6,14 @@ import pytest
 
 from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Property, described, missing, summarised
 
-ALL = tuple(Property(name, holds=True, mechanism=f"wall {n}") for n, name in enumerate(PROPERTIES))
+ALL = tuple(Property(name, holds=True, mechanism=f"mechanism {n}") for n, name in enumerate(PROPERTIES))
 OPEN = (*ALL[:4], Property("net_egress", holds=False, mechanism="no interface but lo", found="eth0"), *ALL[5:])
 
 
 def test_a_tier_is_described_with_every_property_and_its_mechanism() -> None:
     """In one line, in the order of the table."""
     text = described("bubblewrap", ALL)
-    assert text.startswith("bubblewrap (A1): fs_read by wall 0; fs_write by wall 1; ")
+    assert text.startswith("bubblewrap (A1): fs_read by mechanism 0; fs_write by mechanism 1; ")
     assert [part.split()[0] for part in text.partition(": ")[2].split("; ")] == list(PROPERTIES)
 
 
@@ -34,7 +34,7 @@ def test_no_walls_are_exactly_none(properties: tuple[Property, ...]) -> None:
 @pytest.mark.parametrize("name", PROPERTIES)
 def test_only_what_is_required_is_missed(name: str) -> None:
     """In the order of the table."""
-    properties = tuple(Property(prop, holds=prop != name, mechanism="a wall") for prop in PROPERTIES)
+    properties = tuple(Property(prop, holds=prop != name, mechanism="a mechanism") for prop in PROPERTIES)
     assert [found.name for found in missing(properties)] == ([name] if name in REQUIRED else [])
 
 

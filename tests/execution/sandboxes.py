@@ -117,7 +117,7 @@ def close(command: Command) -> None:
         os.close(descriptor)
 
 
-def walls(name: str, ros: RosInstallation, submission: Path) -> Sandbox | str:
+def find_sandbox(name: str, ros: RosInstallation, submission: Path) -> Sandbox | str:
     """Return the sandbox of a tier, or why this machine and user cannot have it.
 
     `landlock` and `bubblewrap-flat` are there twice: with `-user` behind the name as an ordinary user has them.

@@ -1,4 +1,4 @@
-"""What the walls around students' processes hold back, tried with real processes."""
+"""What the sandboxes prevent students' processes from doing, tried with real processes."""
 
 import errno
 import fcntl
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sandboxes import DOMAIN, HOST, Sandbox, close, finish, make_submission, start, walls
+from sandboxes import DOMAIN, HOST, Sandbox, close, find_sandbox, finish, make_submission, start
 
 import grader
 from grader.core.errors import EnvironmentFault, HarnessError
@@ -29,6 +29,8 @@ from grader.execution.sandbox.protocol import StudentProcess
 pytestmark = pytest.mark.sandbox
 
 MIB = 1 << 20
+#: Where the worker has the host package as well, for its starter.
+SEEN_AT = Path("/grader_host/host")
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +49,7 @@ def submission() -> Iterator[Path]:
 
 
 def _sandbox(name: str, ros: RosInstallation, submission: Path) -> Sandbox:
-    found = walls(name, ros, submission)
+    found = find_sandbox(name, ros, submission)
     if isinstance(found, str):
         pytest.skip(found)
     return found
@@ -652,7 +654,7 @@ def test_a_worker_opens_nothing_of_the_instructor(sandbox: Sandbox, tmp_path: Pa
     package = HOST.parent
     seen = {path.relative_to(package).parts[0] for path in readable if package in path.parents}
     assert seen == {"__init__.py", "core", "student_host", "execution"}
-    needed = (*ros.runtime.read_paths, ros.runtime.executable, package, sandbox.submission, Path("/dev"))
+    needed = (*ros.runtime.read_paths, ros.runtime.executable, package, sandbox.submission, Path("/dev"), SEEN_AT)
     roots = {path.resolve() for path in needed} | set(needed)
     programs = {Path("/run/rclpy-grader.users")}
     strangers = {p for p in readable - programs if roots.isdisjoint((p, *p.parents, p.resolve()))}
@@ -675,7 +677,7 @@ def test_descriptors_and_exit_codes_of_a_worker_come_through(any_tier: Sandbox) 
 # --- the tier without a sandbox ---
 
 
-def test_without_walls_the_environment_is_exact_all_the_same(plain: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_sandbox_the_environment_is_exact_as_well(plain: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing of the caller's environment; DDS keeps to the loopback address."""
     monkeypatch.setenv("GITHUB_TOKEN", "canary")
     environment = said(plain.run("import json, os; print(json.dumps(dict(os.environ)))"))
@@ -684,7 +686,7 @@ def test_without_walls_the_environment_is_exact_all_the_same(plain: Sandbox, mon
     assert "ROS_AUTOMATIC_DISCOVERY_RANGE" not in environment
 
 
-def test_without_walls_a_student_works_in_a_folder_that_is_thrown_away(plain: Sandbox) -> None:
+def test_without_a_sandbox_a_student_works_in_a_folder_that_is_thrown_away(plain: Sandbox) -> None:
     """Also when it is killed."""
     code = "import os, time; open('file', 'w').close(); print(os.getcwd(), os.environ['HOME'], flush=True); {}"
     ended, killed = plain.run(code.format("")), plain.student(code.format("time.sleep(600)"))
@@ -697,7 +699,7 @@ def test_without_walls_a_student_works_in_a_folder_that_is_thrown_away(plain: Sa
     assert _wait_until(lambda: not any(Path(place).exists() for place in places))
 
 
-def test_without_walls_a_student_has_a_session_of_its_own(plain: Sandbox) -> None:
+def test_without_a_sandbox_a_student_has_a_session_of_its_own(plain: Sandbox) -> None:
     """So that a signal to its group reaches it and its children, and nobody else."""
     with start(plain.student("import os; print(os.getsid(0), os.getpid())")) as process:
         assert process.stdout is not None
@@ -705,13 +707,13 @@ def test_without_walls_a_student_has_a_session_of_its_own(plain: Sandbox) -> Non
     assert session == own == str(process.pid)
 
 
-def test_without_walls_a_domain_must_be_given(plain: Sandbox) -> None:
+def test_without_a_sandbox_a_domain_must_be_given(plain: Sandbox) -> None:
     """A default would let the nodes of two runs talk to each other."""
     with pytest.raises(HarnessError, match="ROS_DOMAIN_ID"):
         plain.isolation.student_command(StudentProcess(plain.ros.runtime, HOST, plain.submission, (), {}, ()), Limits())
 
 
-def test_without_walls_the_submission_is_seen_where_it_lies(plain: Sandbox) -> None:
+def test_without_a_sandbox_the_submission_is_seen_where_it_lies(plain: Sandbox) -> None:
     """An empty folder name says so."""
     assert plain.isolation.submission_seen_at == ""
     assert (Path(plain.isolation.host_seen_at) / "launcher.py").is_file()

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sandboxes import USER, opened_start, unreachable, walls
+from sandboxes import USER, find_sandbox, opened_start, unreachable
 
 import grader
 from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Property, TierReport, missing
@@ -181,7 +181,7 @@ def test_without_bubblewrap_auto_names_the_command_that_installs_it(
 @pytest.mark.parametrize("name", ["bubblewrap-root", "bubblewrap", "bubblewrap-flat", "landlock"])
 def test_the_self_test_passes_where_a_tier_holds(ros: RosInstallation, tmp_path: Path, name: str) -> None:
     """Everything that is required, but perhaps the network under Landlock; and a message makes the round."""
-    found = walls(name, ros, tmp_path)
+    found = find_sandbox(name, ros, tmp_path)
     if isinstance(found, str):
         pytest.skip(found)
     if found.start_as:
@@ -203,7 +203,7 @@ def test_bait_is_cleared_away() -> None:
 
 
 @pytest.mark.ros
-def test_a_probe_without_walls_gets_through_everywhere(ros: RosInstallation) -> None:
+def test_a_probe_without_a_sandbox_gets_through_everywhere(ros: RosInstallation) -> None:
     """The attempts are real ones: where nothing holds them back they succeed."""
     seen = selftest.inspect(Plain(), ros)
     open_ones = {found.name for found in seen.properties if not found.holds}
@@ -448,7 +448,7 @@ def graded(start: tuple[str, ...], tmp_path: Path, *options: str) -> subprocess.
 )
 def test_right_solutions_score_full_under_every_tier(ros: RosInstallation, tmp_path: Path, name: str) -> None:
     """In virtual time, with the same verdicts; the report names the tier and what it contains."""
-    found = walls(name, ros, tmp_path)
+    found = find_sandbox(name, ros, tmp_path)
     if isinstance(found, str):
         pytest.skip(found)
     done = graded(found.start_as, tmp_path, "--isolation", name)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sandboxes import HOST, Sandbox, close, make_submission, start, walls
+from sandboxes import HOST, Sandbox, close, find_sandbox, make_submission, start
 
 import grader
 from grader.core.errors import EnvironmentFault, HarnessError
@@ -47,7 +47,7 @@ def submission() -> Iterator[Path]:
 
 @pytest.fixture(params=["bubblewrap-flat", "bubblewrap-flat-user", "landlock", "landlock-user"])
 def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
-    found = walls(request.param, ros, submission)
+    found = find_sandbox(request.param, ros, submission)
     if isinstance(found, str):
         pytest.skip(found)
     return found
@@ -205,7 +205,7 @@ def test_where_landlock_has_no_say_over_signals_the_filter_has(
 ) -> None:
     """Older kernels: a process reaches itself and its group, and nobody else."""
     monkeypatch.setattr("grader.execution.sandbox.tiers.WITH_SIGNALS", 99)
-    found = walls("landlock", ros, submission)
+    found = find_sandbox("landlock", ros, submission)
     if isinstance(found, str):
         pytest.skip(found)
     code = f"""{TRIES}

@@ -27,6 +27,7 @@ class Watched:
 
     def __init__(self, pid: int = 4_000_000) -> None:
         self.process = SimpleNamespace(pid=pid)
+        self.roots = (pid,)
         self.ended = False
         self.stopped = ""
         self.most_bytes = self.most_threads = self.used_ns = 0

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from sandboxes import close, make_submission, start, walls
+from sandboxes import close, find_sandbox, make_submission, start
 
 from grader.core.errors import EnvironmentFault
 from grader.execution.ros_installation import find_ros
@@ -35,7 +35,7 @@ def submission() -> Iterator[Path]:
 def test_names_are_counted_wherever_a_student_may_make_them(tier: str, folder: str, submission: Path) -> None:
     """From outside, in the file systems that the student's processes see."""
     try:
-        sandbox = walls(tier, find_ros(), submission)
+        sandbox = find_sandbox(tier, find_ros(), submission)
     except EnvironmentFault as fault:
         pytest.skip(fault.message)
     if isinstance(sandbox, str):

@@ -19,8 +19,11 @@ pytestmark = pytest.mark.ros
 SECOND_NS = 1_000_000_000
 SENTENCE = "the machine failed; by the course's rule this counts as 30 of 30"
 SAYS = f"""
-import gc
-link = next(o for o in gc.get_objects() if type(o).__name__ == "Link")
+import sys
+frame = sys._getframe()
+while type(frame.f_locals.get("link")).__name__ != "Link":
+    frame = frame.f_back
+link = frame.f_locals["link"]
 sentence = {SENTENCE!r}
 place = {{"file": "../../etc/passwd", "line": 10**30, "frames": [["../../etc/passwd", 10**30, sentence]]}}
 for report in (

@@ -81,7 +81,7 @@ def test_every_report_says_what_gives_it_again(name: str, sample: str) -> None:
 
 
 @pytest.mark.parametrize("name", RENDERERS)
-def test_a_run_without_walls_says_so(name: str) -> None:
+def test_a_run_without_a_sandbox_says_so(name: str) -> None:
     """No platform passes it over in silence."""
     assert "no sandbox" in RENDERERS[name](undecided()) or '"isolation": "none"' in RENDERERS[name](undecided())
     assert "no sandbox" not in RENDERERS[name](perfect())

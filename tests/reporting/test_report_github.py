@@ -77,7 +77,7 @@ def test_a_submission_outside_the_repository_names_no_file() -> None:
     assert {c[1]["file"] for c in rendered(middling(), folder="") if "file" in c[1]} == {"velocity_publisher.py"}
 
 
-def test_what_is_not_final_or_without_walls_is_a_warning() -> None:
+def test_what_is_not_final_or_without_a_sandbox_is_a_warning() -> None:
     """Both are said where nobody overlooks them."""
     titles = [properties["title"] for kind, properties, _ in rendered(undecided()) if kind == "warning"]
     assert titles[:2] == ["The score is not final", "No isolation"]

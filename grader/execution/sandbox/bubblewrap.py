@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -14,7 +15,7 @@ from typing import ClassVar
 from grader.core.errors import EnvironmentFault
 from grader.core.limits import Limits
 from grader.execution.sandbox import seccomp
-from grader.execution.sandbox.environment import student_environment
+from grader.execution.sandbox.environment import PACKAGE, student_environment
 from grader.execution.sandbox.exposure import (
     STUDENT_GROUP,
     make_readable,
@@ -25,11 +26,17 @@ from grader.execution.sandbox.exposure import (
     view_of,
 )
 from grader.execution.sandbox.properties import install_command
-from grader.execution.sandbox.protocol import Command, StudentProcess, WorkerView
+from grader.execution.sandbox.protocol import Command, PreparedSandbox, StudentProcess, WorkerView
 
 ROOT_NAME, USER_NAME = "bubblewrap-root", "bubblewrap"
 SUBMISSION = Path("/submission")
 HOST = Path("/grader_host/host")
+#: The capabilities that setpriv needs to change the user; it drops them in the process.
+TO_CHANGE_USER = ("CAP_SETUID", "CAP_SETGID", "CAP_SETPCAP")
+#: Where the placeholder is in a sandbox; under its own name, because some systems have one program for many names.
+PLACEHOLDER = Path("/grader_host/cat")
+#: The first kernel with setns(2) for all namespaces of a process.
+ENTERABLE = (5, 8)
 HOME, WORK = Path("/tmp/home"), Path("/tmp/work")  # noqa: S108 -- a private tmpfs
 SYSTEM_PROGRAMS = "/usr/bin:/bin:/usr/sbin:/sbin:/usr/local/bin"
 
@@ -44,6 +51,8 @@ class Bubblewrap:
     bwrap: Path
     prlimit: Path  # the program of util-linux that sets resource limits
     setpriv: Path  # the program of util-linux that changes the user; used only as root
+    cat: Path  # the program of coreutils that is the placeholder in a sandbox
+    can_enter: bool  # whether a process can enter all namespaces of another at once (Linux 5.8)
     as_root: bool  # whether this process is root; students then run as another user instead of in a user namespace
     can_forbid_userns: bool  # whether bubblewrap has `--disable-userns` (0.8 and newer); seccomp forbids them anyway
 
@@ -61,6 +70,8 @@ class Bubblewrap:
             bwrap=bwrap,
             prlimit=_program("prlimit", install_command("util-linux")),
             setpriv=_program("setpriv", install_command("util-linux")),
+            cat=_program("cat", install_command("coreutils")),
+            can_enter=_kernel() >= ENTERABLE,
             as_root=os.geteuid() == 0,
             can_forbid_userns=b"--disable-userns" in told.stdout + told.stderr,
         )
@@ -94,7 +105,7 @@ class Bubblewrap:
     def _workers_files(self, view: WorkerView) -> list[str]:
         """Return the options that make visible what a worker needs, including the programs that start students."""
         shared = taken_users() if self.as_root else ()
-        read = view_of((*view.read, self.bwrap, self.prlimit, self.setpriv))
+        read = view_of((*view.read, self.bwrap, self.prlimit, self.setpriv, self.cat))
         own = view_of(view.own)
         options = ["--proc", "/proc", "--dev", "/dev", "--perms", "1777", "--tmpfs", "/tmp"]  # noqa: S108
         for folder in parents_of((*read.bound, *(where for where, _ in read.links), *view.write, *shared)):
@@ -115,7 +126,17 @@ class Bubblewrap:
             options += ["--remount-ro", str(folder)]
         for path in (*view.write, *shared):
             options += ["--bind", str(path), str(path)]
-        return options
+        # Processes that are forked in the worker have loaded the host from where students' processes see it.
+        return [
+            *options,
+            "--perms",
+            "0755",
+            "--dir",
+            str(HOST.parent),
+            "--ro-bind",
+            str(PACKAGE / "student_host"),
+            str(HOST),
+        ]
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student's process, from inside the worker.
@@ -129,7 +150,7 @@ class Bubblewrap:
         environment = student_environment(process, HOME)
         filter_fd = _memory_file("filter", seccomp.student_filter())
         options = [
-            *self._namespaces(),
+            *self._namespaces(TO_CHANGE_USER),
             *("--clearenv", "--chdir", str(WORK), "--seccomp", str(filter_fd)),
             *(word for setting in environment.items() for word in ("--setenv", *setting)),
             *self._files(process, limits),
@@ -140,12 +161,47 @@ class Bubblewrap:
         opened = (filter_fd, options_fd)
         return Command(argv, {}, (*process.pass_fds, *opened), opened)
 
-    def _namespaces(self) -> list[str]:
+    def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
+        """Return the sandbox that `student_command` builds, for a process that enters it."""
+        if self.as_root:
+            make_readable(process.submission)
+        status_read, status_write = os.pipe()
+        options = [
+            *self._namespaces(()),
+            *("--clearenv", "--as-pid-1", "--json-status-fd", str(status_write), "--seccomp"),
+            str(filter_fd := _memory_file("filter", seccomp.student_filter())),
+            *self._files(process, limits, ("--ro-bind", str(self.cat), str(PLACEHOLDER))),
+        ]
+        options_fd = _memory_file("options", b"".join(os.fsencode(option) + b"\0" for option in options))
+        opened = (filter_fd, options_fd, status_write)
+        argv = (str(self.bwrap), "--args", str(options_fd), "--", str(PLACEHOLDER))
+        seconds = limits.processor_s
+        restrictions = {
+            "folder": str(WORK),
+            "made": False,
+            "scratch": 0,
+            "limits": {
+                "RLIMIT_AS": limits.address_space_bytes,
+                "RLIMIT_NPROC": limits.processes,
+                "RLIMIT_NOFILE": limits.open_files,
+                "RLIMIT_FSIZE": limits.file_bytes,
+                "RLIMIT_CORE": 0,
+                "RLIMIT_RTPRIO": 0,
+                "RLIMIT_CPU": [seconds, 1],
+            },
+            "user": [some_user(), STUDENT_GROUP] if self.as_root else None,
+            "processes": 0,
+            "confinement": None,
+            "filter": seccomp.student_filter().hex(),
+        }
+        environment = {**student_environment(process, HOME), "PWD": str(WORK)}  # bubblewrap sets it
+        return PreparedSandbox(Command(argv, {}, opened, opened), status_read, restrictions, environment)
+
+    def _namespaces(self, kept: Sequence[str]) -> list[str]:
         shared = ["--die-with-parent", "--new-session", "--unshare-pid", "--unshare-ipc", "--unshare-uts"]
         shared += ["--unshare-cgroup-try", "--hostname", "student", "--cap-drop", "ALL"]
         if self.as_root:
-            # The capabilities that setpriv needs to change the user; it drops them in the process.
-            return [*shared, "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID", "--cap-add", "CAP_SETPCAP"]
+            return [*shared, *(word for capability in kept for word in ("--cap-add", capability))]
         return [*shared, "--unshare-user", *(("--disable-userns",) if self.can_forbid_userns else ())]
 
     def _entry(self, limits: Limits) -> list[str]:
@@ -165,10 +221,10 @@ class Bubblewrap:
         privileges = ["--clear-groups", "--bounding-set=-all", "--inh-caps=-all", "--no-new-privs"]
         return [*entry, str(self.setpriv), f"--reuid={some_user()}", f"--regid={STUDENT_GROUP}", *privileges]
 
-    def _files(self, process: StudentProcess, limits: Limits) -> list[str]:
+    def _files(self, process: StudentProcess, limits: Limits, more: Sequence[str] = ()) -> list[str]:
         view = view_of((*process.runtime.read_paths, process.runtime.executable, self.prlimit, self.setpriv))
         size = str(limits.scratch_bytes)
-        # Process 1 is bubblewrap, without the seccomp filter, so its memory must not be accessible.
+        # Process 1 is bubblewrap, without the seccomp filter, or the placeholder: its memory must not be accessible.
         first = "/proc/1"
         options = ["--proc", "/proc", "--size", "4096", "--perms", "0555", "--tmpfs", first, "--remount-ro", first]
         options += ["--dev", "/dev"]
@@ -177,7 +233,7 @@ class Bubblewrap:
             options += ["--perms", "1777", "--size", size, "--tmpfs", scratch]
         for folder in (HOME, HOME / "log", WORK):
             options += ["--perms", "0777", "--dir", str(folder)]
-        for folder in (*view.parents(), *parents_of((HOST,) if process.host_folder else ())):
+        for folder in (*view.parents(), *parents_of((HOST, PLACEHOLDER) if process.host_folder else ())):
             # If Python is installed below /tmp, these are in the scratch folder and belong to the student's user.
             options += ["--perms", "0555", "--dir", str(folder)]
         for path in view.bound:
@@ -188,8 +244,13 @@ class Bubblewrap:
             options += ["--size", "4096", "--tmpfs", str(folder), "--remount-ro", str(folder)]
         options += ["--ro-bind", str(process.submission), str(SUBMISSION)]
         options += ["--ro-bind", str(process.host_folder), str(HOST)] if process.host_folder else []
+        options += more
         # bubblewrap's /dev is a tmpfs without a size limit, which its owner could fill.
         return [*options, "--remount-ro", "/dev", "--remount-ro", "/"]
+
+
+def _kernel() -> tuple[int, ...]:
+    return tuple(int(number) for number in re.findall(r"\d+", platform.release())[:2])
 
 
 def _program(name: str, hint: str) -> Path:

@@ -52,6 +52,16 @@ class Command:
     opened_fds: tuple[int, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class PreparedSandbox:
+    """A sandbox that a process enters after a fork, and the restrictions that the process then puts on itself."""
+
+    command: Command  # starts a placeholder in it, which writes what it reads and keeps the sandbox until it ends
+    status_fd: int  # where bubblewrap writes the pid of its child as JSON
+    restrictions: Mapping[str, object]  # the request of `start.prepare`
+    environment: Mapping[str, str]  # the complete environment of the process
+
+
 class Isolation(Protocol):
     """One sandbox tier. A tier is sent to a worker by its `name`."""
 
@@ -85,3 +95,10 @@ class Isolation(Protocol):
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student process inside the worker, which shares only its network."""
+
+    @property
+    def can_enter(self) -> bool:
+        """Whether a process can enter a sandbox of this tier, so that it need not be executed in it."""
+
+    def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
+        """Return the sandbox that `student_command` builds, for a process that enters it."""

@@ -31,12 +31,17 @@ from collections.abc import Iterator
 from typing import Any
 
 SET_PARENT_DEATH_SIGNAL = 1  # linux/prctl.h
+SET_DUMPABLE = 4
 KEEP_CAPABILITIES = 8
 SET_SECCOMP, SECCOMP_FILTER = 22, 2
 DROP_FROM_BOUNDING_SET, NO_NEW_PRIVILEGES, AMBIENT, AMBIENT_RAISE = 24, 38, 47, 2
 LAST_CAPABILITY = 63
 CAPABILITIES_VERSION_3 = 0x20080522  # linux/capability.h
 CAP_DAC_READ_SEARCH = 2
+
+#: Mount, control group, host name, IPC and process namespaces of linux/sched.h.
+NAMESPACES = 0x00020000 | 0x02000000 | 0x04000000 | 0x08000000 | 0x20000000
+USER_NAMESPACE = 0x10000000
 
 # The same numbers on every architecture.
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
@@ -62,7 +67,12 @@ LOOK_S, MOST_FILES = 0.05, 10_000
 
 def main(arguments: list[str]) -> None:
     """Prepare this process and execute the program."""
-    request: dict[str, Any] = json.loads(arguments[0])
+    prepare(json.loads(arguments[0]))
+    os.execv(arguments[1], arguments[1:])  # noqa: S606 -- becoming the program is the purpose
+
+
+def prepare(request: dict[str, Any]) -> None:
+    """Sandbox and limit this process, irrevocably."""
     system = ctypes.CDLL(None, use_errno=True)
     parent = os.getppid()
     if os.getsid(0) != os.getpid():
@@ -71,20 +81,25 @@ def main(arguments: list[str]) -> None:
             os.setsid()
     enter_folder(request)
     for name, value in request["limits"].items():
-        limit(getattr(resource, name), value)
+        limit(getattr(resource, name), *(value if isinstance(value, list) else (value,)))
     if request["processes"]:
         limit(resource.RLIMIT_NPROC, request["processes"] + (0 if request["user"] else running() + SPARE))
     confinement = request["confinement"]
     rules = ruleset(system, confinement, request["folder"]) if confinement else -1
     if request["user"]:
         become(system, *request["user"], reach=bool(confinement and confinement["reach"]))
-    # Changing the user resets this, so it has to come afterwards.
+    elif request.get("filter"):
+        drop_capabilities(system)
+    # Changing the user resets both, so they have to come afterwards.
     call(system.prctl, SET_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+    call(system.prctl, SET_DUMPABLE, 1, 0, 0, 0)
     if os.getppid() != parent:
         os._exit(1)
     if confinement:
         restrict(system, rules, bytes.fromhex(confinement["filter"]))
-    os.execv(arguments[1], arguments[1:])  # noqa: S606 -- becoming the program is the purpose
+    elif request.get("filter"):
+        checked(call(system.prctl, NO_NEW_PRIVILEGES, 1, 0, 0, 0), "no new privileges")
+        load_filter(system, bytes.fromhex(request["filter"]))
 
 
 def enter_folder(request: dict[str, Any]) -> None:
@@ -101,11 +116,11 @@ def enter_folder(request: dict[str, Any]) -> None:
     os.chdir(os.path.join(folder, "work"))
 
 
-def limit(which: int, value: int) -> None:
-    """Lower a limit, unless it is already lower."""
+def limit(which: int, value: int, beyond: int = 0) -> None:
+    """Lower a limit, unless it is already lower; the hard one is `beyond` above it."""
     _, most = resource.getrlimit(which)
-    value = value if most == resource.RLIM_INFINITY else min(value, most)
-    resource.setrlimit(which, (value, value))
+    hard = value + beyond if most == resource.RLIM_INFINITY else min(value + beyond, most)
+    resource.setrlimit(which, (min(value, hard), hard))
 
 
 def running() -> int:
@@ -200,6 +215,30 @@ def become(system: Any, user: int, group: int, *, reach: bool) -> None:
         checked(call(system.capset, header, struct.pack("=6I", kept, kept, kept, 0, 0, 0)), "capset")
         raised = call(system.prctl, AMBIENT, AMBIENT_RAISE, CAP_DAC_READ_SEARCH, 0, 0)
         checked(raised, "an ambient capability")
+
+
+def drop_capabilities(system: Any) -> None:
+    """Give up every capability, also for programs that are executed later."""
+    for capability in range(LAST_CAPABILITY + 1):
+        call(system.prctl, DROP_FROM_BOUNDING_SET, capability, 0, 0, 0)
+    checked(call(system.capset, struct.pack("=Ii", CAPABILITIES_VERSION_3, 0), bytes(24)), "capset")
+
+
+def die_with(parent: int) -> None:
+    """Make the kernel kill this process when its parent ends."""
+    call(ctypes.CDLL(None).prctl, SET_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def enter(pid: int) -> None:
+    """Enter the namespaces of a process; the process namespace holds for children that are started from now on."""
+    system = ctypes.CDLL(None, use_errno=True)
+    process = os.pidfd_open(pid)
+    own, others = (os.stat(f"/proc/{who}/ns/user").st_ino for who in ("self", pid))
+    kinds = NAMESPACES | (0 if own == others else USER_NAMESPACE)
+    checked(call(system.setns, process, kinds), "namespaces")
+    os.close(process)
 
 
 def landlock_version(system: Any = None) -> int:

@@ -31,7 +31,7 @@ from grader.execution.sandbox.exposure import (
     some_user,
     view_of,
 )
-from grader.execution.sandbox.protocol import Command, Isolation, StudentProcess, WorkerView
+from grader.execution.sandbox.protocol import Command, Isolation, PreparedSandbox, StudentProcess, WorkerView
 from grader.execution.sandbox.seccomp import flat_filter
 from grader.execution.sandbox.start import landlock_version
 
@@ -75,8 +75,20 @@ def is_for_others(name: str) -> bool:
     return name == (USER_NAME if as_root else ROOT_NAME)
 
 
+class _WithoutEntry:
+    """What the tiers have in common that have no namespaces, so that no process can enter their sandbox."""
+
+    __slots__ = ()
+    can_enter: ClassVar[bool] = False
+
+    def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
+        """Raise HarnessError: a student's process is executed."""
+        del process, limits
+        raise HarnessError("isolation: expected namespaces to enter, found none")
+
+
 @dataclass(frozen=True, slots=True)
-class FlatBubblewrap:
+class FlatBubblewrap(_WithoutEntry):
     """The tier `bubblewrap-flat`: bubblewrap around the worker; Landlock, seccomp and limits around each student in it.
 
     It is for systems that let bubblewrap create namespaces, but do not let it be nested, such as Ubuntu with its
@@ -110,7 +122,7 @@ class FlatBubblewrap:
         return sandboxed_command(process, limits, Ground(SCRATCH, loopback=False, as_root=self.outer.as_root))
 
 
-class _OnSharedNetwork:
+class _OnSharedNetwork(_WithoutEntry):
     """What the tiers have in common that use the caller's network."""
 
     __slots__ = ()

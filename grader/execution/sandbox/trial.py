@@ -11,20 +11,24 @@ import json
 import os
 import resource
 import signal
+import socket
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from grader.core.limits import Limits
 from grader.execution.codec import from_json
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox import probe
 from grader.execution.sandbox.environment import quick_discovery
-from grader.execution.sandbox.protocol import Command, StudentProcess
+from grader.execution.sandbox.protocol import Isolation, StudentProcess
 from grader.execution.sandbox.start import SPARE
+from grader.execution.sandbox.starter import StartedProcess, Starter
 from grader.execution.sandbox.tiers import HOST, isolation_from_name
 
 #: Seconds in which a message must have come back, and between two attempts to send it.
@@ -54,20 +58,12 @@ def trial(request: dict[str, Any], segment: str) -> dict[str, Any]:
     signals: list[int] = []
     signal.signal(signal.SIGUSR1, lambda number, _: signals.append(number))
     before = condition()
-    command = probe_command(request, segment)
-    with subprocess.Popen(
-        command.argv,
-        env=dict(command.environment),
-        pass_fds=command.pass_fds,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-    ) as process:
-        for descriptor in command.opened_fds:
-            os.close(descriptor)
+    reading, writing = os.pipe()
+    with started(request, segment, reading) as process:
         answered, kept = exchange(process, request["domain"])
-        out, err = process.communicate(timeout=EXCHANGE_S)
+        os.close(writing)  # ends the exchange
+        with ThreadPoolExecutor() as pool:  # so that neither stream blocks the probe
+            out, err = pool.map(read, (process.stdout, process.stderr))
     lines = out.decode("utf-8", "replace").splitlines()
     errors = err.decode("utf-8", "replace").strip().splitlines()
     achieved: dict[str, list[str]] = json.loads(lines[0]) if lines else {}
@@ -87,8 +83,48 @@ def condition() -> Mapping[str, object]:
     }
 
 
-def probe_command(request: dict[str, Any], segment: str) -> Command:
-    """Return the command of the probe, as a student's process."""
+def read(stream: IO[bytes] | None) -> bytes:
+    """Return the rest of a stream."""
+    return b"" if stream is None else stream.read()
+
+
+@contextmanager
+def started(request: dict[str, Any], segment: str, stdin: int) -> Iterator[subprocess.Popen[bytes] | StartedProcess]:
+    """Start the probe in the way in which students' processes are started here, and end it."""
+    isolation, process = probe_process(request, segment)
+    with ExitStack() as stack:
+        if isolation.can_enter:
+            starter = Starter("", process.runtime, isolation.host_seen_at)
+            stack.callback(starter.close)
+            _, theirs = (stack.enter_context(end) for end in socket.socketpair())
+            probe = starter.start(
+                isolation.prepared_sandbox(process, LIMITS),
+                {},
+                (str(process.runtime.executable), *process.arguments),
+                theirs,
+                stdin,
+            )
+            stack.callback(probe.close)
+            yield probe
+            return
+        command = isolation.student_command(process, LIMITS)
+        for descriptor in command.opened_fds:
+            stack.callback(os.close, descriptor)
+        yield stack.enter_context(
+            subprocess.Popen(
+                command.argv,
+                env=dict(command.environment),
+                pass_fds=command.pass_fds,
+                stdin=stdin,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                start_new_session=True,
+            )
+        )
+
+
+def probe_process(request: dict[str, Any], segment: str) -> tuple[Isolation, StudentProcess]:
+    """Return the tier, and the probe as a student's process."""
     isolation = isolation_from_name(request["isolation"])
     runtime = from_json(PythonRuntime, request["runtime"])
     told = {
@@ -104,7 +140,7 @@ def probe_command(request: dict[str, Any], segment: str) -> Command:
     told["files"] = [*told["files"], f"{seen_at}/{request['staged']}"]
     told["closed"] = [*told["closed"], seen_at, str(Path(seen_at).parent)]
     source = Path(probe.__file__).read_text(encoding="utf-8")
-    process = StudentProcess(
+    return isolation, StudentProcess(
         runtime=runtime,
         host_folder=HOST,
         submission=Path(request["submission"]),
@@ -112,10 +148,9 @@ def probe_command(request: dict[str, Any], segment: str) -> Command:
         environment={"ROS_DOMAIN_ID": str(request["domain"]), **quick_discovery(isolation.host_seen_at, runtime)},
         pass_fds=(),
     )
-    return isolation.student_command(process, LIMITS)
 
 
-def exchange(process: subprocess.Popen[bytes], domain: int) -> tuple[bool, Any]:
+def exchange(process: subprocess.Popen[bytes] | StartedProcess, domain: int) -> tuple[bool, Any]:
     """Send a message until it comes back from the probe; return whether it did while that ran, and the node."""
     import rclpy  # noqa: PLC0415 -- the probe starts meanwhile
     from std_msgs.msg import String  # noqa: PLC0415

@@ -1,0 +1,127 @@
+"""Starts students' processes: imports rclpy once, and for each process forks itself into a sandbox.
+
+Usage: starter.py JSON, with an object of `line`, the descriptor of a socket; `clock`, empty to import nothing and to
+execute each process's command; `python_paths`; and `sandbox`, the path of the module that sandboxes a process. Each
+message on the socket has these descriptors: the request, the standard streams of the process, its connection to the
+grader, and a socket for its pid and its exit code.
+
+This process has seen no plan, seed, path or file of any submission: a request is read by the fork that it is for.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import importlib
+import importlib.util
+import inspect
+import json
+import os
+import select
+import signal
+import socket
+import sys
+from typing import Any
+
+FROM_LAUNCHER = "launcher.py"
+#: Descriptors of a message, in this order; the number that the connection to the grader gets in the student's process.
+REQUEST, INPUT, OUTPUT, ERRORS, CONNECTION, CONTROL = range(6)
+CONNECTED = 3
+
+
+def load(path: str, name: str) -> Any:
+    """Load a module from a file."""
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def main() -> None:
+    """Prepare what all processes have in common, and start one for each message."""
+    told = json.loads(sys.argv[1])
+    sys.path[:1] = told["python_paths"]
+    line = socket.socket(fileno=told["line"])
+    program = load(os.path.join(os.path.dirname(os.path.abspath(__file__)), FROM_LAUNCHER), "_launcher").load_package()
+    sandbox = load(told["sandbox"], "_sandbox")
+    host = program.Host(told["clock"]) if told["clock"] else None
+    if host is not None:
+        host.install_ros()
+        program.warm_up()
+        inspect.getmodule(sys._getframe())  # fills a cache that the first log record of each node needs
+    gc.collect()
+    gc.freeze()
+    line.send(b"ready")
+    while True:
+        data, descriptors, _, _ = socket.recv_fds(line, 1, CONTROL + 1)
+        if not data:
+            return
+        with contextlib.suppress(ChildProcessError):
+            while os.waitpid(-1, os.WNOHANG)[0]:
+                pass
+        parent = os.getpid()
+        if not os.fork():
+            with contextlib.suppress(BaseException):
+                line.close()
+                attend(descriptors, parent, sandbox, program, host)
+            os._exit(1)
+        for descriptor in descriptors:
+            os.close(descriptor)
+
+
+def attend(descriptors: list[int], parent: int, sandbox: Any, program: Any, host: Any) -> None:
+    """Start one student's process, report its pid and exit code, and kill it when the grader closes the socket."""
+    sandbox.die_with(parent)
+    with open(descriptors[REQUEST], "rb") as source:
+        request: dict[str, Any] = json.load(source)
+    control = socket.socket(fileno=descriptors[CONTROL])
+    if request["enter"]:
+        sandbox.enter(request["enter"])
+    child = os.fork()
+    if not child:
+        try:
+            control.close()
+            become(request, descriptors, sandbox, program, host)
+        except BaseException as error:  # the grader shows it if the process never reports
+            os.write(2, f"{type(error).__name__}: {error}\n".encode())
+        os._exit(1)
+    for descriptor in (0, 1, 2, *descriptors[INPUT:CONTROL]):
+        os.close(descriptor)
+    control.sendall(json.dumps({"pid": child}).encode() + b"\n")
+    process = os.pidfd_open(child)
+    poller = select.poll()
+    poller.register(process, select.POLLIN)
+    poller.register(control, select.POLLHUP)
+    if any(found == process for found, _ in poller.poll()):
+        # The pid stays taken until the grader needs it no more.
+        ended = os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)
+        code = 0 if ended is None else ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
+        with contextlib.suppress(OSError):
+            control.sendall(json.dumps({"code": code}).encode() + b"\n")
+            control.recv(1)
+    with contextlib.suppress(OSError):
+        os.killpg(child, signal.SIGKILL)
+    with contextlib.suppress(OSError):
+        os.kill(child, signal.SIGKILL)
+    os._exit(0)
+
+
+def become(request: dict[str, Any], descriptors: list[int], sandbox: Any, program: Any, host: Any) -> None:
+    """Turn this process into a student's; never returns."""
+    os.setsid()
+    for number, descriptor in enumerate(descriptors[INPUT:CONTROL]):
+        os.dup2(descriptor, number)
+    os.closerange(CONNECTED + 1, os.sysconf("SC_OPEN_MAX"))
+    os.environ.clear()
+    os.environ.update(request["environment"])
+    sandbox.prepare(request["restrictions"])
+    if host is None or program.hides_modules(request["program"]):
+        os.execv(request["command"][0], request["command"])  # noqa: S606 - becoming the program is the purpose
+    program.keep_interfaces(request["program"])
+    program.run({**request["program"], "fd": CONNECTED}, host)
+
+
+if __name__ == "__main__":
+    main()
