@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -207,7 +208,9 @@ def test_nothing_of_a_start_is_found_by_a_later_one(run: Callable[..., Trace], s
 
 
 def children(pid: int) -> list[int]:
-    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()]
+    with contextlib.suppress(OSError):
+        return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()]
+    return []
 
 
 def below(pid: int) -> Iterator[int]:
@@ -217,12 +220,13 @@ def below(pid: int) -> Iterator[int]:
 
 
 def starters() -> list[int]:
-    """Return the starters among the descendants of this process."""
+    """Return the starters among the descendants of this process, some of which may end meanwhile."""
     found = []
     for pid in below(os.getpid()):
-        words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
-        if any(word.endswith(b"/starter.py") for word in words):
-            found.append(pid)
+        with contextlib.suppress(OSError):
+            words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+            if any(word.endswith(b"/starter.py") for word in words):
+                found.append(pid)
     return found
 
 
@@ -230,7 +234,8 @@ def test_a_starter_that_is_killed_costs_no_recording(run: Callable[..., Trace]) 
     """The recording is done again with a new worker, which has a new starter."""
     assert len(run(hostile()).messages("/cmd_vel")) > 20
     for pid in starters():
-        os.kill(pid, signal.SIGKILL)
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
     trace = run(hostile())
     assert trace.harness_problem == ""
     assert len(trace.messages("/cmd_vel")) > 20
