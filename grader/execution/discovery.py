@@ -245,7 +245,7 @@ class Discovery:
     def _found(self, graph: GraphSnapshot) -> Counter[Key]:
         """Count, in the graph, the endpoints that any process has ever claimed."""
         found = Counter((e.kind, e.topic, e.type) for e in graph.endpoints)
-        found.update(("node", name, "") for name in self._observer.students_nodes())
+        found.update(("node", name, "") for name in self._observer.students_nodes(self._nodes()))
         for kind, name, _ in self._known:
             if kind in ("service", "client"):
                 found[kind, name, ""] = self._observer.ends_of(kind, name) - self._services.ends_of(kind, name)
@@ -254,7 +254,11 @@ class Discovery:
     def _graph_at(self, now_ns: int) -> GraphSnapshot:
         """Return the live graph, including services if any process has reported one."""
         services = any(c["kind"] in ("service", "client") for s in self._students for c in s.claims)
-        return self._observer.graph(now_ns, services=services or bool(self._recorder.graph.services))
+        services = services or bool(self._recorder.graph.services)
+        return self._observer.graph(now_ns, services=services, existing=self._nodes())
+
+    def _nodes(self) -> set[str]:
+        return {c["name"] for c in self._claims() if c["kind"] == "node"}
 
     def is_served(self, calls: PlannedCalls) -> bool:
         """Return whether the server for some calls exists and is matched."""

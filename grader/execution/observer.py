@@ -11,7 +11,7 @@ import secrets
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from grader.core.trace import Endpoint, GraphSnapshot
 from grader.execution.console import TEXT_CHARACTERS, Logged
 from grader.execution.interfaces import message_class, plain_fields
 from grader.execution.padding import without_padding
-from grader.execution.service_ends import BACKGROUND_TYPES, ServiceEnds
+from grader.execution.service_ends import BACKGROUND_TYPES, ServiceEnds, looked
 from grader.student_host.originals import wait_until
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
@@ -107,7 +107,7 @@ class Observer:
         wait_until(lambda: other.get_name() in self.node.get_node_names(), NAME_S)
         return create(other)
 
-    def graph(self, t_ns: int, *, services: bool = False) -> GraphSnapshot:
+    def graph(self, t_ns: int, *, services: bool = False, existing: Collection[str] | None = None) -> GraphSnapshot:
         """Return the live graph, sorted and without the grader's own node.
 
         An endpoint can be in the graph before or after the name of its node is; it is left out then.
@@ -115,10 +115,9 @@ class Observer:
         Args:
             t_ns: Time of the snapshot.
             services: Whether to include services, which takes longer.
+            existing: See `students_nodes`.
         """
-        names = [
-            pair for pair in self.node.get_node_names_and_namespaces() if pair[0] not in {*self._names, UNKNOWN_NODE}
-        ]
+        names = self._names_in_graph(existing)
         nodes = sorted({_full_name(name, space) for name, space in names})
         offered = self.services.graph(sorted(set(names))) if services else ()
         ends = []
@@ -183,10 +182,22 @@ class Observer:
         """Return whether a stimulus is published on a topic now."""
         return topic in self._writers
 
-    def students_nodes(self) -> list[str]:
-        """Return the names of the students' nodes in the graph, including duplicates."""
-        pairs = self.node.get_node_names_and_namespaces()
-        return [_full_name(*pair) for pair in pairs if pair[0] not in {*self._names, UNKNOWN_NODE}]
+    def students_nodes(self, existing: Collection[str] | None = None) -> list[str]:
+        """Return the names of the students' nodes in the graph, including duplicates.
+
+        Args:
+            existing: The nodes that are known to exist. If given, others count only if they have a publisher, as every
+                node has: rmw_fastrtps learns of a participant's nodes and of its end on two threads, and if the end
+                comes first, the nodes return to the graph for good.
+        """
+        return [_full_name(*pair) for pair in self._names_in_graph(existing)]
+
+    def _names_in_graph(self, existing: Collection[str] | None) -> list[tuple[str, str]]:
+        pairs = [p for p in self.node.get_node_names_and_namespaces() if p[0] not in {*self._names, UNKNOWN_NODE}]
+        return [p for p in pairs if existing is None or _full_name(*p) in existing or self._publishes_anything(*p)]
+
+    def _publishes_anything(self, name: str, namespace: str) -> bool:
+        return bool(looked(self.node.get_publisher_names_and_types_by_node, name, namespace))
 
     def ends_of(self, kind: str, service: str) -> int:
         """Return the number of servers (`service`) or clients (`client`) of a service, including the grader's own."""

@@ -117,14 +117,15 @@ class ServiceEnds:
             for kind, look in looks:
                 found += [
                     ServiceEnd(kind, service, interface, f"{space.rstrip('/')}/{name}")
-                    for service, interfaces in _looked(look, name, space)
+                    for service, interfaces in looked(look, name, space)
                     for interface in interfaces
                     if not interface.startswith(BACKGROUND_TYPES)
                 ]
         return tuple(sorted(set(found), key=lambda end: (end.kind, end.service, end.type, end.node)))
 
 
-def _looked(look: Any, name: str, space: str) -> list[tuple[str, list[str]]]:
+def looked(look: Any, name: str, space: str) -> list[tuple[str, list[str]]]:
+    """Return the names and types that a query by node finds; nothing if the node is gone."""
     try:
         found: list[tuple[str, list[str]]] = look(name, space)
     except Exception:  # the node is gone; rclpy's exception for that is in different modules in different releases

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Collection, Generator
 from pathlib import Path
 from typing import Any
 
@@ -221,7 +221,7 @@ class ScriptedObserver:
         self.advertised: list[tuple[str, str, bool]] = []
         self.services: Any = None
 
-    def graph(self, t_ns: int, *, services: bool = False) -> GraphSnapshot:
+    def graph(self, t_ns: int, *, services: bool = False, existing: Collection[str] | None = None) -> GraphSnapshot:
         """Return the graph of all claims."""
         ends = [
             Endpoint(c["kind"], c["name"], c["type"], f"/{name[:-3]}", number, "reliable", "volatile")
@@ -244,7 +244,7 @@ class ScriptedObserver:
         self._watched |= {(e.topic, e.type, True) for e in graph.endpoints if e.kind == "publisher"}
         return []
 
-    def students_nodes(self) -> list[str]:
+    def students_nodes(self, existing: Collection[str] | None = None) -> list[str]:
         """Return the nodes that are claimed."""
         return [c["name"] for claims in self._world.claims.values() for c in claims if c["kind"] == "node"]
 

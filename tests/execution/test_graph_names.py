@@ -35,6 +35,7 @@ def observer(publishers: list[Any], nodes: list[tuple[str, str]]) -> Observer:
         get_topic_names_and_types=lambda no_demangle: [("/fan_speed", ["std_msgs/msg/Float32"])],
         get_publishers_info_by_topic=lambda _: publishers,
         get_subscriptions_info_by_topic=lambda _: [],
+        get_publisher_names_and_types_by_node=lambda name, _: [p.topic_type for p in publishers if p.node_name == name],
     )
     return found
 
@@ -51,3 +52,11 @@ def test_an_endpoint_is_there_as_soon_as_its_node_has_a_name() -> None:
     """Both of two nodes, in order."""
     graph = observer([info("b", 2), info("a", 1)], [("b", "/"), ("a", "/")]).graph(0)
     assert [e.node for e in graph.endpoints] == ["/a", "/b"]
+
+
+def test_a_node_that_returns_after_its_participant_has_left_is_not_there() -> None:
+    """It has no endpoint; a node that has none yet is there if it is known to exist."""
+    seen = observer([info("new", 1)], [("new", "/"), ("gone", "/"), ("young", "/")])
+    assert seen.graph(0).nodes == ("/gone", "/new", "/young")
+    assert seen.graph(0, existing={"/young"}).nodes == ("/new", "/young")
+    assert seen.students_nodes({"/young"}) == ["/new", "/young"]
