@@ -1,1 +1,1 @@
-"""Grades a class: finds the submissions, grades each in its own process, stores results, and writes the overview."""
+"""Grades a class: finds the submissions, grades them in processes of their own, stores results, and writes the overview."""

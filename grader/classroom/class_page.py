@@ -98,7 +98,7 @@ def _cost(book: Gradebook) -> str:
     used = [row.result for row in book.rows if row.result is not None]
     processor = sum(status.usage.get("processor_s", 0.0) for status in used)
     peak = max((status.usage.get("peak_bytes", 0.0) for status in used), default=0.0)
-    return f"{processor:.1f} s of processor time in all, at most {peak / _MIB:.0f} MiB in one process"
+    return f"{processor:.1f} s of processor time in all, at most {peak / _MIB:.0f} MiB in one process of the grader"
 
 
 def _counted(texts: Iterable[str]) -> str:

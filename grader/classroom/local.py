@@ -1,9 +1,10 @@
-"""Grades submissions on this machine, each in its own process; also defines the interface of schedulers."""
+"""Grades submissions on this machine, in processes that are kept for the next one; also defines the interface of schedulers."""
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -90,6 +91,7 @@ class LocalScheduler:
         self._folder = folder
         self._lock = threading.Lock()
         self._running: set[subprocess.Popen[bytes]] = set()
+        self._idle: list[subprocess.Popen[bytes]] = []
         self._closed = False
 
     def prepare(self, isolation: str) -> Sequence[str]:
@@ -115,11 +117,22 @@ class LocalScheduler:
 
     def _one(self, task: Task, on_step: OnStep) -> Attempt:
         on_step(task.name, "starting")
+        process = self._idle_one()
+        if process is not None:
+            attempt = self._attempt(process, task, on_step)
+            if attempt.status.state is not State.FAILED:
+                return attempt
+            # What a process keeps for the next submission costs no submission its result.
+            shutil.rmtree(task.into, ignore_errors=True)
         try:
             process = self._start()
         except OSError as error:
             return failed(task, f"the grader cannot be started: {error.strerror}")
-        overdue = threading.Event()
+        return self._attempt(process, task, on_step)
+
+    def _attempt(self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep) -> Attempt:
+        """Grade in a process, and keep it for the next submission unless it failed."""
+        overdue, status = threading.Event(), None
 
         def give_up() -> None:
             overdue.set()
@@ -132,12 +145,20 @@ class LocalScheduler:
             status = self._listen(process, task, on_step)
         finally:
             timer.cancel()
-            self._end(process)
+            if status is None or status.state is State.FAILED:
+                self._end(process)
+            else:
+                with self._lock:
+                    self._idle.append(process)
         if status is not None:
             return Attempt(task, status)
         if overdue.is_set():
             return failed(task, f"the grader was not done after {task.deadline_s:.0f} s")
         return failed(task, f"the grader ended without a result (exit code {process.returncode})")
+
+    def _idle_one(self) -> subprocess.Popen[bytes] | None:
+        with self._lock:
+            return self._idle.pop() if self._idle and not self._closed else None
 
     def _start(self) -> subprocess.Popen[bytes]:
         root = str(Path(__file__).resolve().parents[2])
@@ -165,7 +186,7 @@ class LocalScheduler:
         request = {"task": msgspec.to_builtins(task, enc_hook=str), "folder": str(folder), "parent": os.getpid()}
         with suppress(OSError):
             process.stdin.write(json.dumps(request).encode() + b"\n")
-            process.stdin.close()
+            process.stdin.flush()
         while line := process.stdout.readline(_LINE_BYTES):
             message = _message(line)
             if "done" in message:
@@ -175,23 +196,27 @@ class LocalScheduler:
         return None
 
     def _end(self, process: subprocess.Popen[bytes]) -> None:
+        if process.stdin is not None:
+            with suppress(OSError):
+                process.stdin.close()  # it cleans up and ends
         with suppress(subprocess.TimeoutExpired):
-            process.wait(timeout=10)  # it has reported its result and is cleaning up
+            process.wait(timeout=10)
         _kill(process)
         process.wait()
-        for stream in (process.stdin, process.stdout):
-            if stream is not None:
-                with suppress(OSError):
-                    stream.close()
+        if process.stdout is not None:
+            process.stdout.close()
         with self._lock:
             self._running.discard(process)
 
     def _close(self) -> None:
         with self._lock:
             self._closed = True
-            running = list(self._running)
+            running, idle = list(self._running), list(self._idle)
         for process in running:
-            _kill(process)
+            if process not in idle:
+                _kill(process)
+        for process in idle:
+            self._end(process)
 
 
 def _message(line: bytes) -> dict[str, object]:

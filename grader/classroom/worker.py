@@ -1,4 +1,4 @@
-"""The process that grades one submission of a class: reads a task, writes the result files, and reports its status."""
+"""The process that grades submissions of a class: reads tasks, writes the result files, and reports each status."""
 
 from __future__ import annotations
 
@@ -9,20 +9,26 @@ import resource
 import signal
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from datetime import date
 
 import msgspec
 
-from grader.app.grade import EvidenceWriter, Progress, grade
+from grader.app.grade import EvidenceWriter, Progress, grade_in
 from grader.app.request import GradeRequest
 from grader.classroom import store as kept
 from grader.classroom.local import Task
 from grader.classroom.messages import read_collected
 from grader.classroom.store import Conditions, ResultStatus, State, refused
 from grader.core.errors import GraderError, SubmissionError
+from grader.core.exercise import Exercise
+from grader.core.quantities import NS_PER_S
 from grader.core.report import Report, Reproduction
+from grader.core.submission import Run
+from grader.execution.recording_session import RecordingSession, open_session
+from grader.execution.usage import families, usage
 from grader.reporting.audience import for_student
 from grader.reporting.delivery import write_whole
 from grader.reporting.html.render import render_html
@@ -41,22 +47,51 @@ _SET_PARENT_DEATH_SIGNAL = 1  # linux/prctl.h
 
 
 def main() -> None:
-    """Grade the task from standard input; write steps and finally the status as JSON lines to standard output."""
+    """Grade the tasks from standard input; write steps and each status as JSON lines to standard output.
+
+    A recording session serves all tasks that ask for the same one. It never runs anything of a submission in this
+    process.
+    """
     ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
-    request = json.loads(sys.stdin.buffer.readline())
-    if os.getppid() != request["parent"]:  # the parent died before the signal was set
-        return
-    os.chdir(request["folder"])
-    task = msgspec.convert(request["task"], Task, dec_hook=lambda type_, value: type_(value))
-    status = attempt(task, lambda step: _send({"step": step}))
-    _send({"done": json.loads(kept.dump(status))})
+    with ExitStack() as stack:
+        sessions = Sessions(stack)
+        for line in sys.stdin.buffer:
+            request = json.loads(line)
+            if os.getppid() != request["parent"]:  # the parent died before the signal was set
+                return
+            os.chdir(request["folder"])
+            task = msgspec.convert(request["task"], Task, dec_hook=lambda type_, value: type_(value))
+            status = attempt(task, lambda step: _send({"step": step}), sessions.grade)
+            _send({"done": json.loads(kept.dump(status))})
 
 
-def attempt(task: Task, progress: Progress) -> ResultStatus:
+class Sessions:
+    """The recording sessions of a process, which are closed with the stack."""
+
+    def __init__(self, stack: ExitStack) -> None:
+        self._stack = stack
+        self._opened: dict[tuple[str, int | None], RecordingSession] = {}
+
+    def grade(
+        self, request: GradeRequest, progress: Progress, on_recorded: Callable[[Run, Sequence[Exercise]], None]
+    ) -> Report:
+        """Grade a submission in a session that is opened if there is none for the request yet; see `grade`."""
+        started = time.perf_counter()
+        wanted = (request.isolation, request.workers)
+        if wanted not in self._opened:
+            self._opened[wanted] = self._stack.enter_context(open_session(*wanted, progress))
+        return grade_in(self._opened[wanted], request, progress, on_recorded, started=started)
+
+
+#: Grades a submission: `Sessions.grade`.
+Grade = Callable[[GradeRequest, Progress, Callable[[Run, Sequence[Exercise]], None]], Report]
+
+
+def attempt(task: Task, progress: Progress, grade: Grade) -> ResultStatus:
     """Grade a submission, write the result, and return its status; never raises because of the submission."""
-    started = time.perf_counter()
+    started, before_s = time.perf_counter(), _processor_s()
     try:
-        status = _graded(task, progress)
+        status = _graded(task, progress, grade)
     except SubmissionError as error:
         status = refused(task.label, task.conditions, error)
     except GraderError as error:
@@ -65,10 +100,12 @@ def attempt(task: Task, progress: Progress) -> ResultStatus:
         status = _failed(task, f"the result cannot be written: {error.strerror}")
     except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
         status = _failed(task, f"the grader failed: {type(error).__name__}: {error}")
-    return replace(status, duration_s=round(time.perf_counter() - started, 3), usage=_usage())
+    duration_s, processor_s = time.perf_counter() - started, _processor_s() - before_s
+    used = {"processor_s": round(processor_s, 3), "peak_bytes": float(_peak_bytes())}
+    return replace(status, duration_s=round(duration_s, 3), usage=used)
 
 
-def _graded(task: Task, progress: Progress) -> ResultStatus:
+def _graded(task: Task, progress: Progress, grade: Grade) -> ResultStatus:
     conditions, own = task.conditions, task.conditions.variants
     request = GradeRequest(
         submission=str(task.submission),
@@ -131,13 +168,14 @@ def _failed(task: Task, problem: str, hint: str = "") -> ResultStatus:
     return ResultStatus(State.FAILED, "", "", task.label, problem, hint)
 
 
-def _usage() -> dict[str, float]:
-    """Return the resources used so far by this process and its children."""
-    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return {
-        "processor_s": round(sum(u.ru_utime + u.ru_stime for u in used), 3),
-        "peak_bytes": 1024 * max(u.ru_maxrss for u in used),
-    }
+def _processor_s() -> float:
+    """Return the processor time used so far by this process and all that it has started."""
+    return usage(families([os.getpid()])[os.getpid()]).processor_ns / NS_PER_S
+
+
+def _peak_bytes() -> int:
+    """Return the most memory so far of this process or one that it has waited for."""
+    return 1024 * max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 
 
 def _send(message: Mapping[str, object]) -> None:

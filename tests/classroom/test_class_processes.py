@@ -1,4 +1,4 @@
-"""One process for each submission: whatever becomes of it, the others and the class go on."""
+"""The processes that grade a class: whatever becomes of it, the others and the class go on."""
 
 from __future__ import annotations
 
@@ -73,6 +73,34 @@ def test_one_disaster_touches_nobody_else(tmp_path: Path) -> None:
         "fine too": "graded",
     }
     assert found["exits"].problem == "the grader ended without a result (exit code 7)"
+
+
+#: Grades one submission after the other, and tells its process as a step; fails or ends if the label says so.
+LASTING = f"""
+import json, os, sys
+for line in sys.stdin:
+    label = json.loads(line)["task"]["label"]
+    print(json.dumps({{"step": str(os.getpid())}}), flush=True)
+    if label.startswith("ends"):
+        sys.exit(7)
+    status = {DONE!r}
+    status["state"] = "failed" if label.startswith("fails") else "graded"
+    print(json.dumps({{"done": status}}), flush=True)
+"""
+
+
+def test_a_process_is_kept_for_the_next_submission(tmp_path: Path) -> None:
+    """Until it fails or ends. A submission that a kept process fails on is graded once more in a new one."""
+    heard: list[str] = []
+    here = LocalScheduler(1, (sys.executable, "-c", LASTING))
+    labels = ("a", "b", "fails", "c", "d", "ends", "e")
+    tasks = [task(tmp_path, label) for label in labels]
+    found = {a.task.name: a.status.state.value for a in here.run(tasks, lambda _, step: heard.append(step))}
+    assert [label for label, state in found.items() if state == "failed"] == ["fails", "ends"]
+    pids = [step for step in heard if step != "starting"]
+    order = {pid: number for number, pid in enumerate(dict.fromkeys(pids))}
+    assert [order[pid] for pid in pids] == [0, 0, 0, 1, 2, 2, 2, 3, 4]
+    assert [pid for pid in pids if Path(f"/proc/{pid}").exists()] == []
 
 
 def test_what_does_not_end_is_given_up(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from grader.classroom.outputs import Graded
 from grader.classroom.store import Conditions, State
 from grader.core.errors import ClassError, HarnessError, VariantError
 from grader.core.exercise import Drawn
+from grader.core.report import Report
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 from grader.rubrics.variants import Recorded
@@ -82,21 +83,18 @@ def test_without_key_or_roster_nothing_is_graded(class_: Callable[..., Any]) -> 
         class_(roster="")
 
 
-def test_the_process_that_grades_gets_the_values_and_not_the_key(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_process_that_grades_gets_the_values_and_not_the_key(tmp_path: Path) -> None:
     """So that it can be anywhere; the line that repeats the run names student and key."""
     heard = []
 
-    def refuse(request: GradeRequest, progress: Callable[..., Any], on_recorded: Callable[..., Any]) -> None:
+    def refuse(request: GradeRequest, progress: Callable[..., Any], on_recorded: Callable[..., Any]) -> Report:
         heard.append(request)
         raise HarnessError("enough")
 
-    monkeypatch.setattr(worker, "grade", refuse)
     own = Drawn("17", {"velocity_publisher": {"rate": "7 Hz"}})
     conditions = Conditions("0", (), "", None, "auto", "auto", variants=own)
     task = Task("x", "x", tmp_path, tmp_path / "into", (), (), None, conditions, 1, False, 60.0)
-    status = worker.attempt(replace(task, variant_key=tmp_path / "course.key"), lambda step: None)
+    status = worker.attempt(replace(task, variant_key=tmp_path / "course.key"), lambda step: None, refuse)
     (request,) = heard
     assert isinstance(request.draw, Recorded)
     assert (request.student, request.variant_key, request.draw.drawn) == ("17", tmp_path / "course.key", own)

@@ -22,16 +22,15 @@ from grader.core.trace import ClockKind
 CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
 
 
-def attempt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Any) -> ResultStatus:
+def attempt(tmp_path: Path, error: Any) -> ResultStatus:
     """Return what an attempt comes to in which grading ends with an error."""
 
-    def grade(request: GradeRequest, progress: Callable[..., Any], on_recorded: Callable[..., Any]) -> None:
+    def grade(request: GradeRequest, progress: Callable[..., Any], on_recorded: Callable[..., Any]) -> Report:
         raise error
 
-    monkeypatch.setattr(worker, "grade", grade)
     into = tmp_path / f"into {len(list(tmp_path.iterdir()))}"
     task = Task("x", "label", tmp_path, into, (), (), None, CONDITIONS, 1, False, 60.0)
-    return worker.attempt(task, lambda step: None)
+    return worker.attempt(task, lambda step: None, grade)
 
 
 @pytest.mark.parametrize(
@@ -46,27 +45,23 @@ def attempt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Any) -> Resu
         (MemoryError(), State.FAILED, "the grader failed: MemoryError: "),
     ],
 )
-def test_an_error_is_told_by_who_must_act(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Any, state: State, problem: str
-) -> None:
+def test_an_error_is_told_by_who_must_act(tmp_path: Path, error: Any, state: State, problem: str) -> None:
     """Only what is wrong with the submission itself refuses it and has a key; all else is tried again."""
-    status = attempt(tmp_path, monkeypatch, error)
+    status = attempt(tmp_path, error)
     assert (status.state, status.problem) == (state, problem)
     assert bool(status.key) == (state is State.REFUSED)
     assert status.usage["peak_bytes"] > 1 << 20
 
 
-def test_the_same_reason_to_refuse_has_the_same_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_reason_to_refuse_has_the_same_key(tmp_path: Path) -> None:
     """A submission that cannot be used is looked at again only when something changed."""
-    one = attempt(tmp_path, monkeypatch, SubmissionError("x: found none"))
-    same = attempt(tmp_path, monkeypatch, SubmissionError("x: found none"))
-    other = attempt(tmp_path, monkeypatch, SubmissionError("x: found two"))
+    one = attempt(tmp_path, SubmissionError("x: found none"))
+    same = attempt(tmp_path, SubmissionError("x: found none"))
+    other = attempt(tmp_path, SubmissionError("x: found two"))
     assert one.key == same.key != other.key
 
 
-def test_a_result_of_some_exercises_has_the_key_that_is_looked_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_result_of_some_exercises_has_the_key_that_is_looked_for(tmp_path: Path) -> None:
     """Where only exercises count of which there is a file, the others do not make it look changed."""
     rubrics = (("a", "sha256:1"), ("e", "sha256:2"))
     every = Conditions("0", rubrics, "sha256:9", None, "auto", "auto", every=True)
@@ -76,16 +71,14 @@ def test_a_result_of_some_exercises_has_the_key_that_is_looked_for(
     digest = "sha256:" + "0" * 64
     given = Reproduction(rubrics=rubrics[1:])
     report = Report("x", "x", digest, environment, 1, (exercise,), 0.1, reproduce=given)
-    monkeypatch.setattr(worker, "grade", lambda request, progress, on_recorded: report)
     task = Task("x", "x", tmp_path, tmp_path / "into", (), (), None, every, 1, False, 60.0)
-    assert worker.attempt(task, lambda step: None).key == every.key(digest)
+    assert worker.attempt(task, lambda step: None, lambda *_: report).key == every.key(digest)
     changed = dataclasses.replace(report, reproduce=Reproduction(rubrics=(("e", "sha256:3"),)))
-    monkeypatch.setattr(worker, "grade", lambda request, progress, on_recorded: changed)
     task = dataclasses.replace(task, into=tmp_path / "again")
-    assert worker.attempt(task, lambda step: None).key != every.key(digest)
+    assert worker.attempt(task, lambda step: None, lambda *_: changed).key != every.key(digest)
 
 
-def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path: Path) -> None:
     """The instructor's files show everything; the student's keep back what the rubric withholds."""
     secret = Verdict("b", "B", Outcome.NOT_MET, Fraction(0), Fraction(2), "hushhush")
     exercise = ExerciseReport(
@@ -93,9 +86,9 @@ def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path: Path, mo
     )
     environment = Environment("0", "jazzy", "7", "rmw", "3.11", "none")
     report = Report("x", "x", "sha256:" + "0" * 64, environment, 1, (exercise,), 0.1)
-    monkeypatch.setattr(worker, "grade", lambda request, progress, on_recorded: report)
     into = tmp_path / "into"
-    worker.attempt(Task("x", "x", tmp_path, into, (), (), None, CONDITIONS, 1, False, 60.0), lambda step: None)
+    task = Task("x", "x", tmp_path, into, (), (), None, CONDITIONS, 1, False, 60.0)
+    worker.attempt(task, lambda step: None, lambda *_: report)
     found = {path.name for path in into.iterdir() if "hushhush" in path.read_text(encoding="utf-8")}
     assert found == {worker.REPORT, worker.PAGE}
     assert {path.name for path in into.iterdir()} == set(worker.PARTS) - {worker.EVIDENCE}
