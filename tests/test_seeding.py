@@ -122,7 +122,9 @@ rclpy.spin(node)
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("given", ["variable", pytest.param("file", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(
+    "given", [pytest.param("variable", marks=pytest.mark.long), pytest.param("file", marks=pytest.mark.nightly)]
+)
 def test_nothing_of_the_key_leaves_the_grader(tmp_path: Path, given: str) -> None:
     """Not to reports, evidence or messages, nor to a student's process, which looks for it."""
     (tmp_path / "in").mkdir()

@@ -47,7 +47,12 @@ def test_every_program_is_listed() -> None:
 @pytest.mark.ros
 @pytest.mark.parametrize(
     "program",
-    [pytest.param(p, id=p["folder"], marks=[pytest.mark.nightly] if p.get("nightly") else []) for p in PROGRAMS],
+    [
+        pytest.param(
+            p, id=p["folder"], marks=[getattr(pytest.mark, tier) for tier in ("long", "nightly") if p.get(tier)]
+        )
+        for p in PROGRAMS
+    ],
 )
 def test_a_program_gets_what_it_is_worth(program: Mapping[str, Any]) -> None:
     """What a process says about itself is no evidence, and nothing that it did is lost."""

@@ -27,7 +27,7 @@ OTHERS = tuple(tier for tier in TIERS if tier != USUAL)
 #: What does not depend on the tier is tried in one of them.
 IN_ONE_TIER = ("archive", "report")
 #: What the default run tries; the other units are left to .ci/run.
-QUICK = ("privileges", "report")
+QUICK = ("report",)
 UNITS = units(read_attacks())
 
 

@@ -357,9 +357,9 @@ def test_a_gap_over_millions_of_messages_does_not_fill_the_grader(run: Callable[
 
 #: Has its host claim an endpoint more at every tick, which does not exist.
 GHOSTS = """
-import gc
+import inspect
 from _grader_host import ledger
-self.ledger = next(o for o in gc.get_objects() if isinstance(o, ledger.Ledger))
+self.ledger = inspect.getclosurevars(Node.destroy_node).nonlocals["leave"].__self__._ledger
 claims = ledger.Ledger.claims
 ghost = {"type": "std_msgs/msg/String", "reliable": True, "latched": False, "manual": False, "deadline_ns": 0}
 ledger.Ledger.claims = lambda it: [

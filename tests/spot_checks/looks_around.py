@@ -21,6 +21,7 @@ def elsewhere(text):
 
 
 def found():
+    gc.unfreeze()  # what was there before a fork
     texts = {
         "modules": [*sys.modules, *(str(getattr(m, "__file__", "")) for m in list(sys.modules.values()))],
         "path": sys.path,

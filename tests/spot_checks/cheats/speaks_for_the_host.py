@@ -13,6 +13,7 @@ def main():
     message = Twist()
     message.linear.x, message.angular.z = 0.5, 0.1
     node.get_logger().info("driving")
+    gc.unfreeze()  # what was there before a fork
     paused = [o for o in gc.get_objects() if type(o).__name__ == "Scheduler" and hasattr(o, "pause")]
     clocks = [o for o in gc.get_objects() if type(o).__name__ == "VirtualClock"]
     for _ in range(1200):
