@@ -6,7 +6,7 @@ import platform
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -179,10 +179,22 @@ def read_exercises(request: GradeRequest, submissions: Sequence[Path] = ()) -> l
     The submissions are other paths that students control: no rubric may load its own checks from there.
     """
     theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
-    paths = request.rubrics or _builtin(request)
-    exercises = [read_rubric(path, submissions=theirs, draw=request.draw) for path in paths]
+    if request.rubrics:
+        exercises = [read_rubric(path, submissions=theirs, draw=request.draw) for path in request.rubrics]
+    else:
+        exercises = list(map(_read_builtin, _builtin(request)))
     require_exercises(request.exercises, [exercise.id for exercise in exercises])
     return [exercise for exercise in exercises if not request.exercises or exercise.id in request.exercises]
+
+
+@cache
+def _read_builtin(path: Path) -> Exercise:
+    return read_rubric(path)
+
+
+@cache
+def _builtin_recording() -> Odometry:
+    return read_odometry(builtin_odometry())
 
 
 def _builtin(request: GradeRequest) -> list[Path]:
@@ -198,7 +210,7 @@ def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odom
     if request.odom_bag is not None:
         return read_odometry(request.odom_bag)
     stimuli = (stimulus for e in exercises for scenario in e.scenarios for stimulus in scenario.stimuli)
-    return read_odometry(builtin_odometry()) if any(isinstance(s, OdometryStream) for s in stimuli) else None
+    return _builtin_recording() if any(isinstance(s, OdometryStream) for s in stimuli) else None
 
 
 def plan_jobs(

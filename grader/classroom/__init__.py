@@ -1,1 +1,1 @@
-"""Grades a class: finds the submissions, grades them in processes of their own, stores results, and writes the overview."""
+"""Grades a class: finds the submissions, grades them, stores results, and writes the overview."""

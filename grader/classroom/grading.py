@@ -21,6 +21,7 @@ from grader.classroom.store import Conditions, Kept, ResultStatus, State, Store,
 from grader.classroom.watching import Watcher
 from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError, VariantError
 from grader.core.exercise import Exercise
+from grader.execution.recording_session import workers_for
 from grader.execution.supervisor import MARGIN_S, TRIES
 from grader.reporting.html.assets import bundle
 from grader.similarity.library import ComparedProgram
@@ -135,7 +136,7 @@ class ClassRun:
             self.store.write(f"assets/{name}", data)
         cores = len(os.sched_getaffinity(0))
         jobs = self.course.jobs or cores
-        tasks = [self._task(entry, max(1, cores // jobs)) for entry in usable]
+        tasks = [self._task(entry, workers_for(cores // jobs)) for entry in usable]
         scheduler = make(jobs)
         for line in scheduler.prepare(self.course.grading.isolation):
             warn(line)

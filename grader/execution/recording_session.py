@@ -22,8 +22,8 @@ from grader.execution.worker import FOREVER_S, RealTimeBudget
 
 #: The name of a run without a sandbox in reports.
 NO_ISOLATION = "none"
-#: More parallel workers do not pay off for one submission.
-MOST_WORKERS = 4
+#: A worker and the nodes that it records keep two processors busy, and its start costs as much as several scenarios.
+PROCESSORS_PER_WORKER, MOST_WORKERS = 2, 4
 #: The values of `--clock`: `auto` is virtual time, with the wall clock where virtual time is unsuitable.
 VIRTUAL, WALL, AUTO = "virtual", "wall", "auto"
 
@@ -85,6 +85,11 @@ class RecordingSession:
         return traces
 
 
+def workers_for(processors: int) -> int:
+    """Return how many scenarios of one submission to record in parallel on so many processors."""
+    return min(max(1, processors // PROCESSORS_PER_WORKER), MOST_WORKERS)
+
+
 def _unfit(trace: Trace, clock: str) -> bool:
     """Return whether a first recording has to be repeated on the wall clock."""
     return clock == AUTO and bool(trace.clock_reason) and not trace.harness_problem
@@ -108,7 +113,7 @@ def open_session(
     choice = choose_isolation(isolation, ros, progress)
     tier = choice.isolation
     domains = shared_domains() if tier.shares_network else private_domains()
-    workers = workers or min(len(os.sched_getaffinity(0)), MOST_WORKERS)
+    workers = workers or workers_for(len(os.sched_getaffinity(0)))
     # Neither workers nor student processes write byte code, so their modules are compiled here, once.
     compile_own()
     with scratch_folder() as folder:
