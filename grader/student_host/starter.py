@@ -53,22 +53,28 @@ def main() -> None:
         inspect.getmodule(sys._getframe())  # fills a cache that the first log record of each node needs
     gc.collect()
     gc.freeze()
+    signal.signal(signal.SIGCHLD, reap)
     line.send(b"ready")
     while True:
         data, descriptors, _, _ = socket.recv_fds(line, 1, CONTROL + 1)
         if not data:
             return
-        with contextlib.suppress(ChildProcessError):
-            while os.waitpid(-1, os.WNOHANG)[0]:
-                pass
         parent = os.getpid()
         if not os.fork():
             with contextlib.suppress(BaseException):
+                signal.signal(signal.SIGCHLD, signal.SIG_DFL)
                 line.close()
                 attend(descriptors, parent, sandbox, program, host)
             os._exit(1)
         for descriptor in descriptors:
             os.close(descriptor)
+
+
+def reap(*_: object) -> None:
+    """Wait for the children that have ended."""
+    with contextlib.suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
 
 
 def attend(descriptors: list[int], parent: int, sandbox: Any, program: Any, host: Any) -> None:
@@ -105,6 +111,7 @@ def attend(descriptors: list[int], parent: int, sandbox: Any, program: Any, host
         os.killpg(child, signal.SIGKILL)
     with contextlib.suppress(OSError):
         os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)  # so that its processor time counts
     os._exit(0)
 
 
