@@ -13,10 +13,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import cast
 
-from grader.app.exit_codes import ALL_MET, NOT_ALL_MET, UNDECIDED, UNUSABLE, exit_code
 from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest, command_words, request_of
-from grader.core.errors import EvidenceError, GraderError
+from grader.core.errors import ALL_MET, NOT_ALL_MET, UNDECIDED, UNUSABLE, EvidenceError, GraderError, exit_code
 from grader.core.exercise import Exercise
 from grader.core.report import Report
 from grader.execution.evidence.store import Evidence, first_report, found_under, is_evidence, open_evidence, run_of

@@ -11,9 +11,8 @@ from typing import Any
 
 from grader.app.seeds import PRACTICE, SeedKey
 from grader.core.exercise import Drawn, Exercise
-from grader.core.json_values import JsonObject
 from grader.core.limits import TIME_BUDGET_S
-from grader.core.report import Reproduction
+from grader.core.report import JsonObject, Reproduction
 from grader.execution.bag import Odometry
 from grader.rubrics.variants import Draw, Recorded
 from grader.submissions.collected import Collected

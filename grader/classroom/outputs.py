@@ -11,7 +11,7 @@ from grader.classroom.class_page import RunOfClass, class_page
 from grader.classroom.gradebook import Gradebook, Row, Status, number, remarks, render_gradebook
 from grader.classroom.platforms import Export, export_canvas, export_gradescope, export_moodle
 from grader.classroom.roster import Table, read_table
-from grader.core.json_values import JsonObject
+from grader.core.report import JsonObject
 from grader.reporting.class_page.contents import PageLink
 from grader.reporting.class_page.render import class_assets, render_class
 from grader.reporting.escape import json_value, shown

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from grader.app.exit_codes import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED
 from grader.cli.options import (
     PATH,
     complain,
@@ -19,6 +18,7 @@ from grader.cli.options import (
     time_budget_option,
 )
 from grader.core.checkup import TIERS
+from grader.core.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED
 
 if TYPE_CHECKING:
     from grader.classroom.local import MakeScheduler

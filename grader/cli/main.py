@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import grader
-from grader.app.exit_codes import ALL_MET, INTERRUPTED, UNDECIDED, UNUSABLE, exit_code
 from grader.cli import batch, export, rejudge, rubric
 from grader.cli.options import (
     EVIDENCE,
@@ -28,7 +27,16 @@ from grader.cli.options import (
     time_budget_option,
 )
 from grader.core.checkup import TIERS
-from grader.core.errors import GraderError, HarnessError, RubricError
+from grader.core.errors import (
+    ALL_MET,
+    INTERRUPTED,
+    UNDECIDED,
+    UNUSABLE,
+    GraderError,
+    HarnessError,
+    RubricError,
+    exit_code,
+)
 from grader.reporting.formats import FORMATS
 
 if TYPE_CHECKING:

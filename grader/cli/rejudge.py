@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from grader.app.exit_codes import exit_code
 from grader.cli.options import (
     EVIDENCE,
     PATH,
@@ -17,6 +16,7 @@ from grader.cli.options import (
     print_result,
     readers,
 )
+from grader.core.errors import exit_code
 from grader.reporting.formats import FORMATS
 
 if TYPE_CHECKING:

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import click
 
-from grader.app.exit_codes import ALL_MET, NOT_ALL_MET, UNUSABLE
 from grader.cli.options import PATH, complain, print_for_programs, print_result, require, shown_progress, write_file
 from grader.core.checkup import TIERS
-from grader.core.errors import GraderError, RubricError
+from grader.core.errors import ALL_MET, NOT_ALL_MET, UNUSABLE, GraderError, RubricError
 
 
 @click.group(name="rubric")

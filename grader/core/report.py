@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeAlias
 
 from grader.core.chart import Excerpt, Figure
 from grader.core.checkup import Property
 from grader.core.exercise import Feedback, Location, Outcome, Problem, Variant
 from grader.core.trace import ClockKind, Endpoint, Fault, GraphSnapshot, LogRecord, Offer, OutputLine, Start
+
+#: JSON values, as in reports, evidence and decoded messages.
+JsonValue: TypeAlias = bool | int | float | str | Sequence["JsonValue"] | Mapping[str, "JsonValue"] | None
+JsonObject: TypeAlias = Mapping[str, JsonValue]
 
 SCHEMA = "grader/report/v1"
 #: Prefix of the reason of a criterion that is blocked by another one.

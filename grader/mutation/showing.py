@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.core.exercise import Outcome
-from grader.core.json_values import JsonObject
+from grader.core.report import JsonObject
 from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult
 from grader.reporting.escape import shown, valid_unicode
 

@@ -9,9 +9,9 @@ from dataclasses import asdict, fields
 from rich.text import Text
 
 from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, Checkup, Exchange, Fact, TierReport, missing
-from grader.core.json_values import JsonObject
 from grader.core.limits import Limits
 from grader.core.quantities import duration, size
+from grader.core.report import JsonObject
 from grader.reporting.escape import json_value, shown
 from grader.reporting.page import Page
 

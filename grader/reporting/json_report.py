@@ -13,9 +13,8 @@ from typing_extensions import NotRequired
 
 from grader.core.checkup import described
 from grader.core.exercise import Problem
-from grader.core.json_values import JsonObject
 from grader.core.quantities import seconds
-from grader.core.report import SCHEMA, ExerciseReport, Report, ReportedFault, Verdict
+from grader.core.report import SCHEMA, ExerciseReport, JsonObject, Report, ReportedFault, Verdict
 from grader.core.trace import Start
 from grader.reporting.escape import command_line, json_value
 

@@ -6,9 +6,8 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 
-from grader.core.json_values import JsonObject
 from grader.core.quantities import seconds
-from grader.core.report import Pace, Summary, TopicSummary
+from grader.core.report import JsonObject, Pace, Summary, TopicSummary
 from grader.core.trace import Endpoint, Fault, LogRecord, Offer, OutputLine
 from grader.reporting.escape import json_value, shown
 from grader.reporting.graph import draw_graph

@@ -22,7 +22,7 @@ _NAMESPACES = {
     "shm": "own /dev/shm, IPC namespace",
     "dds_private": "network namespace",
 }
-_WALLS = {
+_LANDLOCK = {
     **_SYSTEM_LIMITS,
     "fs_read": "Landlock",
     "fs_write": "Landlock, seccomp and a watched scratch folder",
@@ -35,12 +35,12 @@ _BY_TIER: Mapping[str, Mapping[str, str]] = {
     "bubblewrap-root": {**_NAMESPACES, "pids": "RLIMIT_NPROC of a user of its own"},
     "bubblewrap": {**_NAMESPACES, "pids": "RLIMIT_NPROC in a user namespace"},
     "bubblewrap-flat": {
-        **_WALLS,
+        **_LANDLOCK,
         "net_egress": _NAMESPACES["net_egress"],
         "dds_private": _NAMESPACES["dds_private"],
     },
     "landlock": {
-        **_WALLS,
+        **_LANDLOCK,
         "net_egress": "no interface but lo",
         "dds_private": "a reserved domain on the loopback address",
     },

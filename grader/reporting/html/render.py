@@ -12,8 +12,7 @@ from markupsafe import Markup
 
 from grader.core.chart import Excerpt, Figure, GraphFigure, Panel, Series, Stage
 from grader.core.exercise import Location, Outcome, exercise_name
-from grader.core.json_values import JsonObject
-from grader.core.report import ExerciseReport, Report, ReportedFault, Verdict
+from grader.core.report import ExerciseReport, JsonObject, Report, ReportedFault, Verdict
 from grader.core.trace import ClockKind, Endpoint
 from grader.reporting import wording
 from grader.reporting.escape import script_json, shown

@@ -13,8 +13,7 @@ from fractions import Fraction
 from math import gcd, lcm
 
 from grader.core.exercise import Outcome
-from grader.core.json_values import JsonObject
-from grader.core.report import ExerciseReport, Report, Verdict
+from grader.core.report import ExerciseReport, JsonObject, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, log_lines, shown
 from grader.reporting.wording import whole_points

@@ -13,8 +13,7 @@ from pathlib import Path
 
 from grader.core.errors import GraderError
 from grader.core.exercise import Outcome
-from grader.core.json_values import JsonObject
-from grader.core.report import ExerciseReport, Report, Verdict
+from grader.core.report import ExerciseReport, JsonObject, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, shown
 from grader.reporting.json_report import json_text

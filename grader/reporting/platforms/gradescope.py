@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from grader.core.exercise import DUE_DATE, OPEN, PUBLISHED, Outcome
-from grader.core.json_values import JsonObject
-from grader.core.report import ExerciseReport, Report, Verdict
+from grader.core.report import ExerciseReport, JsonObject, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.audience import for_student
 from grader.reporting.escape import json_value, shown

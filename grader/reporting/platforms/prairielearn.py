@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from grader.core.json_values import JsonObject, JsonValue
-from grader.core.report import ExerciseReport, Report, Verdict
+from grader.core.report import ExerciseReport, JsonObject, JsonValue, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, shown
 from grader.reporting.json_report import json_text
