@@ -77,6 +77,7 @@ def test_the_template_runs_and_earns_nothing_yet() -> None:
     assert [fault for exercise in report.exercises for fault in exercise.faults] == []
 
 
+@pytest.mark.long
 def test_the_wall_clock_gives_the_same_verdict() -> None:
     """A correct publisher is correct on either clock; the report says which one it was."""
     request = GradeRequest(str(ROOT / "reference_solutions"), exercises=("velocity_publisher",), clock="wall")

@@ -186,6 +186,7 @@ def test_a_program_that_is_right_only_in_virtual_time_loses(tmp_path: Path, file
 
 
 @pytest.mark.ros
+@pytest.mark.long
 @pytest.mark.parametrize("file", sorted((HERE / "honest").glob("*.py")), ids=lambda file: file.stem)
 def test_an_honest_program_keeps_its_marks(tmp_path: Path, file: Path) -> None:
     """It looks suspicious, and is the same on both clocks."""

@@ -7,7 +7,7 @@ import shutil
 import socket
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import hostile_reports
@@ -26,14 +26,7 @@ USUAL = TIERS[0] if os.geteuid() == 0 else TIERS[1]
 OTHERS = tuple(tier for tier in TIERS if tier != USUAL)
 #: What does not depend on the tier is tried in one of them.
 IN_ONE_TIER = ("archive", "report")
-#: What the default run tries; the other units are left to .ci/run.
-QUICK = ("report",)
 UNITS = units(read_attacks())
-
-
-def choice(names: Iterable[str]) -> list[Any]:
-    """Return the units as parameters, those marked that take long."""
-    return [pytest.param(name, marks=[] if name in QUICK else pytest.mark.long) for name in names]
 
 
 NOTHING = Ran(0, {}, "", "", {})
@@ -57,7 +50,8 @@ def skip_without(tier: str, usable: dict[str, str]) -> None:
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("unit", choice(unit for unit in UNITS if unit not in IN_ONE_TIER))
+@pytest.mark.long
+@pytest.mark.parametrize("unit", [unit for unit in UNITS if unit not in IN_ONE_TIER])
 @pytest.mark.parametrize("tier", [USUAL, *(pytest.param(tier, marks=pytest.mark.nightly) for tier in OTHERS)])
 def test_attacks_are_contained(tier: str, unit: str, usable: dict[str, str]) -> None:
     """Nothing is read, written, reached, left behind or earned by an attack, and right nodes beside it lose nothing."""
@@ -67,7 +61,8 @@ def test_attacks_are_contained(tier: str, unit: str, usable: dict[str, str]) -> 
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("unit", choice(IN_ONE_TIER))
+@pytest.mark.long
+@pytest.mark.parametrize("unit", IN_ONE_TIER)
 def test_archives_and_texts_are_contained(unit: str, usable: dict[str, str]) -> None:
     """Neither what is unpacked nor what is shown depends on the tier, so one of them is enough."""
     skip_without(USUAL, usable)

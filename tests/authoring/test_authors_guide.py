@@ -85,6 +85,7 @@ def run(command: str, folder: Path) -> str:
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_the_worked_example_works(tmp_path: Path) -> None:
     """Every file as it stands in the guide, every command in order, and every line that it is said to print."""
     commands = 0
