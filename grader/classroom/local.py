@@ -211,10 +211,10 @@ class LocalScheduler:
     def _close(self) -> None:
         with self._lock:
             self._closed = True
-            running, idle = list(self._running), list(self._idle)
-        for process in running:
-            if process not in idle:
-                _kill(process)
+            idle = list(self._idle)
+            grading = self._running.difference(idle)
+        for process in grading:
+            _kill(process)
         for process in idle:
             self._end(process)
 

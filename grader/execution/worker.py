@@ -34,6 +34,7 @@ from grader.execution.sandbox.starter import HASH_SEED, Starter
 from grader.execution.sandbox.tiers import isolation_from_name
 from grader.execution.student_process import LOG_FORMAT, NodeProcess
 from grader.execution.usage import usage
+from grader.student_host.starter import CONNECTED
 
 #: The budget of recordings that do not belong to one submission: effectively unlimited.
 FOREVER_S = 1e9
@@ -94,8 +95,6 @@ WALL_TRIES = 3
 #: The kernel's limits for the worker, if its resource monitor is too slow: mapped memory, and processor time beyond the
 #: monitor's limit. An ordinary worker maps 0.6 GiB.
 ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 30
-#: The number of the connection to the grader in a student's process.
-CONNECTED = 3
 #: A worker that uses more memory after a scenario is replaced; ordinary scenarios leave 30 to 50 MiB.
 WORN_BYTES = 128 * MIB
 

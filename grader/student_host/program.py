@@ -53,8 +53,10 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
 
     Args:
         request: `fd` of the socket, `root` and `file` of the submission, `clock`, `seed` (hex), `log_format`, `limits`.
-        host: What the parent process has prepared, if this process is a fork of one.
+        host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
+            hide one that it has imported.
     """
+    prepared = host is not None
     host = host or Host(request["clock"])
     link, describer, time = host.link, host.describer, host.time
     link.open(request["fd"])
@@ -67,7 +69,9 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
         host.install_ros()
         log.open()
 
-    if not entry.shadows_of(request["root"], request["file"]).files:  # otherwise done when the program imports rclpy
+    if prepared:
+        install_ros()
+    elif not hides_modules(request):  # otherwise done when the program imports rclpy
         install_ros()
         preload(os.path.join(request["root"], request["file"]))
     install_stand_ins()

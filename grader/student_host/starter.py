@@ -24,8 +24,9 @@ import sys
 from typing import Any
 
 FROM_LAUNCHER = "launcher.py"
-#: Descriptors of a message, in this order; the number that the connection to the grader gets in the student's process.
+#: Descriptors of a message, in this order.
 REQUEST, INPUT, OUTPUT, ERRORS, CONNECTION, CONTROL = range(6)
+#: The number of the connection to the grader in a student's process.
 CONNECTED = 3
 
 

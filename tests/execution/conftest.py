@@ -1,11 +1,16 @@
-"""What tests that record real nodes share."""
+"""What tests that record real nodes or start sandboxes share."""
 
+import shutil
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hostile import staging
+from sandboxes import make_submission
 
+from grader.core.errors import EnvironmentFault
 from grader.execution.recording_session import RecordingSession, open_session
+from grader.execution.ros_installation import RosInstallation, find_ros
 
 
 @pytest.fixture(scope="module")
@@ -13,3 +18,20 @@ def studio() -> Iterator[RecordingSession]:
     """The strongest sandbox of this machine, with warm workers."""
     with open_session("auto") as studio:
         yield staging(studio)
+
+
+@pytest.fixture(scope="module")
+def ros() -> RosInstallation:
+    """The ROS of this machine."""
+    try:
+        return find_ros()
+    except EnvironmentFault as fault:
+        pytest.skip(fault.message)
+
+
+@pytest.fixture
+def submission() -> Iterator[Path]:
+    """A folder that students' processes may see."""
+    folder = make_submission()
+    yield folder
+    shutil.rmtree(folder)

@@ -15,6 +15,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 import grader
 from grader.core.errors import EnvironmentFault
 from grader.core.limits import Limits
@@ -131,6 +133,20 @@ def find_sandbox(name: str, ros: RosInstallation, submission: Path) -> Sandbox |
         return Sandbox(isolation, ros, submission)
     start_as = user_start(ros)
     return unreachable(start_as, ros) or Sandbox(isolation, ros, submission, start_as)
+
+
+def sandbox_or_skip(name: str, ros: RosInstallation, submission: Path) -> Sandbox:
+    """Return the sandbox of a tier; skips the test if this machine and user cannot have it."""
+    found = find_sandbox(name, ros, submission)
+    if isinstance(found, str):
+        pytest.skip(found)
+    return found
+
+
+def said(done: subprocess.CompletedProcess[str]) -> Any:
+    """Return the JSON that a program printed."""
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
 
 
 def _isolation(name: str, *, as_user: bool) -> Isolation:

@@ -5,24 +5,22 @@ import fcntl
 import json
 import os
 import secrets
-import shutil
 import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
-from sandboxes import DOMAIN, HOST, Sandbox, close, find_sandbox, finish, make_submission, start
+from sandboxes import DOMAIN, HOST, Sandbox, close, finish, said, sandbox_or_skip, start
 
 import grader
-from grader.core.errors import EnvironmentFault, HarnessError
+from grader.core.errors import HarnessError
 from grader.core.limits import Limits
-from grader.execution.ros_installation import RosInstallation, find_ros
+from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.bubblewrap import Bubblewrap
 from grader.execution.sandbox.protocol import StudentProcess
 
@@ -33,36 +31,14 @@ MIB = 1 << 20
 SEEN_AT = Path("/grader_host/host")
 
 
-@pytest.fixture(scope="module")
-def ros() -> RosInstallation:
-    try:
-        return find_ros()
-    except EnvironmentFault as fault:
-        pytest.skip(fault.message)
-
-
-@pytest.fixture
-def submission() -> Iterator[Path]:
-    folder = make_submission()
-    yield folder
-    shutil.rmtree(folder)
-
-
-def _sandbox(name: str, ros: RosInstallation, submission: Path) -> Sandbox:
-    found = find_sandbox(name, ros, submission)
-    if isinstance(found, str):
-        pytest.skip(found)
-    return found
-
-
 @pytest.fixture(params=["bubblewrap-root", "bubblewrap"])
 def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
-    return _sandbox(request.param, ros, submission)
+    return sandbox_or_skip(request.param, ros, submission)
 
 
 @pytest.fixture
 def plain(ros: RosInstallation, submission: Path) -> Sandbox:
-    return _sandbox("none", ros, submission)
+    return sandbox_or_skip("none", ros, submission)
 
 
 @pytest.fixture(
@@ -77,13 +53,7 @@ def plain(ros: RosInstallation, submission: Path) -> Sandbox:
     ]
 )
 def any_tier(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
-    return _sandbox(request.param, ros, submission)
-
-
-def said(done: subprocess.CompletedProcess[str]) -> Any:
-    """Return the JSON that a program printed."""
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return sandbox_or_skip(request.param, ros, submission)
 
 
 # --- network ---

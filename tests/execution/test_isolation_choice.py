@@ -32,14 +32,6 @@ CONTAINER = Path(__file__).with_name("containers.py")
 ALL_HOLD = tuple(Property(name, holds=True, mechanism="a wall") for name in PROPERTIES)
 
 
-@pytest.fixture(scope="module")
-def ros() -> RosInstallation:
-    try:
-        return find_ros()
-    except EnvironmentFault as fault:
-        pytest.skip(fault.message)
-
-
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Tests remember nothing of each other, and nothing of the user's."""

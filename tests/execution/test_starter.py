@@ -5,23 +5,22 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import shutil
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hostile import hostile, record
-from sandboxes import DOMAIN, Sandbox, find_sandbox, finish, make_submission
+from sandboxes import DOMAIN, Sandbox, finish, said, sandbox_or_skip
 
-from grader.core.errors import EnvironmentFault
 from grader.core.trace import FaultKind, Trace
 from grader.execution.codec import to_json
 from grader.execution.recording_session import RecordingSession
-from grader.execution.ros_installation import RosInstallation, find_ros
+from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.environment import worker_environment
+from grader.execution.usage import families
 
 pytestmark = pytest.mark.ros
 
@@ -88,23 +87,9 @@ starter.close()
 """
 
 
-@pytest.fixture(scope="module")
-def ros() -> RosInstallation:
-    try:
-        return find_ros()
-    except EnvironmentFault as fault:
-        pytest.skip(fault.message)
-
-
 @pytest.fixture(params=["bubblewrap-root", "bubblewrap"])
-def sandbox(request: pytest.FixtureRequest, ros: RosInstallation) -> Iterator[Sandbox]:
-    folder = make_submission()
-    found = find_sandbox(request.param, ros, folder)
-    if isinstance(found, str):
-        shutil.rmtree(folder)
-        pytest.skip(found)
-    yield found
-    shutil.rmtree(folder)
+def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
+    return sandbox_or_skip(request.param, ros, submission)
 
 
 @pytest.fixture
@@ -134,9 +119,7 @@ def test_a_forked_process_is_in_the_sandbox_of_an_executed_one(sandbox: Sandbox)
     }
     argv = (str(sandbox.ros.runtime.executable), "-s", "-B", "-c", BOTH, json.dumps(told))
     variables = worker_environment(sandbox.ros.runtime, Path("/tmp"))
-    done = finish(sandbox.worker(argv, pass_fds=(), **variables))
-    assert done.returncode == 0, done.stderr
-    executed, forked, code, errors = json.loads(done.stdout)
+    executed, forked, code, errors = said(finish(sandbox.worker(argv, pass_fds=(), **variables)))
     assert errors == ""
     assert code == 0
     found, expected = json.loads(forked), json.loads(executed)
@@ -207,22 +190,15 @@ def test_nothing_of_a_start_is_found_by_a_later_one(run: Callable[..., Trace], s
         assert printed(trace) == ["before: [] [] False 1 []"], (number, trace.faults())
 
 
-def children(pid: int) -> list[int]:
-    with contextlib.suppress(OSError):
-        return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()]
-    return []
-
-
-def below(pid: int) -> Iterator[int]:
-    for child in children(pid):
-        yield child
-        yield from below(child)
+def below() -> set[int]:
+    """Return the descendants of this process."""
+    return families([os.getpid()])[os.getpid()] - {os.getpid()}
 
 
 def starters() -> list[int]:
     """Return the starters among the descendants of this process, some of which may end meanwhile."""
     found = []
-    for pid in below(os.getpid()):
+    for pid in below():
         with contextlib.suppress(OSError):
             words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
             if any(word.endswith(b"/starter.py") for word in words):
@@ -250,10 +226,10 @@ def test_a_process_that_is_killed_is_told_as_killed(run: Callable[..., Trace]) -
 def settled() -> list[int]:
     """Return the descendants of this process when none has come or gone for a while, at the latest after 10 s."""
     deadline = time.monotonic() + 10
-    found, since = sorted(below(os.getpid())), time.monotonic()
+    found, since = sorted(below()), time.monotonic()
     while time.monotonic() < min(since + 0.5, deadline):
         time.sleep(0.02)
-        now = sorted(below(os.getpid()))
+        now = sorted(below())
         if now != found:
             found, since = now, time.monotonic()
     return found

@@ -1,24 +1,20 @@
 """What Landlock and the wider filter hold back, without namespaces around the student."""
 
 import contextlib
-import json
 import os
 import secrets
-import shutil
 import signal
 import socket
-import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
-from sandboxes import HOST, Sandbox, close, find_sandbox, make_submission, start
+from sandboxes import HOST, Sandbox, close, find_sandbox, said, sandbox_or_skip, start
 
 import grader
-from grader.core.errors import EnvironmentFault, HarnessError
+from grader.core.errors import HarnessError
 from grader.core.limits import Limits
-from grader.execution.ros_installation import RosInstallation, find_ros
+from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox import seccomp as seccomp_flat
 from grader.execution.sandbox.protocol import StudentProcess
 from grader.execution.sandbox.start import OUTGROWN, SPARE
@@ -30,33 +26,9 @@ MIB = 1 << 20
 PACKAGE = Path(grader.__file__).resolve().parent
 
 
-@pytest.fixture(scope="module")
-def ros() -> RosInstallation:
-    try:
-        return find_ros()
-    except EnvironmentFault as fault:
-        pytest.skip(fault.message)
-
-
-@pytest.fixture
-def submission() -> Iterator[Path]:
-    folder = make_submission()
-    yield folder
-    shutil.rmtree(folder)
-
-
 @pytest.fixture(params=["bubblewrap-flat", "bubblewrap-flat-user", "landlock", "landlock-user"])
 def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
-    found = find_sandbox(request.param, ros, submission)
-    if isinstance(found, str):
-        pytest.skip(found)
-    return found
-
-
-def said(done: subprocess.CompletedProcess[str]) -> Any:
-    """Return the JSON that a program printed."""
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return sandbox_or_skip(request.param, ros, submission)
 
 
 TRIES = """

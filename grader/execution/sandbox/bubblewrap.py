@@ -26,7 +26,14 @@ from grader.execution.sandbox.exposure import (
     view_of,
 )
 from grader.execution.sandbox.properties import install_command
-from grader.execution.sandbox.protocol import Command, PreparedSandbox, StudentProcess, WorkerView
+from grader.execution.sandbox.protocol import (
+    Command,
+    PreparedSandbox,
+    StudentProcess,
+    WorkerView,
+    by_resource,
+    start_request,
+)
 
 ROOT_NAME, USER_NAME = "bubblewrap-root", "bubblewrap"
 SUBMISSION = Path("/submission")
@@ -175,25 +182,13 @@ class Bubblewrap:
         options_fd = _memory_file("options", b"".join(os.fsencode(option) + b"\0" for option in options))
         opened = (filter_fd, options_fd, status_write)
         argv = (str(self.bwrap), "--args", str(options_fd), "--", str(PLACEHOLDER))
-        seconds = limits.processor_s
-        restrictions = {
-            "folder": str(WORK),
-            "made": False,
-            "scratch": 0,
-            "limits": {
-                "RLIMIT_AS": limits.address_space_bytes,
-                "RLIMIT_NPROC": limits.processes,
-                "RLIMIT_NOFILE": limits.open_files,
-                "RLIMIT_FSIZE": limits.file_bytes,
-                "RLIMIT_CORE": 0,
-                "RLIMIT_RTPRIO": 0,
-                "RLIMIT_CPU": [seconds, 1],
-            },
-            "user": [some_user(), STUDENT_GROUP] if self.as_root else None,
-            "processes": 0,
-            "confinement": None,
-            "filter": seccomp.student_filter().hex(),
-        }
+        own: dict[str, object] = {"RLIMIT_NPROC": limits.processes, "RLIMIT_RTPRIO": 0}
+        restrictions = start_request(
+            str(WORK),
+            limits={**by_resource(limits), **own, "RLIMIT_CPU": [limits.processor_s, 1]},
+            user=[some_user(), STUDENT_GROUP] if self.as_root else None,
+            filter=seccomp.student_filter().hex(),
+        )
         environment = {**student_environment(process, HOME), "PWD": str(WORK)}  # bubblewrap sets it
         return PreparedSandbox(Command(argv, {}, opened, opened), status_read, restrictions, environment)
 

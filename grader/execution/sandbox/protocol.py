@@ -62,6 +62,23 @@ class PreparedSandbox:
     environment: Mapping[str, str]  # the complete environment of the process
 
 
+def start_request(folder: str, **further: object) -> dict[str, object]:
+    """Return the request of `start.prepare` that enters a folder, and puts further restrictions on the process."""
+    nothing: dict[str, object] = {"made": False, "scratch": 0, "limits": {}, "user": None, "processes": 0}
+    return {"folder": folder, **nothing, "confinement": None, "filter": "", **further}
+
+
+def by_resource(limits: Limits) -> dict[str, object]:
+    """Return the limits that hold for each process alone, by their names in `resource`."""
+    return {
+        "RLIMIT_AS": limits.address_space_bytes,
+        "RLIMIT_NOFILE": limits.open_files,
+        "RLIMIT_FSIZE": limits.file_bytes,
+        "RLIMIT_CORE": 0,
+        "RLIMIT_CPU": limits.processor_s,
+    }
+
+
 class Isolation(Protocol):
     """One sandbox tier. A tier is sent to a worker by its `name`."""
 

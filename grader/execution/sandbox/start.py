@@ -84,22 +84,17 @@ def prepare(request: dict[str, Any]) -> None:
         limit(getattr(resource, name), *(value if isinstance(value, list) else (value,)))
     if request["processes"]:
         limit(resource.RLIMIT_NPROC, request["processes"] + (0 if request["user"] else running() + SPARE))
-    confinement = request["confinement"]
-    rules = ruleset(system, confinement, request["folder"]) if confinement else -1
+    confinement, program = request["confinement"], bytes.fromhex(request["filter"])
+    rules = ruleset(system, confinement, request["folder"]) if confinement else None
     if request["user"]:
         become(system, *request["user"], reach=bool(confinement and confinement["reach"]))
-    elif request.get("filter"):
+    elif program and not confinement:
         drop_capabilities(system)
     # Changing the user resets both, so they have to come afterwards.
-    call(system.prctl, SET_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+    die_with(parent)
     call(system.prctl, SET_DUMPABLE, 1, 0, 0, 0)
-    if os.getppid() != parent:
-        os._exit(1)
-    if confinement:
-        restrict(system, rules, bytes.fromhex(confinement["filter"]))
-    elif request.get("filter"):
-        checked(call(system.prctl, NO_NEW_PRIVILEGES, 1, 0, 0, 0), "no new privileges")
-        load_filter(system, bytes.fromhex(request["filter"]))
+    if program:
+        restrict(system, rules, program)
 
 
 def enter_folder(request: dict[str, Any]) -> None:
@@ -201,9 +196,7 @@ def become(system: Any, user: int, group: int, *, reach: bool) -> None:
 
     To `reach` is to keep the privilege to enter folders that are closed to the user; Landlock still restricts it.
     """
-    for capability in range(LAST_CAPABILITY + 1):
-        if capability != CAP_DAC_READ_SEARCH or not reach:
-            call(system.prctl, DROP_FROM_BOUNDING_SET, capability, 0, 0, 0)
+    limit_capabilities(system, CAP_DAC_READ_SEARCH if reach else None)
     if reach:
         call(system.prctl, KEEP_CAPABILITIES, 1, 0, 0, 0)
     os.setgroups([])
@@ -217,10 +210,16 @@ def become(system: Any, user: int, group: int, *, reach: bool) -> None:
         checked(raised, "an ambient capability")
 
 
+def limit_capabilities(system: Any, kept: int | None = None) -> None:
+    """Forbid programs that are executed later every capability but one."""
+    for capability in range(LAST_CAPABILITY + 1):
+        if capability != kept:
+            call(system.prctl, DROP_FROM_BOUNDING_SET, capability, 0, 0, 0)
+
+
 def drop_capabilities(system: Any) -> None:
     """Give up every capability, also for programs that are executed later."""
-    for capability in range(LAST_CAPABILITY + 1):
-        call(system.prctl, DROP_FROM_BOUNDING_SET, capability, 0, 0, 0)
+    limit_capabilities(system)
     checked(call(system.capset, struct.pack("=Ii", CAPABILITIES_VERSION_3, 0), bytes(24)), "capset")
 
 
@@ -291,11 +290,12 @@ def add_rule(system: Any, rules: int, path: str, rights: int) -> None:
         os.close(place)
 
 
-def restrict(system: Any, rules: int, program: bytes) -> None:
-    """Apply Landlock and the seccomp filter to this process, irrevocably."""
+def restrict(system: Any, rules: int | None, program: bytes) -> None:
+    """Apply the Landlock rules, if any, and the seccomp filter to this process, irrevocably."""
     checked(call(system.prctl, NO_NEW_PRIVILEGES, 1, 0, 0, 0), "no new privileges")
-    checked(call(system.syscall, RESTRICT_SELF, rules, 0), "Landlock")
-    os.close(rules)
+    if rules is not None:
+        checked(call(system.syscall, RESTRICT_SELF, rules, 0), "Landlock")
+        os.close(rules)
     load_filter(system, program)
 
 

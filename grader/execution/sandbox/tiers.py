@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from grader.core.checkup import TIERS
 from grader.core.errors import EnvironmentFault, HarnessError
@@ -31,7 +31,15 @@ from grader.execution.sandbox.exposure import (
     some_user,
     view_of,
 )
-from grader.execution.sandbox.protocol import Command, Isolation, PreparedSandbox, StudentProcess, WorkerView
+from grader.execution.sandbox.protocol import (
+    Command,
+    Isolation,
+    PreparedSandbox,
+    StudentProcess,
+    WorkerView,
+    by_resource,
+    start_request,
+)
 from grader.execution.sandbox.seccomp import flat_filter
 from grader.execution.sandbox.start import landlock_version
 
@@ -199,24 +207,9 @@ class Ground:
     as_root: bool  # whether this process is root; the student's then runs as another user
 
 
-def start_command(
-    folder: str, *, made: bool = False, limits: Mapping[str, int] | None = None, **further: object
-) -> tuple[str, ...]:
-    """Return the beginning of a command line; the program and its arguments follow. See `start.py`."""
-    request = {"folder": folder, "made": made, "scratch": 0, "limits": dict(limits or {})}
-    request |= {"user": None, "processes": 0, "confinement": None, **further}
-    return (sys.executable, "-I", "-S", str(HERE / "start.py"), json.dumps(request))
-
-
-def by_resource(limits: Limits) -> dict[str, int]:
-    """Return the limits that hold for each process alone, by their names in `resource`."""
-    return {
-        "RLIMIT_AS": limits.address_space_bytes,
-        "RLIMIT_NOFILE": limits.open_files,
-        "RLIMIT_FSIZE": limits.file_bytes,
-        "RLIMIT_CORE": 0,
-        "RLIMIT_CPU": limits.processor_s,
-    }
+def start_command(folder: str, **further: Any) -> tuple[str, ...]:
+    """Return the beginning of a command line; the program and its arguments follow. See `start_request`."""
+    return (sys.executable, "-I", "-S", str(HERE / "start.py"), json.dumps(start_request(folder, **further)))
 
 
 def loopback_only(environment: Mapping[str, str]) -> dict[str, str]:
@@ -260,6 +253,7 @@ def sandboxed_command(process: StudentProcess, limits: Limits, ground: Ground) -
         processes=limits.processes,
         user=[some_user(), STUDENT_GROUP] if ground.as_root else None,
         confinement=_confinement(process, ground),
+        filter=flat_filter(signals=_version() < WITH_SIGNALS).hex(),
     )
     return Command((*start, str(process.runtime.executable), *process.arguments), environment, tuple(process.pass_fds))
 
@@ -274,5 +268,4 @@ def _confinement(process: StudentProcess, ground: Ground) -> dict[str, object]:
         "devices": DEVICES,
         "tcp": not ground.loopback,
         "reach": ground.as_root and bool(closed_folders((*bound, *own, process.runtime.executable))),
-        "filter": flat_filter(signals=_version() < WITH_SIGNALS).hex(),
     }
