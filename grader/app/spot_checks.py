@@ -46,7 +46,10 @@ def shortened(plan: Plan, virtual: Trace) -> Plan:
 def bare_plan(plan: Plan, virtual: Trace) -> Plan:
     """Change a plan to the wall clock, with no code of the grader in the student's processes."""
     first_node_ns = next((graph.t_ns for graph in virtual.graphs() if graph.nodes), 0)
-    return replace(plan, clock=WALL, bare=True, first_node_ns=first_node_ns, stop_when_unfit=False)
+    publishers = tuple(dict.fromkeys(e for g in virtual.graphs() for e in g.endpoints if e.kind == "publisher"))
+    return replace(
+        plan, clock=WALL, bare=True, first_node_ns=first_node_ns, publishers=publishers, stop_when_unfit=False
+    )
 
 
 def is_drawn(share: float, seed: int, digest: str) -> bool:

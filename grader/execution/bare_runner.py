@@ -13,7 +13,7 @@ from grader.execution.ending import reported_fault
 from grader.execution.observer import Observer
 from grader.execution.plan import Plan
 from grader.execution.student_process import NodeProcess
-from grader.execution.wall_runner import LOOK_S, WallRunner
+from grader.execution.wall_runner import LOOK_S, MESSAGES_A_LOOK, WallRunner
 
 #: How long, in real time, to wait for the first node.
 FIRST_NODE_NS = 15 * NS_PER_S
@@ -31,9 +31,10 @@ class BareRunner(WallRunner):
         super().__init__(plan, students, observer)
         self._logs: list[Logged] = []
         observer.subscribe_to_logs()
+        observer.watch(plan.publishers)  # a message that is sent before anybody subscribes is lost
 
     def _begin(self) -> None:
-        """Wait for the first node, and start the clock."""
+        """Wait for the first node or message, and start the clock."""
         begin_ns = time.monotonic_ns()
         deadline_ns = begin_ns + (IMPORTS_NS if self._plan.first_node_ns > PROMPT_NS else FIRST_NODE_NS)
         next_ns = 0
@@ -43,6 +44,10 @@ class BareRunner(WallRunner):
                 next_ns = now_ns + FIRST_LOOK_NS
             for student in self._students:
                 self._hear(student, 0)
+            if taken := self._observer.take(MESSAGES_A_LOOK):
+                for message in taken:
+                    self._record(0, message)
+                break
             time.sleep(LOOK_S)
         self._started = time.monotonic_ns()
 

@@ -156,7 +156,7 @@ class Discovery:
         if not self._departures.wait(lambda: not self._surplus(now_ns, claims), pause_s=GRAPH_PAUSE_S):
             self._strangers = self._strangers + self._surplus(now_ns, claims)
         self.look(now_ns)
-        unknown = self._observer.watch(self._recorder.graph)
+        unknown = self._observer.watch(self._recorder.graph.endpoints)
         self._recorder.note(*(f"the type of {name} is not known on this machine" for name in unknown))
         writers = [c for c in claims if c["kind"] == "publisher"]
         self.patience.wait(lambda: all(self._watched(c, writers) for c in writers))

@@ -11,7 +11,7 @@ import secrets
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -154,10 +154,14 @@ class Observer:
             liveliness="manual_by_topic" if manual else "automatic",
         )
 
-    def watch(self, graph: GraphSnapshot) -> list[str]:
-        """Subscribe to every topic that a student's node publishes; return the topics whose type is not installed."""
+    def watch(self, endpoints: Iterable[Endpoint]) -> list[str]:
+        """Subscribe to every topic that has a publisher; return the topics whose type is not installed.
+
+        Args:
+            endpoints: Endpoints of students' nodes.
+        """
         unknown = []
-        for end in graph.endpoints:
+        for end in endpoints:
             key = (end.topic, end.type, end.reliability == "reliable")
             if end.kind != "publisher" or key in self._readers:
                 continue

@@ -25,6 +25,7 @@ from grader.core.scenario import (
     shortest,
 )
 from grader.core.submission import Submission
+from grader.core.trace import Endpoint
 from grader.execution.bag import Odometry, window
 from grader.execution.exchanges import (
     PlannedCalls,
@@ -93,6 +94,7 @@ class Plan:
         bare: Whether the files run as with `python3 FILE`, on the wall clock, without the grader's code in their
             processes.
         first_node_ns: When the first node of the bare processes is expected, from which their time is counted.
+        publishers: The publishers that bare processes are expected to create; the grader subscribes before they do.
     """
 
     scenario: str
@@ -116,6 +118,7 @@ class Plan:
     shutdown_ns: int = 0
     bare: bool = False
     first_node_ns: int = 0
+    publishers: tuple[Endpoint, ...] = ()
 
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage

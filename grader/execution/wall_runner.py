@@ -126,7 +126,7 @@ class WallRunner(Runner):
         self._end_if_full(now_ns)
         if not changed:
             return
-        self._observer.watch(self._recorder.graph)
+        self._observer.watch(self._recorder.graph.endpoints)
         self._topics.follow_types()
 
     def _announce_exchange(self, kind: str, service: str, count: int) -> None:

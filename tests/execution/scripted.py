@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator
+from collections.abc import Callable, Collection, Generator, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -239,9 +239,9 @@ class ScriptedObserver:
         """Return what is to be said of messages: nothing."""
         return []
 
-    def watch(self, graph: GraphSnapshot) -> list[str]:
+    def watch(self, endpoints: Iterable[Endpoint]) -> list[str]:
         """Watch every publisher."""
-        self._watched |= {(e.topic, e.type, True) for e in graph.endpoints if e.kind == "publisher"}
+        self._watched |= {(e.topic, e.type, True) for e in endpoints if e.kind == "publisher"}
         return []
 
     def students_nodes(self, existing: Collection[str] | None = None) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from grader.core.trace import Trace
+from grader.core.trace import Endpoint, Trace
 from grader.execution.recording_session import RecordingSession
 
 pytest.importorskip("rclpy")
@@ -354,6 +354,15 @@ def test_the_wall_clock_loses_nothing_either(run: Callable[..., Trace]) -> None:
     for ending in ("node.destroy_node()\nrclpy.shutdown()", "", "os._exit(0)"):
         trace = run(TALKER + "burst(publisher, 10)\n" + ending, clock="wall")
         assert numbers(trace) == list(range(10))
+
+
+def test_a_spot_check_hears_what_a_short_lived_node_says(run: Callable[..., Trace]) -> None:
+    """The subscription is there before the publisher, which is gone before a look at the graph would have shown it."""
+    publisher = Endpoint("publisher", "/words", "std_msgs/msg/String", "/talker", 0, "reliable", "volatile")
+    program = TALKER + "burst(publisher, 10)\nraise RuntimeError('over')"
+    # Even so, what is sent before discovery has finished can be lost, as in reality; without it, all is always lost.
+    heard = (numbers(run(program, clock="wall", bare=True, publishers=(publisher,))) for _ in range(6))
+    assert list(range(10)) in heard
 
 
 @pytest.mark.parametrize("options", ["", "signal_handler_options=rclpy.signals.SignalHandlerOptions.NO"])
