@@ -6,13 +6,14 @@ import platform
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import grader
 from grader.app.request import GradeRequest, reproduction, request_to_json
 from grader.app.seeds import PRACTICE_NOTE
+from grader.app.shipped import builtin_exercises, builtin_recording
 from grader.app.spot_checks import SpotChecks, check
 from grader.core.errors import SubmissionError
 from grader.core.exercise import Exercise, exercise_name
@@ -29,7 +30,7 @@ from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
 from grader.reporting.json_report import dumps
-from grader.rubrics.builtin import builtin_headers, builtin_odometry, require_exercises
+from grader.rubrics.builtin import require_exercises
 from grader.rubrics.loader import read_rubric
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import read_reaches, read_sources
@@ -182,27 +183,11 @@ def read_exercises(request: GradeRequest, submissions: Sequence[Path] = ()) -> l
     if request.rubrics:
         exercises = [read_rubric(path, submissions=theirs, draw=request.draw) for path in request.rubrics]
     else:
-        exercises = list(map(_read_builtin, _builtin(request)))
+        exercises = list(builtin_exercises())
     require_exercises(request.exercises, [exercise.id for exercise in exercises])
-    return [exercise for exercise in exercises if not request.exercises or exercise.id in request.exercises]
-
-
-@cache
-def _read_builtin(path: Path) -> Exercise:
-    return read_rubric(path)
-
-
-@cache
-def _builtin_recording() -> Odometry:
-    return read_odometry(builtin_odometry())
-
-
-def _builtin(request: GradeRequest) -> list[Path]:
-    """Return the files of the requested built-in rubrics, so that the others are not read."""
-    headers = builtin_headers()
-    require_exercises(request.exercises, [header.id for header in headers])
-    wanted = request.exercises or [h.id for h in headers if request.every or not h.by_request]
-    return [header.path for header in headers if header.id in wanted]
+    if request.exercises:
+        return [exercise for exercise in exercises if exercise.id in request.exercises]
+    return [e for e in exercises if request.rubrics or request.every or not e.by_request]
 
 
 def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odometry | None:
@@ -210,7 +195,7 @@ def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odom
     if request.odom_bag is not None:
         return read_odometry(request.odom_bag)
     stimuli = (stimulus for e in exercises for scenario in e.scenarios for stimulus in scenario.stimuli)
-    return _builtin_recording() if any(isinstance(s, OdometryStream) for s in stimuli) else None
+    return builtin_recording() if any(isinstance(s, OdometryStream) for s in stimuli) else None
 
 
 def plan_jobs(

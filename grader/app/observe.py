@@ -8,6 +8,7 @@ from pathlib import Path
 
 from grader.app.grade import Progress
 from grader.app.seeds import PRACTICE
+from grader.app.shipped import builtin_recording
 from grader.core.errors import HarnessError, SubmissionError
 from grader.core.quantities import NS_PER_S
 from grader.core.report import Summary
@@ -19,7 +20,6 @@ from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import open_session, planned_clock
 from grader.execution.supervisor import Job
 from grader.judging.judge_run import summarise
-from grader.rubrics.builtin import builtin_odometry
 from grader.submissions.submission import stage_submission
 
 #: When a given recording starts playing; before that the nodes receive no odometry.
@@ -58,7 +58,9 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
     if scenario is None:
         scenario = _undisturbed(request, names)
     plays = any(isinstance(stimulus, OdometryStream) for stimulus in scenario.stimuli)
-    odometry = read_odometry(request.odom_bag or builtin_odometry()) if plays else None
+    odometry = None
+    if plays:
+        odometry = builtin_recording() if request.odom_bag is None else read_odometry(request.odom_bag)
     with open_session(request.isolation, progress=progress) as session:
         submission = _stage(request.files, names, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)

@@ -35,9 +35,8 @@ TIMEOUT_S = 120.0
 
 
 def compile_own() -> None:
-    """Compile the modules of this package that workers and student processes load, where needed and possible."""
-    for folder in OWN:
-        compileall.compile_dir(folder, maxlevels=0, quiet=2)
+    """Compile the modules of this package, where needed and possible."""
+    compileall.compile_dir(PACKAGE, quiet=2)
 
 
 def byte_code(runtime: PythonRuntime) -> Fact:

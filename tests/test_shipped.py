@@ -1,0 +1,89 @@
+"""The compiled form of what is shipped says what its sources say, and is made anew when they change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from grader.app import shipped
+from grader.app.grade import read_exercises
+from grader.app.request import GradeRequest
+from grader.app.shipped import builtin_exercises, builtin_recording, compiled
+from grader.execution.bag import read_odometry
+from grader.rubrics.builtin import builtin_headers, builtin_odometry
+from grader.rubrics.loader import read_rubric
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder for compiled forms."""
+    monkeypatch.setattr(shipped, "COMPILED", tmp_path / "compiled")
+    shipped.COMPILED.mkdir()
+    return shipped.COMPILED
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    """A file that a value is read from."""
+    path = tmp_path / "source"
+    path.write_text("one")
+    return path
+
+
+def never() -> str:
+    raise AssertionError("it was read again")
+
+
+def test_the_compiled_form_equals_its_sources(folder: Path) -> None:
+    """Rubrics and recording, when they are compiled and when they are loaded."""
+    rubrics = tuple(read_rubric(header.path) for header in builtin_headers())
+    recording = read_odometry(builtin_odometry())
+    for _ in ("compiled", "loaded"):
+        assert builtin_exercises.__wrapped__() == rubrics
+        assert builtin_recording.__wrapped__() == recording
+        assert len(list(folder.iterdir())) == 2
+
+
+def test_an_unchanged_source_is_not_read_again(folder: Path, source: Path) -> None:
+    """The value is loaded."""
+    assert compiled("it", [source], source.read_text) == "one"
+    assert compiled("it", [source], never) == "one"
+
+
+def test_a_changed_source_is_read_again(folder: Path, source: Path) -> None:
+    """Also one that was added."""
+    compiled("it", [source], source.read_text)
+    source.write_text("three")
+    assert compiled("it", [source], source.read_text) == "three"
+    other = source.with_name("other")
+    other.write_text("")
+    assert compiled("it", [source, other], lambda: "more") == "more"
+
+
+@pytest.mark.parametrize(
+    "damage", [lambda b: b[:-1], lambda b: b[:40], lambda b: b"", lambda b: b[:32] + b"cos\nno\n."]
+)
+def test_a_damaged_form_is_ignored(folder: Path, source: Path, damage: Callable[[bytes], bytes]) -> None:
+    """And replaced."""
+    compiled("it", [source], source.read_text)
+    (file,) = folder.iterdir()
+    file.write_bytes(damage(file.read_bytes()))
+    assert compiled("it", [source], lambda: "again") == "again"
+    assert compiled("it", [source], never) == "again"
+
+
+def test_a_folder_that_cannot_be_written_to_does_not_matter(folder: Path, source: Path) -> None:
+    """The sources are read every time, and nothing is left behind."""
+    folder.rmdir()
+    assert [compiled("it", [source], source.read_text) for _ in range(2)] == ["one", "one"]
+    assert not folder.exists()
+
+
+def test_an_exercise_that_is_graded_on_request_is_left_out() -> None:
+    """Unless all are asked for, or it alone."""
+    usual, every = read_exercises(GradeRequest("")), read_exercises(GradeRequest("", every=True))
+    assert [e.id for e in every if not e.by_request] == [e.id for e in usual]
+    assert len(usual) < len(every) == len(builtin_headers())
+    assert [e.id for e in read_exercises(GradeRequest("", exercises=(every[-1].id,)))] == [every[-1].id]
