@@ -10,8 +10,8 @@ import sys
 import time
 from pathlib import Path
 
-from grader.app.grade import grade
 from grader.app.request import GradeRequest
+from grader.app.start import grade
 from grader.reporting.html.assets import bundle
 from grader.reporting.html.render import render_html
 

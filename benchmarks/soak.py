@@ -27,8 +27,8 @@ from arena import Arena
 from attack_rubric import publisher_rubric
 from attack_runs import HERE, REFERENCE, Attack, read_attacks
 
-from grader.app.grade import grade
 from grader.app.request import GradeRequest
+from grader.app.start import grade
 from grader.core.errors import GraderError
 
 NODE = "velocity_publisher"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from grader.app.grade import Progress, grade
+from grader.app.grade import Progress
 from grader.app.request import GradeRequest
+from grader.app.start import grade
 from grader.core.report import Report
 
 ATTEMPTS = 3

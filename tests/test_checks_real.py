@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.grade import grade
 from grader.app.request import GradeRequest
+from grader.app.start import grade
 from grader.judging.checks import CHECKS
 from grader.judging.run_check import check_name
 from grader.rubrics.loader import read_rubric

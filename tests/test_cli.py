@@ -14,7 +14,7 @@ from cli_samples import a_report
 from click.testing import CliRunner, Result
 
 import grader
-from grader.app import grade as session
+from grader.app import start as session
 from grader.app.request import GradeRequest
 from grader.cli import main
 from grader.core import errors
@@ -321,7 +321,7 @@ CHILD = """
 import sys
 sys.path.insert(0, {folder!r})
 from cli_samples import a_report
-from grader.app import grade as session
+from grader.app import start as session
 from grader.cli import main
 def grade(request, progress, on_recorded=None, on_partial_report=None, *, pictures=True):
     progress("exercise 1: \\x1b[31malone")

@@ -16,8 +16,8 @@ from _pytest.mark import ParameterSet
 from archive import SEED, SUBMISSIONS, expected, golden, outcomes, told
 from grading import grade_until_decided, say_nothing
 
-from grader.app.grade import grade
 from grader.app.request import GradeRequest
+from grader.app.start import grade
 from grader.core.report import Report
 
 ROOT = Path(__file__).resolve().parent.parent

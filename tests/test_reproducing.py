@@ -7,7 +7,7 @@ from typing import NoReturn
 import pytest
 from click.testing import CliRunner
 
-from grader.app import grade
+from grader.app import start
 from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest, command_words, recording_digest, reproduction
 from grader.cli import main
@@ -38,7 +38,7 @@ def test_every_option_that_the_result_depends_on_comes_back(monkeypatch: pytest.
         heard.append(request)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(grade, "grade", hear)
+    monkeypatch.setattr(start, "grade", hear)
     CliRunner().invoke(main.app, list(command_words(asked, 7))[1:])
     assert heard == [asked]
 

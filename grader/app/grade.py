@@ -25,7 +25,7 @@ from grader.core.trace import Trace
 from grader.execution.bag import Odometry, read_odometry
 from grader.execution.evidence.store import check_place, keep
 from grader.execution.plan import plan_scenario
-from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, open_session, planned_clock
+from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
 from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
@@ -100,25 +100,7 @@ class EvidenceWriter:
             keep(folder, run, exercises, request=asked, report=dumps(report).encode())
 
 
-def grade(
-    request: GradeRequest,
-    progress: Progress,
-    on_recorded: Callable[[Run, Sequence[Exercise]], None] | None = None,
-    on_partial_report: Callable[[Report], None] | None = None,
-    *,
-    pictures: bool = True,
-) -> Report:
-    """Grade one submission; raises a GraderError whose class tells who must act.
-
-    The complete recording and its exercises are passed to `on_recorded`; a partial report to `on_partial_report`,
-    whenever one exercise is done and others are not. Pictures are charts, which only some formats show.
-    """
-    started = time.perf_counter()
-    with open_session(request.isolation, request.workers, progress) as session:
-        return grade_in(session, request, progress, on_recorded, on_partial_report, pictures=pictures, started=started)
-
-
-def grade_in(  # noqa: PLR0913  as `grade`
+def grade_in(  # noqa: PLR0913  what to grade, and who is told
     session: RecordingSession,
     request: GradeRequest,
     progress: Progress,
@@ -128,9 +110,12 @@ def grade_in(  # noqa: PLR0913  as `grade`
     pictures: bool = True,
     started: float | None = None,
 ) -> Report:
-    """Grade one submission in a session, which others may use before and after it; see `grade`.
+    """Grade one submission in a session, which others may use before and after it.
 
-    The duration in the report begins at `started`, a reading of `time.perf_counter`; now if it is None.
+    Raises a GraderError whose class tells who must act. The complete recording and its exercises are passed to
+    `on_recorded`; a partial report to `on_partial_report`, whenever one exercise is done and others are not. Pictures
+    are charts, which only some formats show. The duration in the report begins at `started`, a reading of
+    `time.perf_counter`; now if it is None.
     """
     started = time.perf_counter() if started is None else started
     # What cannot be removed now is removed with the folder of the session.

@@ -7,15 +7,17 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from grader.app.seeds import PRACTICE, SeedKey
 from grader.core.exercise import Drawn, Exercise
 from grader.core.limits import TIME_BUDGET_S
 from grader.core.report import JsonObject, Reproduction
-from grader.execution.bag import Odometry
-from grader.rubrics.variants import Draw, Recorded
-from grader.submissions.collected import Collected
+
+if TYPE_CHECKING:
+    from grader.execution.bag import Odometry
+    from grader.rubrics.variants import Draw
+    from grader.submissions.collected import Collected
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +112,8 @@ def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -
 
 def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> GradeRequest:
     """Return the request that would record a kept run again and judge it by these rubrics."""
+    from grader.rubrics.variants import Recorded  # noqa: PLC0415 - only where a recording is judged again
+
     bag, key, student = data.get("odom_bag"), data.get("variant_key"), str(data.get("student", ""))
     return GradeRequest(
         submission=submission,

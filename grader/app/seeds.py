@@ -11,11 +11,14 @@ import unicodedata
 from collections.abc import MutableMapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from grader.core.errors import KeyFileError, VariantError
 from grader.core.exercise import Drawn, Exercise, Value
-from grader.rubrics.variants import VariantOptions
 from grader.submissions.collected import shown
+
+if TYPE_CHECKING:
+    from grader.rubrics.variants import VariantOptions
 
 #: Fewest and most bytes of a key; with a key that can be guessed, students could predict the drawn values.
 LEAST_BYTES, MOST_BYTES = 16, 4096

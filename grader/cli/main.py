@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +42,8 @@ from grader.reporting.formats import FORMATS
 if TYPE_CHECKING:
     from fractions import Fraction
 
+    from grader.app.grade import EvidenceWriter
+    from grader.app.request import GradeRequest
     from grader.reporting.delivery import Output
 
 _EPILOG = (
@@ -159,7 +161,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     rendered = tuple(output for output in outputs if output.format != EVIDENCE)
     wanted = prepared((*rendered, Output("json")) if as_json else rendered)
     for_whom = readers(audience, as_of)
-    from grader.app import grade
+    from grader.app import start
     from grader.app.request import GradeRequest
     from grader.app.seeds import PRACTICE
     from grader.core.checkup import missing
@@ -178,21 +180,28 @@ def _grade(  # noqa: PLR0913  one parameter an option
         **as_given,
     )
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
-    writer = grade.EvidenceWriter(folders, request)
+    writer = _evidence_writer(folders, request) if folders else None
+    remember = writer.remember if writer is not None else None
     pictures = any(FORMATS[output.format].illustrated for output in wanted)
     with shown_progress(wanted=not no_progress) as progress:
-        report = grade.grade(request, progress, writer.remember, early_delivery(wanted, for_whom), pictures=pictures)
+        report = start.grade(request, progress, remember, early_delivery(wanted, for_whom), pictures=pictures)
     for found in missing(report.environment.containment):
         complain(f"sandbox {report.environment.isolation}: {found}")
     if report.environment.ros_distro not in TRIED:
         complain(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
     deliver(report, wanted, for_whom)
     seen = told(report, for_whom)
-    if folders and seen is not report:
+    if writer is not None and seen is not report:
         complain("the evidence is not kept: it holds what the rubric withholds from students")
-    else:
+    elif writer is not None:
         writer.write(report)
     return exit_code(seen, min_score)
+
+
+def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> EvidenceWriter:
+    from grader.app.grade import EvidenceWriter
+
+    return EvidenceWriter(folders, request)
 
 
 @click.command(name="observe")

@@ -11,11 +11,11 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from grader.core.errors import HarnessError
 from grader.core.limits import Limits
@@ -35,6 +35,9 @@ from grader.execution.sandbox.tiers import isolation_from_name
 from grader.execution.student_process import LOG_FORMAT, NodeProcess
 from grader.execution.usage import usage
 from grader.student_host.starter import CONNECTED
+
+if TYPE_CHECKING:
+    from grader.execution.runner import Runner
 
 #: The budget of recordings that do not belong to one submission: effectively unlimited.
 FOREVER_S = 1e9
@@ -143,21 +146,14 @@ class Worker:
             for name, file in plan.processes:
                 start = self._start_bare if plan.bare else self._start
                 students.append(start(plan, name, file, domain))
-            # rclpy takes long to import: the students' processes start meanwhile.
-            from grader.execution.observer import Observer  # noqa: PLC0415
-            from grader.execution.virtual_runner import VirtualRunner  # noqa: PLC0415
-            from grader.execution.wall_runner import WallRunner  # noqa: PLC0415
+            from grader.execution.observer import Observer  # noqa: PLC0415 - imports rclpy, which takes long
 
             observer = Observer(domain, plan.limits)
             stack.callback(observer.close)
             monitor = stack.enter_context(ResourceMonitor(students, plan.limits, budget))
             stack.callback(self._account, monitor)
-            runner: Callable[..., VirtualRunner | WallRunner] = WallRunner if plan.clock == "wall" else VirtualRunner
-            if plan.bare:
-                from grader.execution.bare_runner import BareRunner  # noqa: PLC0415 - as above
-
-                runner = BareRunner
-            else:
+            runner = _import_runners()["bare" if plan.bare else plan.clock]
+            if not plan.bare:
                 for student in students:
                     _await_ready(student)
             trace = monitor.reviewed(runner(plan, students, observer).run())
@@ -235,6 +231,15 @@ class Worker:
         return student
 
 
+def _import_runners() -> Mapping[str, Callable[..., Runner]]:
+    """Import rclpy, which the supervisor never does, and return what runs a plan by its clock, or `bare`."""
+    from grader.execution.bare_runner import BareRunner  # noqa: PLC0415
+    from grader.execution.virtual_runner import VirtualRunner  # noqa: PLC0415
+    from grader.execution.wall_runner import WallRunner  # noqa: PLC0415
+
+    return {"virtual": VirtualRunner, "wall": WallRunner, "bare": BareRunner}
+
+
 def limit_memory() -> None:
     """Set the kernel's limit on the memory that this process may map; students' processes have their own."""
     _, most = resource.getrlimit(resource.RLIMIT_AS)
@@ -288,6 +293,8 @@ def main() -> None:
     commands, answers = line.makefile("r"), line.makefile("w")
     limit_memory()
     worker = Worker(isolation_from_name(request["isolation"]), from_json(PythonRuntime, request["runtime"]))
+    with suppress(Exception):  # the first plan raises it again, and answers with it
+        _import_runners()  # here, because the starter and the supervisor are still busy with imports as well
     for command in commands:
         data = json.loads(command)
         try:
