@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -275,10 +276,10 @@ def recording_bytes(trace: Trace, facts: Mapping[str, str], name: str) -> tuple[
         channels.add(message)
     writer.add_attachment(0, 0, TRACE, "application/zstd", zstandard.compress(packed))
     writer.add_metadata(FACTS, {key: _fact(value) for key, value in about.items()})
-    information = _information(messages, channels, name, json.loads(facts["environment"])["ros_distro"])
-    writer.add_metadata("rosbag2", {"serialized_metadata": _yaml(information)})
+    information = _yaml(_information(messages, channels, name, json.loads(facts["environment"])["ros_distro"]))
+    writer.add_metadata("rosbag2", {"serialized_metadata": information})
     writer.finish()  # type: ignore[no-untyped-call]
-    return stream.getvalue(), _yaml({"rosbag2_bagfile_information": information}).encode()
+    return stream.getvalue(), f"rosbag2_bagfile_information:\n{textwrap.indent(information, '  ')}".encode()
 
 
 def place_of_trace(recording: bytes) -> tuple[int, int]:
