@@ -6,14 +6,13 @@ import platform
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import grader
 from grader.app.request import GradeRequest, reproduction, request_to_json
 from grader.app.seeds import PRACTICE_NOTE
-from grader.app.shipped import builtin_exercises, builtin_recording
 from grader.app.spot_checks import SpotChecks, check
 from grader.core.errors import SubmissionError
 from grader.core.exercise import Exercise, exercise_name
@@ -30,7 +29,7 @@ from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
 from grader.reporting.json_report import dumps
-from grader.rubrics.builtin import require_exercises
+from grader.rubrics.builtin import PACKAGE, builtin_exercises, builtin_odometry, compiled, require_exercises
 from grader.rubrics.loader import read_rubric
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import read_reaches, read_sources
@@ -173,6 +172,14 @@ def read_exercises(request: GradeRequest, submissions: Sequence[Path] = ()) -> l
     if request.exercises:
         return [exercise for exercise in exercises if exercise.id in request.exercises]
     return [e for e in exercises if request.rubrics or request.every or not e.by_request]
+
+
+@cache
+def builtin_recording() -> Odometry:
+    """Return the built-in /odom recording."""
+    folder = builtin_odometry()
+    code = (PACKAGE / name for name in ("execution/bag.py", "core/scenario.py"))
+    return compiled("odometry", [*folder.iterdir(), *code], lambda: read_odometry(folder))
 
 
 def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odometry | None:

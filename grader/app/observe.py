@@ -6,9 +6,8 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.app.grade import Progress
+from grader.app.grade import Progress, builtin_recording
 from grader.app.seeds import PRACTICE
-from grader.app.shipped import builtin_recording
 from grader.core.errors import HarnessError, SubmissionError
 from grader.core.quantities import NS_PER_S
 from grader.core.report import Summary

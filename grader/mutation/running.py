@@ -26,7 +26,7 @@ from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.supervisor import Job
 from grader.judging.judge_run import judge_exercise
 from grader.mutation.explained import Explained, Explanation, beside, read_explained
-from grader.mutation.operators.mutants import mutants_of
+from grader.mutation.operators import mutants_of
 from grader.mutation.operators.program import Candidate, Program
 from grader.mutation.operators.variants import variants_of
 from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change, result_of

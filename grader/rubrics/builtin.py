@@ -1,25 +1,36 @@
-"""Files that ship with the grader: rubrics, templates and integrations."""
+"""Files that ship with the grader: rubrics, templates and integrations; rubrics are also kept in a compiled form."""
 
 from __future__ import annotations
 
+import contextlib
 import difflib
+import hashlib
+import pickle
 import re
-from collections.abc import Mapping, Sequence
+import secrets
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from grader.core.errors import RubricError
-from grader.rubrics.loader import NOTES
+from grader.core.exercise import Exercise
+from grader.rubrics.loader import NOTES, read_rubric
 from grader.rubrics.yaml_tree import read_yaml
 from grader.submissions.collected import shown
+
+#: The package, and where Python keeps its byte code: who may write there decides what the grader executes anyway.
+PACKAGE = Path(__file__).resolve().parent.parent
+COMPILED = PACKAGE / "__pycache__"
+_Value = TypeVar("_Value")
 
 
 def shipped(name: str) -> Path:
     """Return a shipped folder: `rubrics`, `student_template` or `integrations`."""
-    package = Path(__file__).resolve().parent.parent
-    inside = package / "shipped" / name
-    return inside if inside.is_dir() else package.parent / name
+    inside = PACKAGE / "shipped" / name
+    return inside if inside.is_dir() else PACKAGE.parent / name
 
 
 def builtin_odometry() -> Path:
@@ -35,6 +46,45 @@ class Header:
     id: str
     number: str
     by_request: bool
+
+
+@cache
+def builtin_exercises() -> tuple[Exercise, ...]:
+    """Return the built-in exercises, ordered by number; raises RubricError without any."""
+    paths = [header.path for header in builtin_headers()]
+    return compiled("rubrics", [*paths, *PACKAGE.rglob("*.py")], lambda: tuple(map(read_rubric, paths)))
+
+
+def compiled(name: str, sources: Iterable[Path], read: Callable[[], _Value]) -> _Value:
+    """Return what `read` returns, from its compiled form if that was made from the same sources.
+
+    A compiled form that cannot be read is ignored, and one that cannot be written is not kept.
+
+    Args:
+        name: Name of the compiled form.
+        sources: The files that the value depends on, by path, size and time of change.
+        read: Reads the sources.
+    """
+    file = COMPILED / f"{name}.{sys.implementation.cache_tag}.pickle"
+    digest = hashlib.sha256()
+    for source in sorted(sources):
+        found = source.stat()
+        digest.update(f"{source} {found.st_size} {found.st_mtime_ns}\n".encode())
+    key = digest.digest()
+    with contextlib.suppress(Exception):  # whatever an incomplete file raises
+        content = file.read_bytes()
+        if content.startswith(key):
+            value: _Value = pickle.loads(content[len(key) :])  # noqa: S301 - as trusted as the byte code beside it
+            return value
+    value = read()
+    draft = file.with_name(f"{file.name}.{secrets.token_hex(8)}")
+    with contextlib.suppress(OSError):
+        try:
+            draft.write_bytes(key + pickle.dumps(value, pickle.HIGHEST_PROTOCOL))
+            draft.replace(file)
+        finally:
+            draft.unlink(missing_ok=True)
+    return value
 
 
 def builtin_rubrics() -> Mapping[str, Path]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from grader.mutation.operators.mutants import OPERATORS, mutants_of
+from grader.mutation.operators import OPERATORS, mutants_of
 from grader.mutation.operators.program import Candidate
 from grader.mutation.results import one_line_change
 

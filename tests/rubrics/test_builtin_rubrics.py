@@ -193,7 +193,7 @@ def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path: Path, monk
     for number, name in (("10", "a"), ("2", "c"), ("P1", "b")):
         changed = text.replace('number: "1"', f'number: "{number}"').replace("id: velocity_publisher", f"id: {name}")
         (rubrics / f"{name}.yaml").write_text(changed, encoding="utf-8")
-    monkeypatch.setattr(builtin, "__file__", str(tmp_path / "grader" / "rubrics" / "builtin.py"))
+    monkeypatch.setattr(builtin, "PACKAGE", tmp_path / "grader")
     assert builtin_rubrics() == {"c": rubrics / "c.yaml", "a": rubrics / "a.yaml", "b": rubrics / "b.yaml"}
     assert list(builtin_rubrics()) == ["c", "a", "b"]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 import libcst as cst
 
-from grader.mutation.operators.mutants import meaning
+from grader.mutation.operators import meaning
 from grader.mutation.operators.program import CREATORS, Candidate, Edit, Program, argument, called, string, text_of
 from grader.mutation.operators.words import names
 

@@ -7,21 +7,20 @@ from pathlib import Path
 
 import pytest
 
-from grader.app import shipped
-from grader.app.grade import read_exercises
+from grader.app.grade import builtin_recording, read_exercises
 from grader.app.request import GradeRequest
-from grader.app.shipped import builtin_exercises, builtin_recording, compiled
 from grader.execution.bag import read_odometry
-from grader.rubrics.builtin import builtin_headers, builtin_odometry
+from grader.rubrics import builtin
+from grader.rubrics.builtin import builtin_exercises, builtin_headers, builtin_odometry, compiled
 from grader.rubrics.loader import read_rubric
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder for compiled forms."""
-    monkeypatch.setattr(shipped, "COMPILED", tmp_path / "compiled")
-    shipped.COMPILED.mkdir()
-    return shipped.COMPILED
+    monkeypatch.setattr(builtin, "COMPILED", tmp_path / "compiled")
+    builtin.COMPILED.mkdir()
+    return builtin.COMPILED
 
 
 @pytest.fixture
