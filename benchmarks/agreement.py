@@ -85,7 +85,9 @@ def run(  # noqa: PLR0913  one parameter a choice
         futures = {pool.submit(judged, session, f, tuple(expected[f]["graded"]), how): f for f in left}
         for number, future in enumerate(as_completed(futures), 1):
             results[mode][futures[future]] = future.result()
-            path.write_text(json.dumps(results, indent=1), encoding="utf-8")
+            draft = path.with_name(f"{path.name}.draft")
+            draft.write_text(json.dumps(results, indent=1), encoding="utf-8")
+            draft.replace(path)  # a run that is killed here loses nothing
             print(f"{mode} {number}/{len(left)} {futures[future]}", flush=True)
 
 
