@@ -24,6 +24,7 @@ from grader.app.grade import grade_in
 from grader.app.request import GradeRequest
 from grader.core.errors import GraderError
 from grader.execution.recording_session import RecordingSession, open_session
+from grader.reporting.delivery import write_whole
 
 SUBMISSIONS = Path(__file__).resolve().parent.parent / "tests" / "submissions"
 MODES = ("virtual", "wall", "auto", "auto-load")
@@ -85,9 +86,7 @@ def run(  # noqa: PLR0913  one parameter a choice
         futures = {pool.submit(judged, session, f, tuple(expected[f]["graded"]), how): f for f in left}
         for number, future in enumerate(as_completed(futures), 1):
             results[mode][futures[future]] = future.result()
-            draft = path.with_name(f"{path.name}.draft")
-            draft.write_text(json.dumps(results, indent=1), encoding="utf-8")
-            draft.replace(path)  # a run that is killed here loses nothing
+            write_whole(path, json.dumps(results, indent=1).encode())  # a run that is killed here loses nothing
             print(f"{mode} {number}/{len(left)} {futures[future]}", flush=True)
 
 

@@ -91,7 +91,7 @@ class EvidenceWriter:
 
     def write(self, report: Report) -> None:
         """Write the run and its report; raises EvidenceError if that fails."""
-        if self._recorded is None or not self._folders:
+        if self._recorded is None:
             return
         run, exercises = self._recorded
         for folder in self._folders:

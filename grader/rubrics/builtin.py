@@ -51,8 +51,8 @@ class Header:
 @cache
 def builtin_exercises() -> tuple[Exercise, ...]:
     """Return the built-in exercises, ordered by number; raises RubricError without any."""
-    paths = [header.path for header in builtin_headers()]
-    return compiled("rubrics", [*paths, *PACKAGE.rglob("*.py")], lambda: tuple(map(read_rubric, paths)))
+    sources = [*_paths(), *PACKAGE.rglob("*.py")]
+    return compiled("rubrics", sources, lambda: tuple(read_rubric(header.path) for header in builtin_headers()))
 
 
 def compiled(name: str, sources: Iterable[Path], read: Callable[[], _Value]) -> _Value:
@@ -94,11 +94,15 @@ def builtin_rubrics() -> Mapping[str, Path]:
 
 def builtin_headers() -> tuple[Header, ...]:
     """Return the headers of the built-in rubrics, ordered by exercise number; raises RubricError without any."""
-    folder = shipped("rubrics")
-    paths = [path for path in sorted(folder.glob("*.yaml")) if not path.name.endswith(NOTES)]
+    paths = _paths()
     if not paths:
-        raise RubricError(f"{shown(str(folder), 500)}: expected the built-in rubrics, found none", "install again")
+        folder = shown(str(shipped("rubrics")), 500)
+        raise RubricError(f"{folder}: expected the built-in rubrics, found none", "install again")
     return tuple(sorted(map(_header, paths), key=lambda header: _number_order(header.number)))
+
+
+def _paths() -> list[Path]:
+    return [path for path in sorted(shipped("rubrics").glob("*.yaml")) if not path.name.endswith(NOTES)]
 
 
 def _header(path: Path) -> Header:
