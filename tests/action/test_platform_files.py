@@ -77,7 +77,7 @@ def test_the_steps_of_the_action_pass_shellcheck(tmp_path: Path) -> None:
 @pytest.mark.parametrize("part", ["inputs", "outputs"])
 def test_the_documentation_names_every_input_and_output(part: str) -> None:
     """And none that the action has not."""
-    text = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "how-to" / "github-actions.md").read_text(encoding="utf-8")
     table = text.partition(f"\n| {part[:-1]} |")[2].partition("\n\n")[0]
     told = [name for row in table.splitlines()[2:] for name in re.findall(r"`([a-z-]+)`", row.split("|")[1])]
     assert told == list(YAML(typ="safe").load(ACTION.read_text(encoding="utf-8"))[part])

@@ -20,7 +20,7 @@ from grader.judging.checks import CHECKS
 from grader.rubrics.check_parameters import manual_of
 from grader.rubrics.model import StimulusShape
 
-GUIDE = Path(__file__).resolve().parent.parent.parent / "docs" / "authors.md"
+GUIDE = Path(__file__).resolve().parent.parent.parent / "docs" / "tutorials" / "author.md"
 FILE = re.compile(r"^`([\w/.]+)`:\n\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 CONSOLE = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 STIMULI_HEAD, CHECKS_HEAD = "| stimulus | is |\n|---|---|\n", "| check | asks |\n|---|---|\n"
