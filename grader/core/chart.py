@@ -57,7 +57,8 @@ class Level:
     """A horizontal line at a value."""
 
     value: float
-    label: str
+    label: str  # what stands beside the line
+    name: str = "expected"  # its name in the legend
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +98,8 @@ class Chart:
     panels: tuple[Panel, ...]  # its panels, from the top
     moments: tuple[Moment, ...] = ()  # lines through all panels
     square: bool = False  # whether both axes have the same scale
+    scenario: str = ""  # the recording that it shows; empty if it shows none
+    until_s: float | None = None  # when that recording ended, in seconds; None if the horizontal axis is not time
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,25 +79,18 @@ def _drawn(criterion: Criterion, traces: Mapping[str, Trace]) -> Iterable[Chart]
     except Exception:  # a failing chart must not cost the report
         chart = None
     if isinstance(chart, Chart):
-        yield replace(chart, id=f"{criterion.scenario} {chart.id}", criteria=(criterion.id,))
+        yield replace(chart, scenario=criterion.scenario, criteria=(criterion.id,))
 
 
 def _merged(charts: Iterable[Chart]) -> Iterable[Chart]:
-    """Merge charts with one id: two criteria about the same data share one chart."""
-    joined: dict[str, Chart] = {}
+    """Merge charts that show the same: two criteria about the same data share one chart."""
+    merged: dict[tuple[str, str, tuple[Panel, ...]], Chart] = {}
     for chart in charts:
-        other = joined.get(chart.id)
-        joined[chart.id] = chart if other is None else _joined(other, chart)
-    return joined.values()
-
-
-def _joined(one: Chart, other: Chart) -> Chart:
-    return replace(
-        one,
-        about=" ".join(dict.fromkeys((one.about, other.about))),
-        criteria=tuple(dict.fromkeys((*one.criteria, *other.criteria))),
-        panels=tuple(dict.fromkeys((*one.panels, *other.panels))),
-    )
+        key = (chart.scenario, chart.id, chart.panels)
+        other = merged.get(key, chart)
+        criteria = tuple(dict.fromkeys((*other.criteria, *chart.criteria)))
+        merged[key] = replace(other, criteria=criteria)
+    return merged.values()
 
 
 def _timelines(exercise: Exercise, traces: Mapping[str, Trace]) -> Sequence[Chart]:
@@ -106,7 +99,7 @@ def _timelines(exercise: Exercise, traces: Mapping[str, Trace]) -> Sequence[Char
     for scenario in recorded:
         chart = timeline_chart(traces[scenario.id], scenario.processes)
         title = f"{chart.title}: {scenario.id.replace('_', ' ')}" if len(recorded) > 1 else chart.title
-        charts.append(replace(chart, title=title))
+        charts.append(replace(chart, title=title, scenario=scenario.id))
     return charts
 
 
@@ -198,10 +191,9 @@ def timeline_chart(trace: Trace, processes: Sequence[str]) -> Chart:
     _exchanges(trace, lanes, rows)
     _faults(trace, lanes, rows)
     moments = [*_marked(trace, *_SAID_OF_MARKS), Moment(seconds(trace.stop_ns), "end")]
-    panels = (Panel("", "", tuple(rows), lanes=tuple(lanes)),)
-    return Chart(
-        "timeline", "Logs and faults over time", _about(trace, processes), (), "time", "s", panels, tuple(moments)
-    )
+    panel = Panel("", "", tuple(rows), lanes=tuple(lanes))
+    chart = time_chart(trace, "timeline", "Logs and faults over time", _about(trace, processes), panel)
+    return replace(chart, moments=tuple(moments))
 
 
 #: Name of a mark -> what follows its detail in charts.
@@ -320,12 +312,12 @@ def time_chart(trace: Trace, id_: str, title: str, about: str, *panels: Panel) -
     moments = _marked(trace, "stream_starts", "stream_stops")
     faults = [f for f in trace.faults() if f.t_ns <= trace.stop_ns]
     moments += [Moment(seconds(f.t_ns), f.kind.value.replace("_", " "), Tone.BAD) for f in faults[:_MOST_FAULTS]]
-    return Chart(id_, title, about, (), "time", "s", panels, tuple(moments))
+    return Chart(id_, title, about, (), "time", "s", panels, tuple(moments), until_s=seconds(trace.stop_ns))
 
 
 def input_panel(topic: str, values: Sequence[Reading], threshold: float, look: Look) -> Panel:
     """Return a panel with the inputs of a controller and its threshold."""
-    level = Level(threshold, f"{number(threshold)}{unit_of(topic)}")
+    level = Level(threshold, f"{number(threshold)}{unit_of(topic)}", name="threshold")
     name = plain_topic(topic)
     return Panel(name, unit_of(topic).strip(), (series(name, points_of(values), look=look),), levels=(level,))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -56,6 +57,13 @@ def visit(browser: Browser, tmp_path: Path) -> Iterator[Open]:
         context.close()
 
 
+def unfold(page: Page) -> None:
+    """Unfold everything, and wait until the charts inside are drawn."""
+    page.evaluate("document.querySelectorAll('details:not(.table)').forEach((details) => { details.open = true; })")
+    drawn = "[...document.querySelectorAll('[data-figure] .drawing')].every((drawing) => drawing.querySelector('svg'))"
+    page.wait_for_function(drawn)
+
+
 def drawings(page: Page) -> list[tuple[str, bool]]:
     """Return (figure id, whether it has a picture of some size with something in it)."""
     found: list[tuple[str, bool]] = page.evaluate(
@@ -72,6 +80,7 @@ def drawings(page: Page) -> list[tuple[str, bool]]:
 def test_every_figure_is_drawn_without_a_complaint_or_a_request(visit: Open, name: str, scheme: str) -> None:
     """The console is silent, and the page itself is all that was ever asked for."""
     page, said, asked = visit(render_html(MADE[name]()), color_scheme=scheme)
+    unfold(page)
     drawn = drawings(page)
     assert len(drawn) >= 10
     assert [id_ for id_, there in drawn if not there] == []
@@ -85,6 +94,7 @@ def test_shared_files_beside_the_report_draw_the_same(visit: Open, tmp_path: Pat
     for name, content in bundle().files.items():
         (tmp_path / "assets" / name).write_bytes(content)
     page, said, asked = visit(render_html(graded.perfect(), assets="assets"))
+    unfold(page)
     assert all(there for _, there in drawings(page))
     assert said == []
     assert {url.rsplit("/", 1)[1] for url in asked} == {"report.html", *bundle().files}
@@ -94,6 +104,7 @@ def test_shared_files_beside_the_report_draw_the_same(visit: Open, tmp_path: Pat
 def test_hostile_text_stays_text_wherever_it_is_shown(visit: Open, text: str) -> None:
     """In the page, in tooltips, in tables, in the legend and inside the charts."""
     page, said, asked = visit(render_html(graded.crashed(text)))
+    unfold(page)
     for summary in page.query_selector_all("figure .table > summary"):
         summary.click()
     for drawing in page.query_selector_all(".drawing"):
@@ -110,6 +121,7 @@ def test_hostile_text_stays_text_wherever_it_is_shown(visit: Open, text: str) ->
 def test_a_pointer_over_a_chart_is_told_the_value(visit: Open) -> None:
     """The tooltip shows the time and the value of what is under it."""
     page, said, _ = visit(render_html(graded.perfect()))
+    unfold(page)
     chart = page.locator("[data-figure=velocity_publisher-1] .drawing")
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
@@ -125,6 +137,7 @@ def test_a_pointer_over_a_chart_is_told_the_value(visit: Open) -> None:
 def test_a_pointer_over_answers_is_told_what_was_expected(visit: Open) -> None:
     """What was said long ago and still holds is in the tooltip as well."""
     page, _, _ = visit(render_html(graded.perfect()))
+    unfold(page)
     figure = page.locator("figure", has=page.get_by_role("heading", name="Answers on /fan_speed"))
     figure.locator(".drawing").focus()
     page.keyboard.press("ArrowRight")
@@ -136,6 +149,7 @@ def test_a_pointer_over_answers_is_told_what_was_expected(visit: Open) -> None:
 def test_a_pointer_over_a_timeline_is_told_what_was_logged(visit: Open) -> None:
     """The text of the record, as it was written."""
     page, said, _ = visit(render_html(graded.perfect()))
+    unfold(page)
     chart = page.locator("#odom_subscriber figure").last.locator(".drawing")
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
@@ -149,6 +163,7 @@ def test_a_pointer_over_a_timeline_is_told_what_was_logged(visit: Open) -> None:
 def test_keys_walk_along_a_chart_and_tell_a_screen_reader(visit: Open) -> None:
     """Arrow keys go from point to point; the words go to a live region."""
     page, _, _ = visit(render_html(graded.perfect()))
+    unfold(page)
     chart = page.locator("[data-figure=velocity_publisher-1]")
     chart.locator(".drawing").focus()
     page.keyboard.press("ArrowRight")
@@ -203,6 +218,7 @@ def turn_wheel(page: Page, figure: str, *, ctrl: bool) -> bool:
 def test_buttons_keys_and_the_wheel_zoom(visit: Open) -> None:
     """In, out, along and back to all of it."""
     page, said, _ = visit(render_html(graded.perfect()))
+    unfold(page)
     figure = "velocity_publisher-1"
     tools = page.locator(f"[data-figure={figure}] .tools")
     assert window_of(page, figure) == [0, 100]
@@ -225,6 +241,7 @@ def test_buttons_keys_and_the_wheel_zoom(visit: Open) -> None:
 def test_the_wheel_alone_scrolls_the_page(visit: Open) -> None:
     """A chart under the pointer is no trap."""
     page, _, _ = visit(render_html(graded.perfect()))
+    unfold(page)
     assert not turn_wheel(page, "velocity_publisher-1", ctrl=False)
     assert window_of(page, "velocity_publisher-1") == [0, 100]
 
@@ -232,6 +249,7 @@ def test_the_wheel_alone_scrolls_the_page(visit: Open) -> None:
 def test_the_graph_lights_up_and_grows(visit: Open) -> None:
     """Hovering or focusing a node shows what it is connected to; the buttons enlarge the drawing."""
     page, said, _ = visit(render_html(graded.perfect()))
+    unfold(page)
     figure = page.locator("[data-figure]", has=page.locator(".stages")).last
     node = figure.locator("[data-box]").first
     node.focus()
@@ -246,6 +264,7 @@ def test_the_graph_lights_up_and_grows(visit: Open) -> None:
 def test_both_directions_are_in_the_graph(visit: Open) -> None:
     """The last situation shows temperature going one way and the fan speed the other."""
     page, _, _ = visit(render_html(graded.perfect()))
+    unfold(page)
     stage = page.locator("#two_node_communication .stage").last
     names = dict(
         stage.evaluate(
@@ -264,6 +283,7 @@ def test_both_directions_are_in_the_graph(visit: Open) -> None:
 def test_every_chart_can_be_read_as_a_table(visit: Open) -> None:
     """All its numbers, with headings."""
     page, _, _ = visit(render_html(graded.perfect()))
+    unfold(page)
     for figure in page.query_selector_all("[data-figure]"):
         summary = figure.query_selector(".table > summary")
         assert summary is not None
@@ -282,22 +302,75 @@ def test_nothing_sticks_out_on_a_phone(visit: Open, name: str, width: int) -> No
     page, said, _ = visit(
         render_html(MADE[name]()), viewport={"width": width, "height": 700}, is_mobile=True, has_touch=True
     )
+    unfold(page)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert all(there for _, there in drawings(page))
     assert said == []
 
 
-def test_a_print_shows_every_criterion_and_every_chart(visit: Open) -> None:
-    """What is folded on the screen is unfolded on paper, and charts fit the sheet; afterwards all is as before."""
+def test_charts_stand_in_their_criterion_and_are_folded_with_it(visit: Open) -> None:
+    """Only those of what cost points are drawn at once; the others when their criterion is unfolded."""
+    page, said, _ = visit(render_html(graded.wrong()))
+    assert page.locator("details.criterion.not_met[open] figure svg[aria-hidden]").count() > 0
+    assert page.locator("details.criterion.met[open]").count() == 0
+    folded = page.locator("#velocity_publisher-linear_velocity")
+    assert folded.locator("figure").count() == 1
+    assert folded.locator("figure .drawing svg").count() == 0
+    folded.locator("summary").first.click()
+    folded.locator("figure .drawing svg").wait_for()
+    assert said == []
+
+
+def test_charts_of_one_run_share_their_cursor_and_their_zoom(visit: Open) -> None:
+    """What is under the pointer in one chart is told in the others, at the same moment."""
+    page, said, _ = visit(render_html(graded.perfect()))
+    unfold(page)
+    drawing = page.locator("[data-figure=velocity_publisher-1] .drawing")
+    drawing.scroll_into_view_if_needed()
+    box = drawing.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 100)
+    tips = [page.locator(f"[data-figure=velocity_publisher-{n}] .tip b") for n in (1, 2)]
+    for tip in tips:
+        tip.wait_for(state="visible")
+    assert len({tip.inner_text() for tip in tips}) == 1
+    page.locator("[data-figure=velocity_publisher-1] .tools").get_by_label("Zoom in").click()
+    assert window_of(page, "velocity_publisher-2") == [25, 75]
+    assert said == []
+
+
+def test_every_series_of_a_chart_has_a_look_of_its_own(visit: Open) -> None:
+    """No two entries of a legend look the same, and what is expected is grey."""
+    page, _, _ = visit(render_html(graded.wrong()))
+    unfold(page)
+    legends = page.evaluate(
+        "[...document.querySelectorAll('figure .legend')].map((legend) => [...legend.children].map((entry) => {"
+        " const path = entry.querySelector('path'); return [path.getAttribute('d') + path.style.cssText,"
+        " entry.textContent]; }))"
+    )
+    assert sum(map(len, legends)) > 20
+    assert [entries for entries in legends if len({look for look, _ in entries}) < len(entries)] == []
+    expected = [look for entries in legends for look, name in entries if "points" in name or name == "expected"]
+    assert len(expected) > 3
+    assert all("--c-faint" in look for look in expected)
+
+
+PAGES = re.compile(rb"/Type\s*/Page[^s]")
+
+
+def test_a_print_is_short_and_shows_every_criterion(visit: Open) -> None:
+    """Paper has the words of every criterion and the charts of the unfolded ones; afterwards all is as before."""
     page, said, _ = visit(render_html(graded.wrong()), color_scheme="dark")
     folded = page.locator("details.criterion:not([open])").count()
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     assert folded > 0
     assert page.locator("details.criterion:not([open])").count() == 0
-    assert max(page.evaluate("[...document.querySelectorAll('.drawing > div > svg')].map((s) => s.clientWidth)")) <= 700
+    assert (
+        page.evaluate("echarts.getInstanceByDom(document.querySelector('.drawing')).getOption().dataZoom.length") == 1
+    )
     page.evaluate("window.dispatchEvent(new Event('afterprint'))")
     assert page.locator("details.criterion:not([open])").count() == folded
-    assert len(page.pdf(format="A4")) > 20_000
+    assert 2 <= len(PAGES.findall(page.pdf(prefer_css_page_size=True))) <= 10
     assert said == []
 
 

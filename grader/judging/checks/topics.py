@@ -224,7 +224,7 @@ def _field_panel(check: FieldValues, messages: tuple[Message, ...], group: str) 
         look = Look.LINE if len(points) > 1 else Look.DOTS
         lines.append(series(path, points, look=look, tone=_TONES[place % len(_TONES)]))
     wanted = {w: [p for p, v in check.values.items() if v == w] for w in dict.fromkeys(check.values.values())}
-    levels = tuple(Level(w, f"{', '.join(paths)} = {number(w)} expected") for w, paths in wanted.items())
+    levels = tuple(Level(w, f"{', '.join(paths)} = {number(w)}") for w, paths in wanted.items())
     same = all("." in path and path.startswith(f"{group}.") for path in check.values)
     return Panel(group if same else "value", _UNITS.get(group, "") if same else "", tuple(lines), levels=levels)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 
@@ -33,6 +34,8 @@ def figure_values(figure: Figure) -> JsonObject:
         "title": shown(figure.title),
         "x": {"title": figure.x_title, "unit": figure.x_unit},
         "square": figure.square,
+        "run": figure.scenario,
+        "until": figure.until_s,
         "panels": [_panel(panel) for panel in figure.panels],
         "moments": [
             {"x": _number(m.x), "label": shown(m.label, limit=_NAME_LIMIT), "tone": m.tone.value}
@@ -50,7 +53,7 @@ def _panel(panel: Panel) -> JsonObject:
             {"low": _number(b.low), "high": _number(b.high), "label": shown(b.label), "tone": b.tone.value}
             for b in panel.bands
         ],
-        "levels": [{"value": _number(level.value), "label": shown(level.label)} for level in panel.levels],
+        "levels": [{"value": _number(v.value), "label": shown(v.label), "name": shown(v.name)} for v in panel.levels],
         "lanes": [shown(lane, limit=_NAME_LIMIT) for lane in panel.lanes],
         "grid": list(panel.grid) if panel.grid else None,
     }
@@ -136,7 +139,7 @@ def _templates() -> Environment:
         "percent": _percent,
         "excerpt_at": _excerpt_at,
         "excerpts_left": _excerpts_left,
-        "figures_for": _figures_for,
+        "placed_in": _placed_in,
         "segments": _segments,
     }
     return templates
@@ -165,8 +168,26 @@ def _excerpts_left(exercise: ExerciseReport, fault: ReportedFault) -> list[Excer
     return [excerpt] if excerpt and place not in shown_above else []
 
 
-def _figures_for(exercise: ExerciseReport, criterion: str) -> list[Figure]:
-    return [figure for figure in exercise.figures if criterion in figure.criteria]
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """The figures of an exercise, each with the criterion that it stands in; empty for none."""
+
+    figures: tuple[tuple[str, Figure], ...]
+
+    def inside(self, criterion: str) -> list[Figure]:
+        """Return the figures that stand in a criterion, or in none."""
+        return [figure for home, figure in self.figures if home == criterion]
+
+    def elsewhere(self, criterion: str) -> list[Figure]:
+        """Return the figures that illustrate a criterion but stand in another one."""
+        return [figure for home, figure in self.figures if home != criterion and criterion in figure.criteria]
+
+
+def _placed_in(exercise: ExerciseReport) -> _Placed:
+    """Place each figure in the first of its criteria that starts unfolded, else in the first."""
+    verdicts = sorted(exercise.verdicts, key=lambda verdict: not _open_at_first(verdict))
+    homes = [next((v.id for v in verdicts if v.id in figure.criteria), "") for figure in exercise.figures]
+    return _Placed(tuple(zip(homes, exercise.figures, strict=True)))
 
 
 def _segments(verdicts: Iterable[Verdict]) -> list[tuple[float, float, str]]:

@@ -1,8 +1,11 @@
 // Draws the figures of kind "chart". All text is already harmless, and it is only ever set as text.
 const Charts = (() => {
   const colour = (tone) => `var(--c-${tone})`;
-  const SYMBOLS = { bad: "diamond", warning: "triangle", second: "rect" };
-  const [SIDE, PANEL, LONE_PANEL, LANE, HEADER, MOMENTS, AXIS, SLIDER, LABEL] = [52, 150, 210, 48, 34, 20, 40, 26, 15];
+  // The tones of data: each series of a chart has its own.
+  const DATA = ["main", "second", "third", "fourth", "fifth", "sixth"];
+  const SYMBOLS = { bad: "diamond", warning: "triangle", second: "rect", third: "triangle", fifth: "rect", sixth: "triangle" };
+  const [SIDE, PANEL, LONE_PANEL, LANE, HEADER, AXIS, SLIDER, LABEL, GLYPH] = [52, 150, 190, 50, 34, 40, 26, 15, 6.4];
+  const BANDS = { good: 0.3, warning: 0.14 };
   const FONT = { color: "var(--soft)", fontSize: 12, fontFamily: "inherit" };
   const TOOLTIP = {
     confine: true,
@@ -51,7 +54,20 @@ const Charts = (() => {
     const points = figure.panels.flatMap((panel) => panel.series.flatMap((series) => series.points));
     const [low, high] = extent([...points.map((p) => p[0]), ...figure.moments.map((m) => m.x)]);
     if (figure.square) return [low, high];
-    return [Math.min(0, low), high > 0 ? high * 1.01 : 1];
+    const last = Math.max(high, figure.until || 0);
+    return [Math.min(0, low), last > 0 ? last * 1.01 : 1];
+  }
+
+  // The tone of each series by name: the one it asks for, unless another series of the chart has it.
+  function tones(figure) {
+    const given = new Map();
+    for (const series of figure.panels.flatMap((panel) => panel.series)) {
+      const key = `${series.name} ${series.tone}`;
+      if (given.has(key)) continue;
+      const free = DATA.filter((tone) => ![...given.values()].includes(tone));
+      given.set(key, DATA.includes(series.tone) && !free.includes(series.tone) ? free[0] || series.tone : series.tone);
+    }
+    return (series) => given.get(`${series.name} ${series.tone}`);
   }
 
   function extentY(panel) {
@@ -59,10 +75,10 @@ const Charts = (() => {
     return extent([...values, ...panel.bands.flatMap((b) => [b.low, b.high]), ...panel.levels.map((l) => l.value)]);
   }
 
-  // How far down each band's label has to move so that none lies on another: upwards where there is room, else downwards.
-  function shifts(bands, axis, height) {
-    const top = bands.map((band) => ((axis.max - band.high) / (axis.max - axis.min)) * height);
-    const order = [...bands.keys()].sort((a, b) => top[a] - top[b]);
+  // How far down each level's label has to move so that none lies on another: upwards where there is room, else downwards.
+  function shifts(levels, axis, height) {
+    const top = levels.map((level) => ((axis.max - level.value) / (axis.max - axis.min)) * height - LABEL);
+    const order = [...levels.keys()].sort((a, b) => top[a] - top[b]);
     const wanted = top.map((place) => Math.min(place, height - LABEL));
     for (let k = order.length - 2; k >= 0; k -= 1) {
       wanted[order[k]] = Math.max(0, Math.min(wanted[order[k]], wanted[order[k + 1]] - LABEL));
@@ -73,9 +89,29 @@ const Charts = (() => {
     return wanted.map((place, index) => place - top[index]);
   }
 
+  // The row of each moment's label above the chart, so that none lies on another: faults first; null where both are full.
+  function momentRows(figure, ends, width) {
+    const inner = width - SIDE - 14;
+    const taken = [[], []];
+    const rows = figure.moments.map(() => null);
+    const order = [...rows.keys()].sort((a, b) => (figure.moments[b].tone === "bad") - (figure.moments[a].tone === "bad"));
+    for (const index of order) {
+      const { x, label } = figure.moments[index];
+      const long = label.length * GLYPH + 6;
+      const at = ((x - ends[0]) / (ends[1] - ends[0])) * inner;
+      const left = at - long * { left: 0, center: 0.5, right: 1 }[alignment(x, ends, label, inner)];
+      const row = taken.findIndex((row) => row.every(([from, to]) => left >= to || left + long <= from));
+      if (row < 0) continue;
+      taken[row].push([left, left + long]);
+      rows[index] = row;
+    }
+    return rows;
+  }
+
   // Where each panel lies, from the top; heights in pixels.
-  function places(figure, width) {
-    let top = figure.moments.length ? MOMENTS : 0;
+  function places(figure, width, slider) {
+    const rowsAbove = momentRows(figure, extentX(figure), width).filter((row) => row !== null);
+    let top = rowsAbove.length ? 6 + LABEL * (1 + Math.max(...rowsAbove)) : 0;
     const rows = figure.panels.map((panel) => {
       const lone = figure.panels.length === 1;
       const height = panel.lanes.length ? panel.lanes.length * LANE : lone ? LONE_PANEL : PANEL;
@@ -84,7 +120,7 @@ const Charts = (() => {
       top += height + 8;
       return place;
     });
-    return { rows, height: top + AXIS + (figure.square ? 0 : SLIDER), width: width - SIDE - 14 };
+    return { rows, height: top + AXIS + (slider ? SLIDER : 0) };
   }
 
   // Extents and height with which a metre is as long upwards as sideways.
@@ -138,7 +174,7 @@ const Charts = (() => {
     };
     if (panel.lanes.length) {
       // The axis starts at the bottom, rows at the top; its name must stay above either way.
-      const label = { ...FONT, inside: true, margin: 4, verticalAlign: "bottom", padding: [0, 0, 9, 0] };
+      const label = { ...FONT, inside: true, margin: 4, verticalAlign: "bottom", padding: [0, 0, 10, 0] };
       const data = [...panel.lanes].reverse();
       return { ...shared, type: "category", data, axisLabel: label, z: 4 };
     }
@@ -151,9 +187,9 @@ const Charts = (() => {
     return panel.lanes.length && y !== null ? panel.lanes.length - 1 - y : y;
   }
 
-  function seriesOption(panel, index, series) {
+  function seriesOption(panel, index, series, named) {
     const data = series.points.map(([x, y]) => [x, row(panel, y)]);
-    const tone = colour(series.tone);
+    const tone = colour(named);
     const common = {
       name: series.name,
       data,
@@ -162,7 +198,7 @@ const Charts = (() => {
       animation: false,
       emphasis: { disabled: true },
       itemStyle: { color: tone, opacity: 0.9 },
-      symbol: SYMBOLS[series.tone] || "circle",
+      symbol: SYMBOLS[named] || "circle",
       z: series.tone === "faint" ? 2 : 3,
     };
     if (series.look === "dots") {
@@ -189,39 +225,39 @@ const Charts = (() => {
   }
 
   // Words at the edge of a chart stay inside it.
-  function alignment(x, ends) {
-    const share = (x - ends[0]) / (ends[1] - ends[0]);
-    return share > 0.88 ? "right" : share < 0.12 ? "left" : "center";
+  function alignment(x, ends, label, inner) {
+    const at = ((x - ends[0]) / (ends[1] - ends[0])) * inner;
+    const half = (label.length * GLYPH) / 2;
+    return at + half > inner ? "right" : at - half < 0 ? "left" : "center";
   }
 
   // Bands, thresholds and moments: what is drawn behind the points.
-  function background(figure, panel, index, ends, height, endsY) {
+  function background(figure, panel, index, ends, width, height, endsY) {
     const label = { ...FONT, fontSize: 11, textBorderColor: "var(--card)", textBorderWidth: 3 };
-    const levels = panel.levels.map((level) => ({
+    const moved = shifts(panel.levels, rangeY(panel, endsY), height);
+    const levels = panel.levels.map((level, at) => ({
       yAxis: level.value,
-      lineStyle: { color: colour("third"), type: "dashed", width: 1.5 },
-      label: { ...label, show: true, position: "insideEndTop", formatter: () => level.label },
+      lineStyle: { color: colour("faint"), type: "dashed", width: 2 },
+      label: { ...label, show: true, position: "insideEndTop", offset: [0, moved[at]], formatter: () => level.label },
     }));
-    const moments = figure.moments.map((moment) => ({
+    const rows = momentRows(figure, ends, width);
+    const moments = figure.moments.map((moment, at) => ({
       xAxis: moment.x,
       lineStyle: { color: colour(moment.tone), type: "dotted", width: 1.5 },
-      label: { ...label, show: index === 0, position: "end", distance: panel.title ? 28 : 2, formatter: () => moment.label,
-        align: alignment(moment.x, ends) },
+      label: { ...label, show: index === 0 && rows[at] !== null, position: "end",
+        distance: (panel.title ? 28 : 2) + LABEL * rows[at], formatter: () => moment.label,
+        align: alignment(moment.x, ends, moment.label, width - SIDE - 14) },
     }));
     const grid = panel.grid ? gridLines(panel, ends) : [];
-    const moved = shifts(panel.bands, rangeY(panel, endsY), height);
-    const bands = panel.bands.map((band, at) => [
-      {
-        yAxis: band.low,
-        itemStyle: { color: colour(band.tone), opacity: 0.14 },
-        label: { ...label, show: true, position: "insideTopRight", offset: [0, moved[at]], formatter: () => band.label },
-      },
+    const bands = panel.bands.map((band) => [
+      { yAxis: band.low, itemStyle: { color: colour("faint"), opacity: BANDS[band.tone] || 0.2 } },
       { yAxis: band.high },
     ]);
     return {
       type: "line",
       name: "",
       data: [],
+      z: 1,
       xAxisIndex: index,
       yAxisIndex: index,
       silent: true,
@@ -242,7 +278,7 @@ const Charts = (() => {
     });
   }
 
-  function tooltip(figure, known, said) {
+  function tooltip(figure, known, toneOf, said) {
     return (params) => {
       const list = (Array.isArray(params) ? params : [params]).filter((p) => known[p.seriesIndex]);
       if (list.length && !figure.square) list.push(...holding(list, known));
@@ -261,7 +297,7 @@ const Charts = (() => {
       for (const one of list.slice(0, 8)) {
         const { panel, series } = known[one.seriesIndex];
         const line = add(box, "div", "", "row");
-        add(line, "i", "").style.background = colour(series.tone);
+        add(line, "i", "").style.background = colour(toneOf(series));
         const value = figure.square
           ? `(${number(one.data[0])}, ${number(one.data[1])}) ${figure.x.unit}`
           : panel.lanes.length ? "" : withUnit(one.data[1], panel.unit);
@@ -275,7 +311,7 @@ const Charts = (() => {
     };
   }
 
-  function zooms(figure, count, window) {
+  function zooms(figure, count, window, visible) {
     const all = [...Array(count).keys()];
     const inside = {
       type: "inside",
@@ -307,12 +343,13 @@ const Charts = (() => {
       moveHandleSize: 4,
       ...window,
     };
-    return [inside, slider];
+    return visible ? [inside, slider] : [inside];
   }
 
-  function option(figure, width, window, said) {
+  function option(figure, width, window, said, { slider = !figure.square } = {}) {
     const square = figure.square ? squared(figure, width) : null;
-    const place = places(figure, width);
+    const place = places(figure, width, slider);
+    const toneOf = tones(figure);
     if (square) {
       place.height += square.height - place.rows[0].height;
       place.rows[0].height = square.height;
@@ -321,10 +358,10 @@ const Charts = (() => {
     const series = [];
     const known = {};
     figure.panels.forEach((panel, index) => {
-      series.push(background(figure, panel, index, ends, place.rows[index].height, square && square.y));
+      series.push(background(figure, panel, index, ends, width, place.rows[index].height, square && square.y));
       for (const one of panel.series) {
         known[series.length] = { panel, series: one };
-        series.push(seriesOption(panel, index, one));
+        series.push(seriesOption(panel, index, one, toneOf(one)));
       }
     });
     return {
@@ -337,12 +374,12 @@ const Charts = (() => {
         xAxis: figure.panels.map((panel, index) => xAxis(figure, panel, index, ends)),
         yAxis: figure.panels.map((panel, index) => yAxis(panel, index, square && square.y)),
         axisPointer: { link: [{ xAxisIndex: "all" }], lineStyle: { color: colour("axis") } },
-        dataZoom: zooms(figure, figure.panels.length, window),
+        dataZoom: zooms(figure, figure.panels.length, window, slider),
         tooltip: {
           trigger: figure.square ? "item" : "axis",
           axisPointer: { axis: "x" },
           ...TOOLTIP,
-          formatter: tooltip(figure, known, said),
+          formatter: tooltip(figure, known, toneOf, said),
         },
         series,
       },
@@ -350,22 +387,31 @@ const Charts = (() => {
   }
 
   // Draws a figure into an element; returns what the page's buttons and keys do with it.
-  function draw(element, figure, said) {
+  // Charts over time with the same group share their cursor and their zoom.
+  function draw(element, figure, said, group) {
     let chart = null;
     let known = {};
     let cursor = null;
 
-    function paint(width) {
+    function paint(width, how) {
       const window = chart ? shown() : { start: 0, end: 100 };
-      const made = option(figure, width, window, said);
+      const made = option(figure, width, window, said, how);
       known = made.known;
       element.style.height = `${made.height}px`;
       const size = { width, height: made.height };
       if (chart) chart.resize(size);
-      else chart = echarts.init(element, null, { renderer: "svg", ...size });
+      else {
+        chart = echarts.init(element, null, { renderer: "svg", ...size });
+        if (group && figure.until) {
+          chart.group = group;
+          echarts.connect(group);
+        }
+      }
       chart.setOption(made.option, { notMerge: true });
       const picture = element.querySelector("svg");
-      if (picture) picture.setAttribute("aria-hidden", "true");
+      if (!picture) return;
+      picture.setAttribute("aria-hidden", "true");
+      picture.setAttribute("viewBox", `0 0 ${width} ${made.height}`);
     }
 
     function shown() {
@@ -418,5 +464,5 @@ const Charts = (() => {
     return { zoom, pan, step, hide, paint, reset: () => show(0, 100), width: () => element.clientWidth };
   }
 
-  return { draw, number, withUnit, colour, SYMBOLS, FONT, TOOLTIP };
+  return { draw, tones, number, withUnit, colour, SYMBOLS, BANDS, FONT, TOOLTIP };
 })();

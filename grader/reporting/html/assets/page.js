@@ -3,8 +3,8 @@
   const holder = document.getElementById("figures");
   if (!holder) return; // another page, which only wants the charts
   const figures = JSON.parse(holder.textContent);
-  const PRINTED_WIDTH = 660;
-  const drawn = [];
+  const PRINTED_WIDTH = 640;
+  const drawn = new Map();
 
   function button(parent, label, text, act) {
     const element = parent.appendChild(document.createElement("button"));
@@ -15,33 +15,52 @@
     element.addEventListener("click", act);
   }
 
-  function swatch(entry, series) {
+  const SHAPES = {
+    line: "M1 8H27",
+    step: "M1 12H10V4H19V12H27",
+    band: "M1 2H27V14H1z",
+    diamond: "M14 2l6 6-6 6-6-6z",
+    triangle: "M14 2l6 11H8z",
+    rect: "M9 3h10v10H9z",
+    circle: "M14 3a5 5 0 1 0 .01 0z",
+  };
+
+  function swatch(entry, { shape, tone, opacity = 1, dashes = "" }) {
     const svg = entry.appendChild(document.createElementNS("http://www.w3.org/2000/svg", "svg"));
     svg.setAttribute("viewBox", "0 0 28 16");
-    const dots = {
-      diamond: "M14 2l6 6-6 6-6-6z",
-      triangle: "M14 2l6 11H8z",
-      rect: "M9 3h10v10H9z",
-      circle: "M14 3a5 5 0 1 0 .01 0z",
-    };
-    const steps = "M1 12H10V4H19V12H27";
     const mark = svg.appendChild(document.createElementNS(svg.namespaceURI, "path"));
-    const line = series.look !== "dots";
-    mark.setAttribute("d", line ? (series.look === "step" ? steps : "M1 8H27") : dots[Charts.SYMBOLS[series.tone] || "circle"]);
-    mark.style.fill = line ? "none" : Charts.colour(series.tone);
-    mark.style.stroke = line ? Charts.colour(series.tone) : "none";
+    const line = shape === "line" || shape === "step";
+    mark.setAttribute("d", SHAPES[shape]);
+    mark.style.fill = line ? "none" : Charts.colour(tone);
+    mark.style.stroke = line ? Charts.colour(tone) : "none";
     mark.style.strokeWidth = "3";
+    mark.style.strokeDasharray = dashes;
+    mark.style.opacity = opacity;
+  }
+
+  // What a chart shows, by name: its series, then what was expected, which is grey.
+  function entries(figure) {
+    const toneOf = Charts.tones(figure);
+    const named = new Map();
+    for (const series of figure.panels.flatMap((panel) => panel.series)) {
+      const tone = toneOf(series);
+      const shape = series.look === "dots" ? Charts.SYMBOLS[tone] || "circle" : series.look;
+      named.set(`${series.name} ${tone}`, { name: series.name, shape, tone });
+    }
+    for (const { levels, bands } of figure.panels) {
+      for (const { name } of levels) named.set(`level ${name}`, { name, shape: "line", tone: "faint", dashes: "6 4" });
+      for (const { label, tone } of bands) {
+        named.set(`band ${label}`, { name: label, shape: "band", tone: "faint", opacity: Charts.BANDS[tone] || 0.2 });
+      }
+    }
+    return named.values();
   }
 
   function legend(parent, figure) {
-    const seen = new Set();
-    for (const series of (figure.panels || []).flatMap((panel) => panel.series)) {
-      const key = `${series.name} ${series.tone} ${series.look}`;
-      if (seen.has(key)) continue;
-      seen.add(key);
-      const entry = parent.appendChild(document.createElement("span"));
-      swatch(entry, series);
-      entry.appendChild(document.createElement("span")).textContent = series.name;
+    for (const entry of entries(figure)) {
+      const element = parent.appendChild(document.createElement("span"));
+      swatch(element, entry);
+      element.appendChild(document.createElement("span")).textContent = entry.name;
     }
   }
 
@@ -108,13 +127,17 @@
   }
 
   function open(element) {
+    if (drawn.has(element)) return;
     const figure = figures[element.dataset.figure];
     const status = element.querySelector("[data-said]");
-    const said = (words) => { if (status.textContent !== words) status.textContent = words; };
     const drawing = element.querySelector(".drawing");
+    // Of the charts that share a cursor, only the one that is used speaks.
+    const said = (words) => {
+      if (status.textContent !== words && drawing.matches(":hover, :focus-within")) status.textContent = words;
+    };
     const graph = figure.kind === "graph";
-    const picture = (graph ? Graphs : Charts).draw(drawing, figure, said);
-    legend(element.querySelector(".legend"), figure);
+    const picture = (graph ? Graphs : Charts).draw(drawing, figure, said, `${element.closest("section").id} ${figure.run}`);
+    if (!graph) legend(element.querySelector(".legend"), figure);
     tools(element.querySelector(".tools"), picture, !graph && !figure.square);
     drawing.addEventListener("keydown", (event) => {
       const act = KEYS[event.key];
@@ -127,7 +150,7 @@
       const place = details.querySelector(".scroll");
       if (details.open && !place.hasChildNodes()) fill(place, figure);
     });
-    drawn.push(picture);
+    drawn.set(element, picture);
     watch(drawing, picture);
   }
 
@@ -147,21 +170,36 @@
     if (folded) folded.open = true;
   }
 
+  // Draws what has become visible; a folded chart costs nothing.
+  function drawVisible() {
+    for (const element of document.querySelectorAll("[data-figure]")) {
+      if (!element.closest("details:not([open])")) open(element);
+    }
+  }
+
+  // On paper every criterion has its words, and those that were unfolded their charts.
   let printing = false;
   let folded = [];
   function printed() {
     printing = true;
     folded = [...document.querySelectorAll("details.criterion:not([open])")];
-    for (const details of folded) details.open = true;
-    for (const picture of drawn) picture.paint(PRINTED_WIDTH);
+    for (const details of folded) {
+      details.classList.add("words");
+      details.open = true;
+    }
+    for (const picture of drawn.values()) picture.paint(PRINTED_WIDTH, { slider: false });
   }
   function shownAgain() {
-    for (const details of folded) details.open = false;
-    for (const picture of drawn) picture.paint(picture.width());
+    for (const details of folded) {
+      details.open = false;
+      details.classList.remove("words");
+    }
+    for (const picture of drawn.values()) if (picture.width()) picture.paint(picture.width());
     printing = false;
   }
 
-  for (const element of document.querySelectorAll("[data-figure]")) open(element);
+  drawVisible();
+  document.addEventListener("toggle", () => { if (!printing) drawVisible(); }, true);
   window.addEventListener("beforeprint", printed);
   window.addEventListener("afterprint", shownAgain);
   window.addEventListener("hashchange", unfold);
