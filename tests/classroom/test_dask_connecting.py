@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,15 +15,16 @@ from grader.core.errors import EnvironmentFault
 
 
 def test_without_the_library_nothing_begins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Exit code 2 and what to install, before the class is looked at."""
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    """Exit code 2 and what to install, before the class is looked at; environments of uv have no pip."""
+    monkeypatch.setitem(sys.modules, "pip", None)
+    monkeypatch.setitem(sys.modules, "distributed", None)
     done = CliRunner().invoke(
         app, ["batch", str(tmp_path / "none"), "-o", str(tmp_path / "o"), "--scheduler", "tcp://x:1"]
     )
     assert done.exit_code == 2
     assert done.stderr.splitlines() == [
-        "error: --scheduler: expected the package distributed, found none",
-        "hint: pip install 'rclpy-grader[dask]'",
+        "error: --scheduler: expected the package distributed of the extra 'dask', found none",
+        f"hint: uv pip install --python {sys.executable} 'distributed<2027,>=2024.9'",
     ]
     assert not (tmp_path / "o").exists()
 

@@ -80,7 +80,7 @@ def test_the_scheduler_needs_the_grader_as_well(found: PackageNotFoundError | st
     workers, _ = worker_pool(FakeClient(scheduler=found))
     with pytest.raises(EnvironmentFault, match=r"scheduler of the cluster: expected rclpy-grader 0\.1\.0") as error:
         workers.inspect("auto")
-    assert error.value.hint == "install it there: pip install 'rclpy-grader[dask]==0.1.0'"
+    assert error.value.hint == "install rclpy-grader 0.1.0 with its extra dask there"
 
 
 def test_a_worker_that_leaves_while_it_is_asked_is_no_problem() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -94,12 +95,12 @@ def test_people_of_the_same_name_are_told_apart(source: Path) -> None:
 
 def test_without_the_library_nothing_begins(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Exit code 2 and what to install, before anybody is graded."""
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "copydetect", None)
     done = CliRunner().invoke(app, ["batch", str(source), "-o", str(source.parent / "o"), "--similarity"])
     assert done.exit_code == 2
     assert done.stderr.splitlines() == [
-        "error: --similarity: expected the package copydetect, found none",
-        "hint: pip install 'rclpy-grader[similarity]'",
+        "error: --similarity: expected the package copydetect of the extra 'similarity', found none",
+        f"hint: {sys.executable} -m pip install 'copydetect<0.6,>=0.5'",
     ]
     assert not (source.parent / "o").exists()
 

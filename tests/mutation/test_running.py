@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -74,10 +75,11 @@ def graded(*arguments: Path | str | int) -> tuple[int, Any]:
 
 def test_without_libcst_the_command_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     """It comes with an extra, for authors only."""
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "libcst", None)
     code, said = graded("any.yaml")
     assert code == 2
-    assert "pip install 'rclpy-grader[authors]'" in said
+    assert "expected the package libcst of the extra 'authors', found none" in said
+    assert f"{sys.executable} -m pip install 'libcst<2,>=1.5'" in said
 
 
 def test_notes_are_no_rubrics() -> None:

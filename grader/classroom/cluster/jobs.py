@@ -203,7 +203,7 @@ def other_version(wanted: str, found: str) -> str:
 
 def remedy(version: str) -> str:
     """Return the hint that fixes a wrong version."""
-    return f"install it there: pip install 'rclpy-grader[dask]=={version}'"
+    return f"install rclpy-grader {version} with its extra dask there"
 
 
 def _machine(worker: Worker) -> str:
