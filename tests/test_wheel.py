@@ -1,12 +1,15 @@
 """The built wheel: what travels in it, and that it works from any directory without the checkout."""
 
+import email
 import hashlib
 import os
 import re
 import runpy
+import shutil
 import subprocess
 import sys
 import tarfile
+import venv
 import zipfile
 from pathlib import Path
 
@@ -19,12 +22,55 @@ HOOK = runpy.run_path(str(ROOT / "hatch_build.py"))
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the wheel once, with the build backend of the development environment."""
-    folder = tmp_path_factory.mktemp("wheel")
-    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(ROOT)]
+def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the source package and, from that, the wheel, once, with the development environment's backend."""
+    folder = tmp_path_factory.mktemp("packages")
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder), str(ROOT)]
     subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    return next(folder.glob("*.whl"))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wheel(packages: Path) -> Path:
+    """Return the wheel."""
+    return next(packages.glob("*.whl"))
+
+
+def test_an_index_takes_the_packages(packages: Path) -> None:
+    """Its own checker has no complaint, not even a warning."""
+    command = [sys.executable, "-m", "twine", "check", "--strict", *map(str, packages.iterdir())]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+    assert done.stdout.count("PASSED") == 2
+
+
+def test_the_description_leads_to_the_repository(wheel: Path) -> None:
+    """No link of the README is relative, each leads to this version, and the addresses are those of one repository."""
+    archive = zipfile.ZipFile(wheel)
+    name = next(name for name in archive.namelist() if name.endswith("/METADATA"))
+    told = email.message_from_bytes(archive.read(name))
+    text = told.get_payload()
+    assert isinstance(text, str)
+    version = told["Version"]
+    addresses = dict(value.split(", ") for value in told.get_all("Project-URL", []))
+    assert sorted(addresses) == ["Changelog", "Documentation", "Homepage", "Issues", "Source"]
+    assert all(address.startswith(addresses["Source"]) for address in addresses.values())
+    assert f"]({addresses['Source']}/blob/v{version}/student_template/README.md)" in text
+    assert [target for target in re.findall(r"\]\(([^)]*)\)", text) if "://" not in target and target[0] != "#"] == []
+
+
+@pytest.mark.parametrize(
+    ("relative", "absolute"),
+    [
+        ("[a](docs/a.md#part)", "[a](https://x/y/blob/v1/docs/a.md#part)"),
+        ("[![a](./b.svg)](c/)", "[![a](https://x/y/raw/v1/b.svg)](https://x/y/blob/v1/c/)"),
+        ('<img alt="a" src="b.png">', '<img alt="a" src="https://x/y/raw/v1/b.png">'),
+        ("[a](#part) [b](https://c/d) [e](mailto:f@g)", "[a](#part) [b](https://c/d) [e](mailto:f@g)"),
+    ],
+)
+def test_links_and_pictures_become_absolute(relative: str, absolute: str) -> None:
+    """Those of Markdown and of HTML; what is absolute stays."""
+    assert HOOK["absolute"](relative, "https://x/y", "v1") == absolute
 
 
 def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel: Path) -> None:
@@ -40,6 +86,7 @@ def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel: Path) -> N
         assert f"grader/shipped/rubrics/{needed}" in names
     assert "grader/reporting/report.schema.json" in names
     assert "grader/student_host/fastdds.xml" in names
+    assert "grader/py.typed" in names
     assert "grader/shipped/student_template/velocity_publisher.py" in names
     assert not [name for name in names if "reference" in name or name.startswith(("tests/", "student_template/"))]
 
@@ -90,33 +137,35 @@ def test_a_failure_of_npm_is_told_in_its_own_words(npm: Path, tmp_path: Path) ->
 
 
 @pytest.mark.ros
-def test_the_installed_wheel_grades_from_any_directory(wheel: Path, tmp_path: Path) -> None:
-    """Nothing of the checkout is needed to grade, and nothing of it is used."""
-    site = tmp_path / "site"
-    install = [
-        sys.executable,
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--no-deps",
-        "--no-index",
-        "--target",
-        str(site),
-        str(wheel),
+@pytest.mark.long
+def test_the_installed_wheel_grades_in_a_bare_root(wheel: Path, tmp_path: Path) -> None:
+    """It brings all it needs: there are Python, the environment and a submission, but no home, user or network."""
+    environment, home = tmp_path / "environment", tmp_path / "home"
+    venv.create(environment, with_pip=True)
+    pip = [str(environment / "bin" / "python"), "-I", "-m", "pip", "install", "--quiet", "--no-compile", str(wheel)]
+    subprocess.run(pip, check=True)
+    (home / "ada").mkdir(parents=True)
+    shutil.copy(ROOT / "reference_solutions" / "velocity_publisher.py", home / "ada")
+    root = ["--ro-bind", "/usr", "/usr", "--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp", "--bind", home, "/home"]
+    links = [word for name in ("bin", "lib", "lib64", "sbin") for word in ("--symlink", f"usr/{name}", f"/{name}")]
+    python = [word for place in (sys.base_prefix, environment) for word in ("--ro-bind", place, place)]
+    apart = ["--unshare-pid", "--unshare-net", "--unshare-ipc", "--die-with-parent", "--clearenv", "--chdir", "/home"]
+    # The grader makes sandboxes of its own in there; a user gets the right to with a namespace of users.
+    rights = ["--cap-add", "ALL"] if os.geteuid() == 0 else []
+    path = ["--setenv", "PATH", f"{environment}/bin:/usr/bin"]
+    command = [
+        "bwrap",
+        *root,
+        *links,
+        *python,
+        *apart,
+        *rights,
+        *path,
+        "grade",
+        "ada",
+        "--exercise",
+        "velocity_publisher",
     ]
-    subprocess.run(install, check=True)
-    submission = tmp_path / "ada"
-    submission.mkdir()
-    (submission / "velocity_publisher.py").write_bytes(
-        (ROOT / "reference_solutions/velocity_publisher.py").read_bytes()
-    )
-    program = (
-        "import sys; sys.path.insert(0, sys.argv.pop(1))\n"
-        "import grader.cli.main; assert grader.__file__.startswith(sys.path[0]), grader.__file__\n"
-        "grader.cli.main.main()"
-    )
-    command = [sys.executable, "-c", program, str(site), "ada", "--exercise", "velocity_publisher"]
-    done = subprocess.run(command, check=False, cwd=tmp_path, env=dict(os.environ), capture_output=True, text=True)
+    done = subprocess.run(list(map(str, command)), check=False, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.startswith("ada: 30 of 30 points")

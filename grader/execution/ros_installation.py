@@ -254,7 +254,7 @@ def _below(prefixes: Iterable[Path], paths: Iterable[Path]) -> tuple[Path, ...]:
 
 
 def _existing(paths: Iterable[Path]) -> tuple[Path, ...]:
-    home = Path.home()
+    home = Path(os.path.expanduser("~"))  # noqa: PTH111  stays "~" for a user without a home, as in some containers
     return _once(path for path in paths if path.exists() and path != home and path not in home.parents)
 
 

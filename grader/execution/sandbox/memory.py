@@ -109,9 +109,8 @@ def report_from_json(values: object) -> TierReport:
 def own_folder() -> Path | None:
     """Return a folder that only this user can write to, created if needed; None if there is none."""
     given = os.environ.get("XDG_RUNTIME_DIR") or os.environ.get("XDG_CACHE_HOME")
-    base = Path(given) if given else Path.home() / ".cache"
-    folder = base / FOLDER
-    with contextlib.suppress(OSError, RuntimeError):
+    with contextlib.suppress(OSError, RuntimeError):  # RuntimeError: a user without a home
+        folder = (Path(given) if given else Path.home() / ".cache") / FOLDER
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = folder.lstat()
         if stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & 0o022:
