@@ -9,11 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from grader.classroom.gradebook import Gradebook, Row, Status, exactly, exercises_of, number, remarks
-from grader.classroom.roster import fold_name
+from grader.classroom.roster import Person
 from grader.classroom.store import Conditions
 from grader.classroom.watching import clock_time
 from grader.core.checkup import NO_SANDBOX
 from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RowTone, RunFacts, StudentRow
+from grader.reporting.class_page.render import REPORT_PAGE, result_link
+from grader.reporting.html.class_links import ClassLinks
 from grader.reporting.json_report import ReportData
 
 
@@ -125,10 +127,31 @@ _ENDED = {"exited": "ended by itself", "killed": "was ended", "hung": "did not c
 
 def class_page(book: Gradebook, run: RunOfClass, links: Sequence[PageLink] = ()) -> ClassPage:
     """Build the page of a class, with links to other pages in the results folder."""
-    rows = sorted(book.rows, key=lambda row: (fold_name(row.shown_name), row.shown_name, row.name))
+    rows = in_order(book.rows)
     students = tuple(_student(row, run) for row in rows)
     listings = [listing for listing in _listings(book, rows, run) if listing.entries]
     return ClassPage(run.title, run_facts(book, run), students, tuple(listings), tuple(links))
+
+
+def in_order(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows in the order of the class page: by surname, then by the rest of the name."""
+    return sorted(rows, key=lambda row: (*_sort_key(row), row.name))
+
+
+def _sort_key(row: Row) -> tuple[str, str]:
+    name, person = _name(row), row.person
+    return person.sort_key if person is not None and person.name == name else Person(name).sort_key
+
+
+def links_between(book: Gradebook) -> dict[str, ClassLinks]:
+    """Return name of an entry -> the links of its page to the class page and to its neighbours on that page."""
+    rows = [row for row in in_order(book.rows) if row.report is not None]
+    pages = [(f"../{result_link(row.name, REPORT_PAGE).removeprefix('students/')}", _name(row)) for row in rows]
+    neighbours = [None, *pages, None]
+    return {
+        row.name: ClassLinks("../../index.html", k + 1, len(rows), neighbours[k], neighbours[k + 2])
+        for k, row in enumerate(rows)
+    }
 
 
 def _student(row: Row, run: RunOfClass) -> StudentRow:

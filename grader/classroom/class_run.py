@@ -19,7 +19,7 @@ from grader.app.grade import read_exercises, read_recording
 from grader.app.request import GradeRequest, recording_digest
 from grader.app.seeds import kept_key
 from grader.classroom.adjustments import Adjustments, read_adjustments
-from grader.classroom.class_page import RunOfClass, folders_of, title_of
+from grader.classroom.class_page import RunOfClass, folders_of, links_between, title_of
 from grader.classroom.gradebook import Gradebook, Row, decisions_for, make_gradebook
 from grader.classroom.grading import (
     ClassRequest,
@@ -36,11 +36,12 @@ from grader.classroom.outputs import CLASS, Graded, class_files, exports, summar
 from grader.classroom.roster import RosterMatch, match, read_roster
 from grader.classroom.store import SEED_KEY, Conditions, Store, open_store
 from grader.classroom.watching import Watcher
-from grader.classroom.worker import GRADESCOPE, HANDED_BACK, REPORT
+from grader.classroom.worker import GRADESCOPE, HANDED_BACK, PAGE, REPORT
 from grader.core.errors import GraderError, HarnessError
 from grader.core.exercise import Exercise
 from grader.execution.temp_dirs import scratch_folder
 from grader.reporting.class_page.contents import PageLink
+from grader.reporting.html.class_links import with_class_links
 from grader.reporting.json_report import ReportData
 from grader.rubrics.variants import First
 from grader.similarity.finding import find_similar, read_programs
@@ -89,7 +90,9 @@ def grade_class(
             graded = _compared(Graded(book(), len(due), before, not_replaced), intake, course, store)
         except (KeyboardInterrupt, HarnessError):
             with suppress(GraderError):  # the error that stopped the run is more useful
-                _write(class_files(book(), {}, _run(course, conditions, began), standalone=course.standalone), store)
+                stopped = book()
+                _write(class_files(stopped, {}, _run(course, conditions, began), standalone=course.standalone), store)
+                _link_students(stopped, store)
             raise
         return _written(graded, _run(course, conditions, began, graded), store, course)
 
@@ -173,11 +176,21 @@ def _written(graded: Graded, run: RunOfClass, store: Store, course: ClassRequest
     graded = replace(graded, left_out=left_out, remarks=remarks)
     files = class_files(graded.book, made, run, links=graded.links, standalone=course.standalone)
     written = _write({CLASS: summary_json(graded).encode(), **files}, store)
+    _link_students(graded.book, store)
     return replace(graded, files=(*graded.files, *written))
 
 
 def _write(files: Mapping[str, bytes], store: Store) -> tuple[Path, ...]:
     return tuple(store.write(name, data) for name, data in files.items())
+
+
+def _link_students(book: Gradebook, store: Store) -> None:
+    """Link each student's page for instructors to the class page and to its neighbours; feedback has no such links."""
+    for name, links in links_between(book).items():
+        page = _text(store.place(name) / PAGE)
+        linked = with_class_links(page, links)
+        if linked != page:
+            store.write(f"students/{name}/{PAGE}", linked.encode())
 
 
 def _report(path: Path) -> ReportData | None:

@@ -47,6 +47,13 @@ class Person:
     handles: frozenset[str] = frozenset()  # all ids that are unique to this person, normalised by `fold_handle`
     names: frozenset[str] = frozenset()  # spellings of the name, without spaces and accents
     row: Mapping[str, str] | None = None  # column -> value on the roster; None for a person who is not on a roster
+    surname: str = ""  # as the roster has it; empty if it does not tell the surname
+
+    @property
+    def sort_key(self) -> tuple[str, str]:
+        """Orders people by surname, then name; where the roster has no surname, it is the last word of the name."""
+        last = self.surname or next(reversed(self.name.split()), "")
+        return fold_name(last), fold_name(self.name)
 
 
 def fold_handle(text: str) -> str:
@@ -139,7 +146,9 @@ def person_of(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> P
     numbers = [match[1] for text in exact if (match := _PARTICIPANT.fullmatch(text.strip()))]
     first, last = value("first"), value("last")
     name = f"{first} {last}".strip() or _in_reading_order(value("name"))
+    before, comma, _ = value("name").partition(",")
     return Person(
+        surname=last or (before.strip() if comma else ""),
         name=name or value("identifier") or next(iter(exact), "").strip(),
         user=value("user"),
         email=value("email"),

@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from class_reports import drawn_report
 from class_samples import FakeScheduler, course, grade, hand_in
 
 from grader.classroom.class_page import without_folders
+from grader.reporting.html.render import render_html
 
 RUN = re.compile(r'<div id="run">.*?</div>\n<nav', re.DOTALL)
 
@@ -89,6 +91,32 @@ def test_no_page_names_a_folder_of_this_machine(tmp_path: Path) -> None:
     assert "notes.txt" in text
     assert str(tmp_path) not in text
     assert str(tmp_path.parent.name) not in text
+
+
+def test_students_come_by_surname_and_their_pages_are_linked_in_that_order(tmp_path: Path) -> None:
+    """Whatever form the roster has; what students get has no links, and a later run with others renews them."""
+    hand_in(tmp_path / "in", ada=10, bob=7, cleo=5, dan="failed")
+    roster = tmp_path / "roster.csv"
+    roster.write_text(
+        'user,name\nada,"Young, Ada"\nbob,Bob de Wit\ncleo,"van Dam, Cleo"\ndan,Dan Vos\n', encoding="utf-8"
+    )
+    grade(course(tmp_path / "in", tmp_path / "out", roster=roster))
+    assert list(standing(tmp_path / "out")) == ["Cleo van Dam", "Dan Vos", "Bob de Wit", "Ada Young"]
+    students = tmp_path / "out" / "students"
+    for name in ("ada", "bob", "cleo"):  # the fake scheduler writes no pages
+        for file in ("report.html", "feedback.html"):
+            (students / name / file).write_text(render_html(drawn_report(3, name)), encoding="utf-8")
+    grade(course(tmp_path / "in", tmp_path / "out", roster=roster))
+
+    def links(name: str) -> list[str]:
+        return re.findall(r'href="(\.\./[^"]+)"', (students / name / "report.html").read_text(encoding="utf-8"))
+
+    assert links("cleo") == ["../../index.html", "../bob/report.html"]
+    assert links("bob") == ["../../index.html", "../cleo/report.html", "../ada/report.html"]
+    assert "index.html" not in (students / "bob" / "feedback.html").read_text(encoding="utf-8")
+    roster.write_text("user,name\nada,Ada A\nbob,Bob B\n", encoding="utf-8")
+    grade(course(tmp_path / "in", tmp_path / "out", roster=roster))
+    assert links("ada") == ["../../index.html", "../bob/report.html"]
 
 
 @pytest.mark.parametrize(

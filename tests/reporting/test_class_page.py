@@ -27,6 +27,8 @@ from grader.reporting.class_page.contents import (
     exercise_counts,
 )
 from grader.reporting.class_page.render import class_assets, page_link, render_class, result_link
+from grader.reporting.html.class_links import ClassLinks, with_class_links
+from grader.reporting.html.render import render_html
 from grader.reporting.json_report import report_to_json
 
 HOSTILE = (
@@ -216,6 +218,22 @@ def test_hostile_text_stays_text(text: str) -> None:
     )
     assert "\u202e" not in "".join(found.texts) + found.raw["class"]
     assert len(data["students"][0]["name"]) <= 100
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_hostile_names_stay_text_in_the_links_of_a_page(text: str) -> None:
+    """Of the students before and after, and of the one whose page it is; setting the links again replaces them."""
+    report = class_reports.drawn_report(3, text)
+    one = ClassLinks(
+        "../../index.html", 1, 3, ("../a/report.html", text), ("../b/report.html", f"{text}<!--class-links-->")
+    )
+    plain = render_html(report, assets="../../assets")
+    page = with_class_links(plain, one)
+    found, before = Parsed(page), Parsed(plain)
+    assert found.open == []
+    assert found.tags - before.tags == Counter({"a": 3, "span": 5, "bdi": 2, "nav": 1})
+    assert not [name for _, name, _ in found.attributes if name.startswith("on")]
+    assert with_class_links(with_class_links(page, ClassLinks("x", 1, 1)), one) == page
 
 
 @pytest.mark.parametrize(

@@ -81,8 +81,8 @@ def _student(
     }
 
 
-#: More causes than this are counted, not shown.
-MOST_CAUSES = 40
+#: More causes than the first number are folded, more than the second only counted.
+FIRST_CAUSES, MOST_CAUSES = 8, 40
 REPORT_PAGE, REPORT_DATA = "report.html", "report.json"
 #: The same as far as students may see it.
 HANDED_BACK_PAGE = "feedback.html"
@@ -101,6 +101,7 @@ def render_class(page: ClassPage, *, assets: str | None = None) -> str:
         page=page,
         exercises=exercises,
         causes=found,
+        first_causes=FIRST_CAUSES,
         most_causes=MOST_CAUSES,
         spread=spread,
         tiles=_tiles(page, spread),

@@ -23,6 +23,7 @@
   };
   const names = order(data.students.map((student) => student.name));
   const keys = {
+    surname: () => [...rows.keys()], // the order of the rows as written, which the pages of students follow too
     name: () => names,
     status: () => order(data.students.map((student) => student.status)),
     raw: () => data.students.map((student) => student.raw),
@@ -66,18 +67,29 @@
   window.addEventListener("beforeprint", () => show(rows.length));
   window.addEventListener("afterprint", () => show());
 
-  // Rows without a value come last, whichever way the others go; equal ones go by name.
-  function sort(head, descending) {
-    const values = keys[head.dataset.sort](head);
+  // Rows without a value come last, whichever way the others go; equal ones stay in the order of surnames.
+  function sort(head, descending, key = head.dataset.sort) {
+    const values = keys[key](head);
     const way = descending ? -1 : 1;
     sorted = [...rows.keys()].sort((a, b) => {
-      if (values[a] === null || values[b] === null) return (values[a] === null) - (values[b] === null) || names[a] - names[b];
-      return way * (values[a] - values[b]) || names[a] - names[b] || a - b;
+      if (values[a] === null || values[b] === null) return (values[a] === null) - (values[b] === null) || a - b;
+      return way * (values[a] - values[b]) || a - b;
     });
     for (const other of table.tHead.querySelectorAll("th[data-sort]")) other.removeAttribute("aria-sort");
     head.setAttribute("aria-sort", descending ? "descending" : "ascending");
+    const chosen = key === "final" && !descending ? "final up" : key;
+    const listed = [...byId("sort").options].some((option) => option.value === chosen);
+    const standard = descending === (chosen === "final");
+    byId("sort").value = listed && standard ? chosen : "";
     show();
   }
+
+  const headOf = (key) => table.tHead.querySelector(`th[data-sort=${key === "name" ? "surname" : key}]`);
+  byId("sort").addEventListener("input", (event) => {
+    event.stopPropagation(); // it filters nothing
+    const [key, up] = byId("sort").value.split(" ");
+    sort(headOf(key), key === "final" && !up, key);
+  });
 
   for (const head of table.tHead.querySelectorAll("th[data-sort]")) {
     const button = document.createElement("button");
@@ -86,7 +98,7 @@
     head.append(button);
     button.addEventListener("click", () => {
       const before = head.getAttribute("aria-sort");
-      const numbers = head.dataset.sort !== "name" && head.dataset.sort !== "status";
+      const numbers = head.dataset.sort !== "surname" && head.dataset.sort !== "status";
       sort(head, before ? before === "ascending" : numbers && head.dataset.sort !== "change");
     });
   }
@@ -125,7 +137,9 @@
   }
 
   function clear() {
+    const order = byId("sort").value;
     form.reset();
+    byId("sort").value = order;
     cause = null;
   }
 
@@ -264,7 +278,7 @@
     window.addEventListener("afterprint", () => { printing = false; paint(width); });
   }
 
-  sort(table.tHead.querySelector("[data-sort=name]"), false);
+  sort(headOf("surname"), false);
   if (figure) draw();
   document.documentElement.dataset.ready = "yes";
 })();

@@ -1,0 +1,36 @@
+"""Links from the page of one student to the page of the class and to its neighbours there, put into a finished page."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+
+from jinja2 import Template
+
+from grader.reporting.html.assets import page_environment
+
+# Every page holds this once, in its header and before any text of a student; all other text is escaped.
+_PLACE = re.compile(r"<!--class-links-->.*?<!--/class-links-->", re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class ClassLinks:
+    """Where the links of a student's page lead; addresses are relative to the page and percent-encoded."""
+
+    back: str  # address of the class page
+    number: int  # position of the student among those with a page, from 1
+    count: int  # number of students with a page
+    before: tuple[str, str] | None = None  # address and name of the student before; None for the first
+    after: tuple[str, str] | None = None  # address and name of the student after; None for the last
+
+
+def with_class_links(page: str, links: ClassLinks) -> str:
+    """Return a page with these links in its header, in place of any earlier ones; names may be hostile."""
+    made = _template().render(links=links)
+    return _PLACE.sub(lambda _: f"<!--class-links-->{made}<!--/class-links-->", page, count=1)
+
+
+@cache
+def _template() -> Template:
+    return page_environment("grader.reporting.html").get_template("class_links.html")
