@@ -134,6 +134,7 @@ class _Default(click.Command):
 @click.option("--student", metavar="ID", default="", help="Grade by the variant of this student; see --variant-key.")
 @click.option("--variant-key", type=PATH, metavar="FILE", help="The course key that rubrics draw variants from.")
 @audience_options
+@click.option("-v", "--verbose", is_flag=True, help="Print every reason, hint and call, the graph, and versions.")
 @click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
 @click.version_option(grader.__version__, prog_name="grade", message="%(prog)s %(version)s")
 def _grade(  # noqa: PLR0913  one parameter an option
@@ -149,6 +150,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     variant_key: Path | None,
     audience: str | None,
     as_of: str,
+    verbose: bool,
     no_progress: bool,
     **as_given: Any,  # options that are fields of a request
 ) -> int:
@@ -159,7 +161,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     from grader.reporting.delivery import Output, deliver, early_delivery, prepared
 
     rendered = tuple(output for output in outputs if output.format != EVIDENCE)
-    wanted = prepared((*rendered, Output("json")) if as_json else rendered)
+    wanted = prepared((*rendered, Output("json")) if as_json else rendered, verbose=verbose)
     for_whom = readers(audience, as_of)
     from grader.app import start
     from grader.app.request import GradeRequest
@@ -185,7 +187,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     pictures = any(FORMATS[output.format].illustrated for output in wanted)
     with shown_progress(wanted=not no_progress) as progress:
         report = start.grade(request, progress, remember, early_delivery(wanted, for_whom), pictures=pictures)
-    for found in missing(report.environment.containment):
+    for found in () if for_whom.only_students else missing(report.environment.containment):
         complain(f"sandbox {report.environment.isolation}: {found}")
     if report.environment.ros_distro not in TRIED:
         complain(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")

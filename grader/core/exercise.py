@@ -184,6 +184,8 @@ class Finding:
     # Id of the criterion that must be met before this one can be judged; credit is then 0
     blocked_by: str | None = None
     problem: Problem | None = None  # the problem found, if the check tells several problems apart
+    # The reason in a few words, without the place of a fault, for terminals; empty if the reason itself is short
+    brief: str = ""
 
 
 class Check(Protocol):

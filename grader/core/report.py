@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from grader.core.chart import Excerpt, Figure
 from grader.core.checkup import Property
-from grader.core.exercise import Feedback, Location, Outcome, Problem, Variant
+from grader.core.exercise import Audience, Feedback, Location, Outcome, Problem, Variant
 from grader.core.trace import ClockKind, Endpoint, Fault, GraphSnapshot, LogRecord, Offer, OutputLine, Start
 
 #: JSON values, as in reports, evidence and decoded messages.
@@ -40,6 +40,8 @@ class Verdict:
     same_cause_as: str = ""
     # The problem that its check found, for programs; None if the check finds only one, or a fault
     problem: Problem | None = None
+    # The reason in a few words, for terminals; empty if the reason itself is short. Not shown in other reports.
+    brief: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,11 +126,15 @@ class Report:
     seed: int | None  # the seed of every drawn value, printed so that a run can be repeated; None if it is not shown
     exercises: tuple[ExerciseReport, ...]  # in the order graded
     duration_s: float  # wall time of the run; the only value that differs between two runs
-    notes: tuple[str, ...] = ()  # sentences about the submission's files
+    notes: tuple[str, ...] = ()  # sentences about the submission's files and the machine
+    # Those of `notes` that tell students nothing: on the machine, its sandbox and the key of drawn values
+    staff_notes: tuple[str, ...] = ()
     reproduce: Reproduction = Reproduction()
     # Ids of the exercises that were not graded yet when the report was made; their criteria are undecided. Empty for a
     # complete report.
     pending: tuple[str, ...] = ()
+    # Who reads it; students get no notes, digests or commands that only help whoever runs the grader
+    audience: Audience = Audience.INSTRUCTOR
 
     @property
     def score(self) -> Fraction:

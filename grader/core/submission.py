@@ -18,6 +18,9 @@ class StudentFile:
     found: str | None  # path inside the submission, POSIX form and relative, or None if there is none
     similar: tuple[str, ...] = ()  # names in the submission that look like a misspelling of `wanted`, nearest first
     others: tuple[str, ...] = ()  # further files of the wanted name that were not taken, relative paths
+    # If it is missing: other .py files in the submission that no exercise asks for, likeliest first
+    candidates: tuple[str, ...] = ()
+    likely: bool = False  # whether the first candidate resembles it, by its name or its text
 
 
 @dataclass(frozen=True, slots=True)

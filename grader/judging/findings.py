@@ -40,9 +40,10 @@ def partly(
     *,
     hint: str = "",
     problem: Problem | ProblemKind | None = None,
+    brief: str = "",
 ) -> Finding:
     """Return a finding with half credit."""
-    return Finding(HALF, reason, evidence or {}, hint=hint, problem=_as_problem(problem))
+    return Finding(HALF, reason, evidence or {}, hint=hint, problem=_as_problem(problem), brief=brief)
 
 
 def only_printed(reason: str, evidence: Mapping[str, object] | None, hint: str) -> Finding:
@@ -58,6 +59,7 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
     fault: Fault | None = None,
     blocked_by: str | None = None,
     problem: Problem | ProblemKind | None = None,
+    brief: str = "",
 ) -> Finding:
     """Return a finding without credit.
 
@@ -68,13 +70,17 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
         fault: The fault that explains it; it becomes the location and part of the evidence.
         blocked_by: Criterion id, or name of a check in the same scenario, that must be met first.
         problem: The problem, where a check tells several apart; a fault needs none.
+        brief: The reason in a few words, if it is long; for a fault, its own text unless given.
     """
     known = dict(evidence or {})
     if fault is not None:
         known[FAULT_KEY] = fault_evidence(fault)
     location = fault_location(fault) if fault is not None else None
     found = _as_problem(problem)
-    return Finding(Fraction(0), reason, known, location=location, hint=hint, blocked_by=blocked_by, problem=found)
+    brief = brief or (_own_words(fault) if fault is not None else "")
+    return Finding(
+        Fraction(0), reason, known, location=location, hint=hint, blocked_by=blocked_by, problem=found, brief=brief
+    )
 
 
 def _as_problem(problem: Problem | ProblemKind | None) -> Problem | None:
@@ -129,12 +135,12 @@ def faulted(fault: Fault, effect: str, evidence: Mapping[str, object] | None = N
 
     Args:
         fault: The fault.
-        effect: The effect, or what was found.
+        effect: The effect, or what was found; empty if the fault says everything.
         evidence: Plain JSON values behind it.
         last: Whether the fault is named after `effect` instead of before.
     """
     clauses = (effect, fault_sentence(fault)) if last else (fault_sentence(fault), effect)
-    return not_met("; ".join(clauses), evidence, hint=fault_hint(fault), fault=fault)
+    return not_met("; ".join(filter(None, clauses)), evidence, hint=fault_hint(fault), fault=fault)
 
 
 def explain_fault(
@@ -153,14 +159,16 @@ def explain_fault(
 def fault_sentence(fault: Fault) -> str:
     """Return a fault as `file:line: text`, or as `file exited after 5.0 s with code 0`."""
     if fault.kind is FaultKind.EXITED:
-        code = "?" if fault.exit_code is None else fault.exit_code
-        return f"{fault.process} exited after {span(fault.t_ns)} with code {code}"
+        return f"{fault.process} {_own_words(fault)}"
     place = f"{fault.file}:{fault.line}" if fault.file and fault.line > 0 else fault.process
     return f"{place}: {_own_words(fault)}"
 
 
 def _own_words(fault: Fault) -> str:
-    """Return the text of a fault; an exception's message is quoted if it could be mistaken for the grader's words."""
+    """Return what happened; the message of an exception is quoted if it could be mistaken for the grader's words."""
+    if fault.kind is FaultKind.EXITED:
+        code = "?" if fault.exit_code is None else fault.exit_code
+        return f"exited after {span(fault.t_ns)} with code {code}"
     text = quote(fault.text)
     kind, colon, message = text.partition(": ")
     if fault.kind is not FaultKind.EXCEPTION or ";" not in text:

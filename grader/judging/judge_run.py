@@ -14,7 +14,7 @@ from grader.core.quantities import NS_PER_S, seconds
 from grader.core.report import NOT_JUDGED, ExerciseReport, Pace, Report, ReportedFault, Summary, TopicSummary, Verdict
 from grader.core.submission import Run, Submission
 from grader.core.trace import ClockKind, Fault, GraphSnapshot, Message, Offer, StartWay, Trace
-from grader.judging.charts import illustrated
+from grader.judging.charts import excerpts_for, illustrated
 from grader.judging.diagnosis import diagnose, placed
 from grader.judging.findings import FAULT_KEY
 from grader.judging.run_check import Answer, check_name, run_check
@@ -45,6 +45,7 @@ def judge_run(
         ),
         duration_s=run.duration_s,
         notes=run.notes,
+        staff_notes=tuple(note for note in run.notes if note not in run.submission.notes),
         reproduce=run.reproduce,
         pending=tuple(exercise.id for exercise in exercises if exercise.id in pending),
     )
@@ -53,7 +54,9 @@ def judge_run(
 def _exercise_report(exercise: Exercise, run: Run, *, pictures: bool) -> ExerciseReport:
     own = {scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id}
     report = judge_exercise(exercise, own, run.submission, run.sources)
-    return illustrated(report, exercise, own, run.submission, run.sources) if pictures else report
+    if pictures:
+        return illustrated(report, exercise, own, run.submission, run.sources)
+    return replace(report, excerpts=excerpts_for(report, run.submission, run.sources))
 
 
 def judge_exercise(
@@ -227,11 +230,17 @@ class VerdictBuilder:
             verdict = _without_points(criterion, Outcome.BLOCKED, f"{NOT_JUDGED}needs {file}, which is missing")
             return replace(verdict, blocked_by=self.missing_owner[file], missing_file=file)
         self.missing_owner[unnamed] = criterion.id
-        similar = self.submission.files[unnamed].similar
-        reason = f"{unnamed}: not in the submission"
-        reason += f"; found {listed(similar)} instead" if similar else ""
-        hint = f"rename {quote(similar[0], 80)} to {unnamed}" if similar else f"hand in a file named {unnamed}"
-        evidence = {"missing": unnamed, "similar": list(similar)}
+        looked_for = self.submission.files[unnamed]
+        similar, others = looked_for.similar, looked_for.candidates
+        hint = f"hand in a file named {unnamed}"
+        evidence: dict[str, object] = {"missing": unnamed, "similar": list(similar)}
+        if similar:
+            hint = f"rename {quote(similar[0], 80)} to {unnamed}"
+        elif looked_for.likely:
+            hint = f"if {quote(others[0], 80)} is your solution, rename it to {unnamed}"
+            evidence["likely"] = others[0]
+        found, reason = (*similar, *others), f"{unnamed}: not in the submission"
+        reason += f"; found {listed(found, len(found))}{' instead' if similar else ''}" if found else ""
         return _without_points(criterion, Outcome.NOT_MET, reason, hint=hint, evidence=evidence)
 
 
@@ -257,6 +266,7 @@ def _earned(criterion: Criterion, finding: Finding) -> Verdict:
         location=finding.location,
         evidence=finding.evidence,
         problem=finding.problem,
+        brief=finding.brief,
     )
 
 

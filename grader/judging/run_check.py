@@ -13,7 +13,7 @@ from grader.core.scenario import Scenario
 from grader.core.submission import Submission
 from grader.core.trace import Fault, FaultKind, Request, Response, Trace
 from grader.judging.checks import CHECKS
-from grader.judging.findings import faulted, first_fault
+from grader.judging.findings import AT_ONCE_NS, faulted, first_fault
 from grader.judging.values import student_endpoints
 from grader.judging.wording import quote, span
 
@@ -138,9 +138,10 @@ def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> 
     fault = start_failure(scenario, trace)
     if fault is None or finding.credit > 0:
         return finding
+    consequence = ""
     if fault.kind is FaultKind.SYNTAX_ERROR:
         consequence = "the file cannot run"
-    else:
+    elif fault.kind is FaultKind.EXITED and fault.t_ns >= AT_ONCE_NS:
         consequence = "the node had sent and received nothing by then"
     return faulted(fault, consequence, finding.evidence)
 
@@ -176,7 +177,7 @@ def breach(finding: object) -> str:
         return f"gave a credit of type {type(finding.credit).__name__}, expected a Fraction"
     if not 0 <= finding.credit <= 1:
         return f"gave a credit of {finding.credit}, expected 0 to 1"
-    texts = (finding.reason, finding.hint, finding.blocked_by or "")
+    texts = (finding.reason, finding.hint, finding.blocked_by or "", finding.brief)
     if not all(isinstance(text, str) for text in texts) or not isinstance(finding.location, (Location, type(None))):
         return "gave a reason, hint or location of another type than a Finding has"
     if not isinstance(finding.problem, (Problem, type(None))):

@@ -180,13 +180,15 @@ def _verdict(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
             blocked_by="",
             same_cause_as="",
             problem=None,
+            brief="",
         )
     verdict = _without_hidden(verdict, shown)
     if shown[verdict.id] is Shows.ALL:
         return verdict
     # The text of a verdict that was not judged has no numbers of its own, and the ids in it must not change.
     said = verdict.reason if verdict.outcome is Outcome.BLOCKED else without_numbers(verdict.reason)
-    return replace(verdict, reason=said, hint=_hint(verdict.hint), evidence={}, problem=None)
+    brief = without_numbers(verdict.brief)
+    return replace(verdict, reason=said, hint=_hint(verdict.hint), evidence={}, problem=None, brief=brief)
 
 
 def _without_hidden(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:

@@ -10,7 +10,7 @@ import stat
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TextIO
 
@@ -85,13 +85,15 @@ class Output:
 
     format: str
     path: Path | None = None
+    verbose: bool = False  # whether a text shows everything
 
 
-def prepared(outputs: Sequence[Output]) -> tuple[Output, ...]:
+def prepared(outputs: Sequence[Output], *, verbose: bool = False) -> tuple[Output, ...]:
     """Return all reports to deliver, files first, after checking that each can be written.
 
-    If nothing goes to standard output, the text report is added. Raises GraderError if a file cannot be written, two
-    reports have the same destination, or the environment lacks a value that a format needs.
+    If nothing goes to standard output, the text report is added. Texts show everything if `verbose`. Raises
+    GraderError if a file cannot be written, two reports have the same destination, or the environment lacks a value
+    that a format needs.
     """
     for output in outputs:
         check_surroundings(output.format)
@@ -102,7 +104,7 @@ def prepared(outputs: Sequence[Output]) -> tuple[Output, ...]:
     _refuse_twins([output.path for output in files if output.path is not None])
     for output in files:
         _check(output)
-    return (*files, *(printed or [Output("text")]))
+    return tuple(replace(output, verbose=verbose) for output in (*files, *(printed or [Output("text")])))
 
 
 def deliver(report: Report, outputs: Sequence[Output], readers: Readers = ANYBODY) -> None:
@@ -167,10 +169,14 @@ def _unwritable(output: Output, error: OSError) -> GraderError:
 def write_report(report: Report, output: Output, readers: Readers) -> None:
     """Write a report to its destination; raises OSError if that fails."""
     if output.path is not None:
-        text = rendered(output.format, report, PageLayout(_FILE_WIDTH, colour=False), readers)
-        write_whole(output.path, text.encode("utf-8"))
-    else:
-        show(lambda layout: rendered(output.format, report, layout, readers), for_people=output.format == "text")
+        layout = PageLayout(_FILE_WIDTH, colour=False, verbose=output.verbose)
+        write_whole(output.path, rendered(output.format, report, layout, readers).encode("utf-8"))
+        return
+
+    def render(layout: PageLayout) -> str:
+        return rendered(output.format, report, replace(layout, verbose=output.verbose), readers)
+
+    show(render, for_people=output.format == "text")
 
 
 def _coloured(stream: TextIO) -> bool:

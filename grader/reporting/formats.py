@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PageLayout:
-    """Width and colour of text; formats for programs ignore it."""
+    """Width, colour and length of text; formats for programs ignore it."""
 
     width: int
     colour: bool
+    verbose: bool = False  # whether to show everything, not only what a student acts on
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,7 @@ class Format:
 
 def _arguments(needs: str, report: Report, layout: PageLayout) -> Mapping[str, object]:
     if needs == "layout":
-        return {"width": layout.width, "colour": layout.colour}
+        return {"width": layout.width, "colour": layout.colour, "verbose": layout.verbose}
     if needs == "folder":
         return {"folder": repository_folder(report.path, os.environ)}
     return {"handed_in": _handed_in()} if needs else {}
@@ -91,6 +92,7 @@ def rendered(name: str, report: Report, layout: PageLayout, readers: Readers) ->
     format_ = FORMATS[name]
     if readers.of(Audience.STUDENT if format_.for_students else Audience.INSTRUCTOR) is Audience.INSTRUCTOR:
         return format_(report, layout)
+    report = replace(report, audience=Audience.STUDENT)
     if format_.withholds:
         return format_(report, layout, day=readers.day)
     return format_(for_student(report, readers.day), layout)

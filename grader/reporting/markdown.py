@@ -78,7 +78,7 @@ def _head(report: Report, detail: Detail) -> list[str]:
         lines.append(f"> [!CAUTION]\n> isolation: {markdown(wording.isolation(report))}\n")
     lines += [f"**{markdown(wording.summary(report))}**\n", f"{markdown(wording.run_line(report))}\n"]
     lines += [_LEFT_OUT] if detail != _ALL else []
-    return lines + _notes(report.notes, detail)
+    return lines + _notes(wording.relevant_notes(report), detail)
 
 
 def _exercise(exercise: ExerciseReport, detail: Detail) -> list[str]:

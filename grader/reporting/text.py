@@ -1,13 +1,14 @@
-"""The report as text for a student in a terminal."""
+"""The report as text for a student in a terminal: what to fix first, a line for each criterion, details on request."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
 
 from rich.cells import cell_len
 from rich.text import Text
 
-from grader.core.exercise import Outcome
+from grader.core.exercise import Location, Outcome
 from grader.core.report import ExerciseReport, Report, ReportedFault, Verdict
 from grader.core.trace import ClockKind
 from grader.reporting import wording
@@ -23,46 +24,161 @@ _STYLES = {
     Outcome.BLOCKED: "dim",
     Outcome.UNDECIDED: "bold magenta",
 }
+_LOST = (Outcome.NOT_MET, Outcome.PARTLY)
 _WORD_WIDTH = max(len(word) for word in OUTCOME_WORDS.values())
 _DETAIL = " " * 6
 # Ends a line of a command that continues on the next one.
 _GOES_ON = " \\"
 
 
-def render_text(report: Report, *, width: int, colour: bool) -> str:
+def render_text(report: Report, *, width: int, colour: bool, verbose: bool = False) -> str:
     """Return a report, all of whose text is treated as hostile, as text of at least 20 columns.
 
-    Colours are ANSI sequences; the text is the same without.
+    Colours are ANSI sequences; the text is the same without. Only a verbose text shows every reason and hint in full,
+    the calls that led to faults, the ROS graph, and how to reproduce the report.
     """
     page = Page(width=width, colour=colour)
-    _head(page, report)
+    first = _first_to_fix(report)
+    _head(page, report, verbose=verbose)
+    if first is not None:
+        _fix_first(page, *first)
     for exercise in report.exercises:
         page.blank()
-        _exercise(page, exercise)
+        if verbose:
+            _exercise(page, exercise)
+        else:
+            _outline(page, exercise, first[1] if first is not None else None)
     page.blank()
-    _foot(page, report)
+    if verbose:
+        _foot(page, report)
+    else:
+        _last_line(page, report)
     return page.text()
 
 
-def _head(page: Page, report: Report) -> None:
+def _head(page: Page, report: Report, *, verbose: bool) -> None:
     full = report.final and report.score == report.max_score
     page.put(wording.headline(report), style="bold green" if full else "bold")
     for warning in wording.warnings(report):
         page.put(warning, style="bold magenta")
-    page.put(wording.summary(report))
-    page.put(wording.run_line(report), style="dim")
-    if any(verdict.outcome is Outcome.BLOCKED for exercise in report.exercises for verdict in exercise.verdicts):
-        page.put("Blocked criteria are judged once what they need is met.")
-    _notes(page, report.notes, indent="")
+    if verbose:
+        page.put(wording.summary(report))
+
+
+def _first_to_fix(report: Report) -> tuple[ExerciseReport, Verdict] | None:
+    """Return the criterion that a student should look at first: one on a file that exists, or that has another name."""
+    lost = [(e, v) for e in report.exercises for v in e.verdicts if v.outcome in _LOST and not v.same_cause_as]
+    return next((found for found in lost if not _is_absent(found[1])), lost[0] if lost else None)
+
+
+def _is_absent(verdict: Verdict) -> bool:
+    """Return whether a file is missing, without another that may be meant."""
+    known = verdict.evidence
+    return bool(known.get("missing")) and not (known.get("similar") or known.get("likely"))
+
+
+def _fix_first(page: Page, exercise: ExerciseReport, verdict: Verdict) -> None:
+    page.put(Text.assemble((_cause(verdict), "bold")), prefix=Text.assemble(("Fix first: ", "bold red")), indent=2)
+    where = verdict.location
+    if where is not None:
+        place = wording.place(where.file, where.line)
+        line = Text(f"  {place}: {shown(code)}" if (code := _source_line(exercise, verdict)) else f"  at {place}")
+        line.truncate(page.width, overflow="ellipsis")
+        page.put(line, style="bold")
+    if verdict.hint:
+        page.put(shown(verdict.hint), prefix=Text.assemble(("  hint: ", "cyan")), style="cyan")
+
+
+def _source_line(exercise: ExerciseReport, verdict: Verdict) -> str:
+    """Return the line of the source that a verdict points to; empty if it is not known."""
+    found = (e.lines[e.line - e.first] for e in exercise.excerpts if Location(e.file, e.line) == verdict.location)
+    return next(found, "").strip()
+
+
+def _cause(verdict: Verdict) -> str:
+    """Return why points were lost, in a few words if known; a fault elsewhere than the verdict comes with its place."""
+    if not verdict.brief:
+        return shown(wording.reason(verdict))
+    fault = verdict.evidence.get("fault")
+    if not isinstance(fault, Mapping):
+        return shown(verdict.brief)
+    place = Location(str(fault.get("file") or fault.get("process", "")), int(fault.get("line") or 0))
+    known = place == verdict.location
+    return shown(verdict.brief if known else f"{wording.place(place.file, max(place.line, 0))}: {verdict.brief}")
+
+
+def _outline(page: Page, exercise: ExerciseReport, first: Verdict | None) -> None:
+    """Write one line for each criterion, and one for all that are blocked; one alone if nothing was handed in."""
+    missing = dict.fromkeys(str(v.missing_file or v.evidence.get("missing", "")) for v in exercise.verdicts)
+    if exercise.verdicts and all(missing):
+        page.put(f"{wording.exercise_line(exercise)}: no {' and no '.join(map(shown, missing))} yet", style="bold")
+        return
+    full = exercise.score == exercise.max_score
+    page.put(wording.exercise_line(exercise), style="bold green" if full else "bold")
+    blocked = [verdict for verdict in exercise.verdicts if verdict.outcome is Outcome.BLOCKED]
+    left = f"0/{points(sum((verdict.max_score for verdict in blocked), Fraction(0)))}"
+    shares = [_share(verdict) for verdict in exercise.verdicts if verdict not in blocked]
+    column = max(map(len, [*shares, *([left] if blocked else [])]), default=0)
+    for verdict in exercise.verdicts:
+        if verdict not in blocked:
+            page.put(_in_a_line(verdict, first), prefix=_prefix(verdict.outcome, _share(verdict).rjust(column)))
+    if blocked:
+        what = "what it needs is" if len(blocked) == 1 else "what they need is"
+        page.put(
+            f"{len(blocked)} more, judged once {what} met",
+            prefix=_prefix(Outcome.BLOCKED, left.rjust(column)),
+            style="dim",
+        )
+    for fault in _unexplained(exercise)[:MOST_FAULTS]:
+        page.put(f"{wording.happened(fault)}: {shown(fault.text)}", prefix=Text.assemble(("  fault: ", "red")))
+    _more(page, len(_unexplained(exercise)) - MOST_FAULTS, "faults")
+    _notes(page, exercise.notes, indent="  ")
+
+
+def _in_a_line(verdict: Verdict, first: Verdict | None) -> str:
+    title = shown(verdict.title)
+    if verdict.outcome is Outcome.MET:
+        return title
+    if verdict is first:
+        return f"{title}: see above"
+    if first is not None and verdict.same_cause_as == first.id:
+        return f"{title}: same cause as above"
+    where = verdict.location
+    return f"{title}: {_cause(verdict)}{f' ({wording.place(where.file, where.line)})' if where else ''}"
+
+
+def _unexplained(exercise: ExerciseReport) -> list[ReportedFault]:
+    """Return the faults that no criterion names."""
+    faults = [v.evidence.get("fault") for v in exercise.verdicts]
+    known = {
+        (f.get("file") or f.get("process"), f.get("line"), f.get("text")) for f in faults if isinstance(f, Mapping)
+    }
+    return [fault for fault in exercise.faults if (fault.file, fault.line, fault.text) not in known]
+
+
+def _last_line(page: Page, report: Report) -> None:
+    _notes(page, [n for n in report.notes if n not in report.staff_notes], indent="")
+    if wording.ran_without_sandbox(report):
+        page.put(wording.isolation(report), prefix=_row("isolation"), style="bold red")
+    seed = "" if report.seed is None else f", seed {report.seed}"
+    page.put(f"{wording.run_line(report)}{seed}; -v shows everything", style="dim")
+
+
+def _share(verdict: Verdict) -> str:
+    return f"{points(verdict.score)}/{points(verdict.max_score)}"
+
+
+def _prefix(outcome: Outcome, share: str) -> Text:
+    word = f"  {OUTCOME_WORDS[outcome].ljust(_WORD_WIDTH)}"
+    return Text.assemble((word, _STYLES[outcome]), (f"  {share}  ", "dim" if outcome is Outcome.BLOCKED else ""))
 
 
 def _exercise(page: Page, exercise: ExerciseReport) -> None:
     full = exercise.score == exercise.max_score
     page.put(wording.exercise_line(exercise), style="bold green" if full else "bold")
-    shares = [f"{points(verdict.score)}/{points(verdict.max_score)}" for verdict in exercise.verdicts]
-    column = max((len(share) for share in shares), default=0)
-    for verdict, share in zip(exercise.verdicts, shares, strict=True):
-        _verdict(page, verdict, share.rjust(column))
+    column = max((len(_share(verdict)) for verdict in exercise.verdicts), default=0)
+    for verdict in exercise.verdicts:
+        _verdict(page, verdict, _share(verdict).rjust(column))
     for fault in exercise.faults[:MOST_FAULTS]:
         _fault(page, fault)
     _more(page, len(exercise.faults) - MOST_FAULTS, "faults")
@@ -73,11 +189,8 @@ def _exercise(page: Page, exercise: ExerciseReport) -> None:
 
 
 def _verdict(page: Page, verdict: Verdict, share: str) -> None:
-    blocked = verdict.outcome is Outcome.BLOCKED
-    word = f"  {OUTCOME_WORDS[verdict.outcome].ljust(_WORD_WIDTH)}"
-    prefix = Text.assemble((word, _STYLES[verdict.outcome]), (f"  {share}  ", "dim" if blocked else ""))
-    title = shown(verdict.title)
-    if blocked:
+    prefix, title = _prefix(verdict.outcome, share), shown(verdict.title)
+    if verdict.outcome is Outcome.BLOCKED:
         page.put(f"{title}: {shown(wording.reason(verdict))}", prefix=prefix, style="dim")
         return
     if verdict.outcome is Outcome.MET:
@@ -128,6 +241,8 @@ def _more(page: Page, count: int, what: str, *, indent: str = "  ") -> None:
 
 
 def _foot(page: Page, report: Report) -> None:
+    _notes(page, wording.relevant_notes(report), indent="")
+    page.put(wording.run_line(report), style="dim")
     for name, value in wording.reproduction(report):
         loud = name == "isolation" and wording.ran_without_sandbox(report)
         page.put(value, prefix=_row(name), style="bold red" if loud else "dim")

@@ -8,7 +8,7 @@ from fractions import Fraction
 from math import floor
 
 from grader.core.checkup import NO_SANDBOX, summarised
-from grader.core.exercise import Outcome, exercise_name
+from grader.core.exercise import Audience, Outcome, exercise_name
 from grader.core.quantities import seconds
 from grader.core.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
 from grader.core.trace import ClockKind
@@ -111,8 +111,14 @@ def opening(report: Report) -> list[str]:
 
 
 def notes(report: Report) -> list[str]:
-    """Return the notes on the whole run; each safe to show as a line of text."""
-    return _capped([f"note: {shown(note)}" for note in report.notes], MOST_NOTES, "notes")
+    """Return the notes on the whole run that its reader needs; each safe to show as a line of text."""
+    return _capped([f"note: {shown(note)}" for note in relevant_notes(report)], MOST_NOTES, "notes")
+
+
+def relevant_notes(report: Report) -> list[str]:
+    """Return the notes on the whole run, for students without those for staff. Not yet safe to show."""
+    left_out = report.staff_notes if report.audience is Audience.STUDENT else ()
+    return [note for note in report.notes if note not in left_out]
 
 
 def remarks(exercise: ExerciseReport) -> list[str]:
@@ -130,12 +136,13 @@ def remarks(exercise: ExerciseReport) -> list[str]:
 def ending(report: Report) -> list[str]:
     """Return the lines that help to reproduce the report, the command last; each safe to show as a line of text."""
     rows = [f"{name}: {value}" for name, value in reproduction(report)]
-    return [*rows, f"reproduce: {' '.join(command(report))}"] if report.reproduce.command else rows
+    words = command(report)
+    return [*rows, f"reproduce: {' '.join(words)}"] if words else rows
 
 
 def overview(report: Report) -> list[str]:
     """Return the whole report but its criteria, for a platform that shows these as tests."""
-    lines = [*opening(report), run_line(report)]
+    lines = [*opening(report), *([] if report.audience is Audience.STUDENT else [run_line(report)])]
     for exercise in report.exercises:
         found = remarks(exercise)
         lines += ["", exercise_line(exercise), *found] if found else []
@@ -209,10 +216,14 @@ def starts(report: Report) -> list[str]:
 
 
 def reproduction(report: Report) -> list[tuple[str, str]]:
-    """Return names and values that reproduce the report, except the command; safe to show as lines of text."""
-    rows = [("versions", versions(report)), ("isolation", isolation(report))]
-    rows[:0] = [] if report.seed is None else [("seed", str(report.seed))]
-    rows.append(("clock", clock(report)))
+    """Return names and values that reproduce the report, except the command; safe to show as lines of text.
+
+    Students get the seed and the clock: the rest helps whoever runs the grader.
+    """
+    seed = [] if report.seed is None else [("seed", str(report.seed))]
+    if report.audience is Audience.STUDENT:
+        return [*seed, ("clock", clock(report))]
+    rows = [*seed, ("versions", versions(report)), ("isolation", isolation(report)), ("clock", clock(report))]
     if report.reproduce.rubrics:
         rows.append(("rubrics", ", ".join(f"{id_} {_short(digest)}" for id_, digest in report.reproduce.rubrics)))
     if report.reproduce.recording:
@@ -221,11 +232,13 @@ def reproduction(report: Report) -> list[tuple[str, str]]:
 
 
 def command(report: Report) -> list[str]:
-    """Return the command that reproduces the report, quoted for a shell and safe to show as text.
+    """Return the command that reproduces the report, quoted for a shell and safe to show as text; none for students.
 
     Join the pieces with spaces; an option and its value are one piece.
     """
     pieces: list[str] = []
+    if report.audience is Audience.STUDENT:
+        return pieces
     for word in report.reproduce.command:
         text = shown(quoted(word), limit=_WORD_LIMIT)
         if pieces and pieces[-1].startswith("--") and " " not in pieces[-1]:

@@ -22,6 +22,11 @@ SIMILARITY = 0.8
 #: Misspelt names shown for one file.
 MAX_SIMILAR = 3
 
+#: Other Python files shown for a missing one, and the likeness of names from which one of them is probably meant.
+MAX_CANDIDATES, LIKELY = 12, 0.6
+#: Files of packages, which are no nodes.
+_NO_NODES = ("__init__.py", "setup.py", "conftest.py")
+
 _EXPECTED = "a folder, a .py file or an archive"
 
 # Suffixes that browsers, editors and file managers add to a name: `x(1).py`, `x - Copy.py`, `x.py.txt`.
@@ -58,8 +63,7 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
 def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into: Path) -> Submission:
     """Write files that were read, here or on another machine, and find the wanted ones; raises HarnessError."""
     digest = write_files(collected, into)
-    names = [name for name, _ in collected.files]
-    files = {name: _look_for(name, names, wanted) for name in wanted}
+    files = {name: _look_for(name, collected.files, wanted) for name in wanted}
     several = tuple(_several(file) for file in files.values() if file.others)
     return Submission(
         name=_name(Path(path)),
@@ -140,12 +144,29 @@ def _name(source: Path) -> str:
     return source.name if source.name not in ("", "..") else source.resolve().name or "/"
 
 
-def _look_for(wanted: str, files: Iterable[str], all_wanted: Sequence[str]) -> StudentFile:
-    files = list(files)
-    exact = sorted((f for f in files if PurePosixPath(f).name == wanted), key=_nearest_the_top)
+def _look_for(wanted: str, files: Sequence[tuple[str, bytes]], all_wanted: Sequence[str]) -> StudentFile:
+    names = [name for name, _ in files]
+    exact = sorted((name for name in names if PurePosixPath(name).name == wanted), key=_nearest_the_top)
     if exact:
         return StudentFile(wanted, exact[0], others=tuple(exact[1:]))
-    return StudentFile(wanted, None, similar=tuple(_similar(wanted, files, all_wanted)))
+    similar = tuple(_similar(wanted, names, all_wanted))
+    others = {name: content for name, content in files if name not in similar and _may_be_node(name, all_wanted)}
+    ranked = sorted((-_resemblance(name, others[name], wanted), _nearest_the_top(name), name) for name in others)
+    candidates = tuple(name for _, _, name in ranked[:MAX_CANDIDATES])
+    return StudentFile(wanted, None, similar=similar, candidates=candidates, likely=bool(ranked and -ranked[0][0] >= 1))
+
+
+def _may_be_node(path: str, all_wanted: Sequence[str]) -> bool:
+    name = PurePosixPath(path).name
+    return name.casefold().endswith(".py") and name not in (*all_wanted, *_NO_NODES)
+
+
+def _resemblance(path: str, content: bytes, wanted: str) -> float:
+    """Return how much a Python file resembles a wanted one; from 1 on, it is probably meant."""
+    plain, text = _plain(wanted), content.decode("utf-8", "replace")
+    names_it = "rclpy" in text and plain in text.replace("_", "").casefold()
+    likeness = difflib.SequenceMatcher(None, _plain(PurePosixPath(path).name), plain, autojunk=False).ratio()
+    return likeness + ("rclpy" in text) * 0.1 + (names_it or likeness >= LIKELY)
 
 
 def _nearest_the_top(relative: str) -> tuple[int, bytes]:

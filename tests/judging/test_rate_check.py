@@ -73,6 +73,18 @@ def test_a_wrong_rate_is_told_the_period(rate: float, hint: str) -> None:
     assert hint in RATE.judge(velocity(rate, stop_s=3.05 if rate > 100 else 10.05).trace()).hint
 
 
+@pytest.mark.parametrize(
+    ("rate", "brief"),
+    [
+        (10, "/cmd_vel: 10.0 Hz, expected 20 ± 1 Hz over 10.0 s"),
+        (18.99, "/cmd_vel: 18.99 Hz, expected 20 ± 1 Hz over 10.0 s"),
+    ],
+)
+def test_a_terminal_is_told_the_rate_and_what_was_expected(rate: float, brief: str) -> None:
+    """With as many decimals as show that the rate is wrong."""
+    assert RATE.judge(velocity(rate).trace()).brief == brief
+
+
 def test_no_partly_without_a_second_tolerance() -> None:
     """Leaving it out leaves nothing between."""
     assert TopicRate("/cmd_vel", 20.0, 1.0, 10 * NS_PER_S).judge(velocity(18.5).trace()).credit == 0

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from report_samples import HANDED_IN, SAMPLES, hostile, middling, partial, perfect, undecided
 
+from grader.core.exercise import Audience
 from grader.core.report import Report
 from grader.reporting.formats import FORMATS, PageLayout
 from grader.reporting.html.render import render_html
@@ -29,7 +30,7 @@ from grader.reporting.text import render_text
 
 GOLDEN = Path(__file__).parent / "golden"
 RENDERERS: dict[str, Callable[[Report], str]] = {
-    "text": lambda report: render_text(report, width=100, colour=False),
+    "text": lambda report: render_text(report, width=100, colour=False, verbose=True),
     "json": dumps,
     "html": lambda report: render_html(report, assets="."),
     "markdown": render_markdown,
@@ -80,6 +81,17 @@ def test_every_report_says_what_gives_it_again(name: str, sample: str) -> None:
         assert word in text
 
 
+@pytest.mark.parametrize("name", sorted(set(RENDERERS) - {"json"}))
+def test_students_get_nothing_that_only_staff_can_use(name: str) -> None:
+    """Neither digests, nor commands on a machine of somebody else, nor notes on its sandbox."""
+    sample = replace(middling(), notes=("of their files", "of the machine"), staff_notes=("of the machine",))
+    text = RENDERERS[name](replace(sample, audience=Audience.STUDENT))
+    for word in ("--seed", "sha256:000000000000", "7.1.6", "of the machine"):
+        assert word not in text
+    assert "4711" in text
+    assert "of their files" in text
+
+
 @pytest.mark.parametrize("name", RENDERERS)
 def test_a_run_without_a_sandbox_says_so(name: str) -> None:
     """No platform passes it over in silence."""
@@ -114,4 +126,4 @@ def test_the_table_of_formats_names_the_right_renderer(name: str, monkeypatch: p
         "classroom": render_classroom,
         "html": render_html,
     }.get(name, RENDERERS[name])
-    assert FORMATS[name](sample, PageLayout(100, colour=False)) == expected(sample)
+    assert FORMATS[name](sample, PageLayout(100, colour=False, verbose=True)) == expected(sample)

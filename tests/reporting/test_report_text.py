@@ -32,8 +32,9 @@ from report_samples import (
 )
 from rich.cells import cell_len
 
-from grader.core.exercise import Location, Outcome
-from grader.core.report import Report, Reproduction
+from grader.core.chart import Excerpt
+from grader.core.exercise import Audience, Location, Outcome
+from grader.core.report import ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.core.trace import GraphSnapshot, ServiceEnd
 from grader.reporting.escape import shown
 from grader.reporting.graph import draw_graph
@@ -43,20 +44,20 @@ GOLDEN = Path(__file__).parent / "golden"
 ANSI = re.compile(r"\x1b\[[0-9;]*m")
 
 
-def render(sample: Report, width: int = 80, *, colour: bool = False) -> str:
-    return render_text(sample, width=width, colour=colour)
+def render(sample: Report, width: int = 80, *, colour: bool = False, verbose: bool = False) -> str:
+    return render_text(sample, width=width, colour=colour, verbose=verbose)
 
 
 def squeezed(text: str) -> str:
     return "".join(text.split())
 
 
-@pytest.mark.parametrize("width", [120, 80, 40])
+@pytest.mark.parametrize(("width", "verbose"), [(120, False), (80, False), (40, False), (80, True)])
 @pytest.mark.parametrize("name", SAMPLES)
-def test_the_text_is_the_golden_one(name: str, width: int) -> None:
+def test_the_text_is_the_golden_one(name: str, width: int, verbose: bool) -> None:
     """What a student sees changes only on purpose."""
-    path = GOLDEN / f"{name}_{width}.txt"
-    text = render(SAMPLES[name](), width)
+    path = GOLDEN / f"{name}_{width}{'_verbose' if verbose else ''}.txt"
+    text = render(SAMPLES[name](), width, verbose=verbose)
     if os.environ.get("UPDATE_GOLDEN"):
         path.write_text(text, encoding="utf-8")
     assert text == path.read_text(encoding="utf-8")
@@ -71,11 +72,12 @@ def test_the_coloured_text_is_the_golden_one() -> None:
     assert text == path.read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize("verbose", [False, True])
 @pytest.mark.parametrize("width", [20, 40, 57, 80, 200])
 @pytest.mark.parametrize("name", SAMPLES)
-def test_lines_keep_to_the_width_and_end_in_no_space(name: str, width: int) -> None:
+def test_lines_keep_to_the_width_and_end_in_no_space(name: str, width: int, verbose: bool) -> None:
     """A terminal never wraps what is already wrapped."""
-    lines = render(SAMPLES[name](), width).split("\n")
+    lines = render(SAMPLES[name](), width, verbose=verbose).split("\n")
     assert max(map(cell_len, lines)) <= width
     assert not [line for line in lines if line != line.rstrip()]
     assert "\n\n\n" not in "\n".join(lines)
@@ -136,10 +138,80 @@ def test_no_text_of_a_student_is_lost_or_breaks_the_layout(text: str, width: int
 
 def test_the_head_says_score_and_finality_first() -> None:
     """A student in a hurry reads two lines."""
-    lines = render(middling()).splitlines()
-    assert lines[0] == "ada_homework: 13 of 60 points"
+    lines = render(middling(), verbose=True).splitlines()
+    assert lines[0] == render(middling()).splitlines()[0] == "ada_homework: 13 of 60 points"
     assert lines[1] == "Final: 2 of 9 criteria met, 1 partly, 3 not met, 3 blocked."
-    assert render(perfect()).splitlines()[1] == "Final: 12 of 12 criteria met."
+    assert render(perfect(), verbose=True).splitlines()[1] == "Final: 12 of 12 criteria met."
+
+
+def located(**changes: object) -> ExerciseReport:
+    """Return an exercise that lost points in line 8 of a file, and others for the same cause or on their own."""
+    fields: dict[str, object] = {
+        "location": Location("a.py", 8),
+        "brief": "/t: 10.0 Hz, expected 20 Hz",
+        "hint": "do X",
+    }
+    rate = criterion("rate", "Rate", 10, Outcome.NOT_MET, **{**fields, **changes})
+    follows = criterion("turn", "Turn", 5, Outcome.NOT_MET, hint="this has the same cause", same_cause_as="rate")
+    rest = criterion("log", "Log", 4, Outcome.PARTLY, reason="printed", hint="log", location=Location("a.py", 9))
+    return exercise("e", "1", "E", rate, follows, rest, excerpts=(Excerpt("a.py", 8, 7, ("import x", "  RATE = 10")),))
+
+
+def test_the_first_thing_to_fix_stands_on_top() -> None:
+    """Cause, place with the line of the source, and one thing to do, in lines two to four."""
+    lines = render(report(located())).splitlines()
+    assert lines[1:4] == ["Fix first: /t: 10.0 Hz, expected 20 Hz", "  a.py:8: RATE = 10", "  hint: do X"]
+    assert lines[6:9] == [
+        "  not met    0/10  Rate: see above",
+        "  not met     0/5  Turn: same cause as above",
+        "  partly      2/4  Log: printed (a.py:9)",
+    ]
+
+
+def test_a_fault_names_its_own_line_if_another_has_to_be_changed() -> None:
+    """The line that raised is not always the one to fix."""
+    fault = {"process": "a.py", "file": "a.py", "line": 20, "text": "E: no"}
+    shown_at = [render(report(located(brief="E: no", evidence={"fault": {**fault, "line": n}}))) for n in (20, 8)]
+    assert [text.splitlines()[1] for text in shown_at] == ["Fix first: a.py:20: E: no", "Fix first: E: no"]
+
+
+def test_a_file_that_is_not_there_comes_after_one_that_is() -> None:
+    """Unless another file may be meant; an exercise without any file takes one line."""
+    absent = exercise("f", "2", "F", *missing("b.py"))
+    text = render(report(absent, located()))
+    assert "Fix first: /t: 10.0 Hz" in text
+    assert "Exercise 2: F (0 of 9 points): no b.py yet\n\n" in text
+    assert render(report(absent)).splitlines()[1] == "Fix first: b.py: not in the submission"
+    renamed = exercise("f", "2", "F", *missing("b.py", likely="c.py"))
+    assert render(report(renamed, located())).splitlines()[1] == "Fix first: b.py: not in the submission"
+
+
+def missing(file: str, **evidence: str) -> tuple[Verdict, Verdict]:
+    known = {"missing": file, "similar": [], **evidence}
+    first = criterion("f", "F", 5, Outcome.NOT_MET, reason=f"{file}: not in the submission", evidence=known)
+    reason = f"not judged: needs {file}, which is missing"
+    return first, criterion("g", "G", 4, Outcome.BLOCKED, reason=reason, blocked_by="f", missing_file=file)
+
+
+def test_a_fault_that_a_criterion_names_is_shown_once() -> None:
+    """Its calls are shown on request."""
+    known = {"process": "a.py", "file": "a.py", "line": 8, "text": "E: no"}
+    faults = (ReportedFault("exception", "a.py", 8, "E: no", 0, "s", ("a.py:8 in main",)),)
+    sample = report(replace(located(brief="E: no", evidence={"fault": known}), faults=faults))
+    assert render(sample).count("E: no") == 1
+    assert "a.py:8 in main" in render(sample, verbose=True)
+    assert "fault: a.py:8 raised" in render(report(replace(located(), faults=faults)))
+
+
+def test_notes_for_staff_are_shown_on_request_and_never_to_students() -> None:
+    """The practice key and the sandbox of a machine say nothing about a program."""
+    sample = replace(middling(), notes=("of the files", "of the machine"), staff_notes=("of the machine",))
+    assert "of the machine" not in render(sample)
+    assert "note: of the files" in render(sample)
+    assert "note: of the machine" in render(sample, verbose=True)
+    students = render(replace(sample, audience=Audience.STUDENT), verbose=True)
+    assert "seed       4711" in students
+    assert not [word for word in ("of the machine", "sha256", "reproduce", "isolation") if word in students]
 
 
 def test_an_undecided_report_says_so_plainly() -> None:
@@ -153,26 +225,28 @@ def test_an_undecided_report_says_so_plainly() -> None:
 
 def test_a_criterion_not_met_gives_reason_hint_and_place_in_this_order() -> None:
     """What was found, what to do, where."""
-    text = render(middling(), 120)
+    text = render(middling(), 120, verbose=True).split("Exercise 1")[1]
     reason, hint, place = (text.index(s) for s in ("10.00 Hz", "hint: the argument", "at velocity_publisher.py:17"))
     assert reason < hint < place
 
 
 def test_a_place_that_the_reason_names_is_not_repeated() -> None:
     """One place, said once."""
-    assert "at velocity_publisher.py:14\n" not in render(crashed())
+    assert "at velocity_publisher.py:14\n" not in render(crashed(), verbose=True).split("Exercise 1")[1]
 
 
 def test_a_blocked_criterion_takes_one_line() -> None:
-    """One cause is told once; what hangs on it only says on what."""
-    lines = [line for line in render(crashed()).splitlines() if "blocked" in line and line.startswith("  ")]
+    """One cause is told once; what hangs on it takes one line together, or one each where all is shown."""
+    lines = [line for line in render(crashed(), verbose=True).splitlines() if line.startswith("  blocked")]
     assert lines[0] == "  blocked    0/10  Publishes at 20 Hz: needs publishes_twist (not met)"
     assert len(lines) == 3
+    lines = [line for line in render(crashed()).splitlines() if line.startswith("  blocked")]
+    assert lines == ["  blocked    0/20  3 more, judged once what they need is met"]
 
 
 def test_long_call_chains_are_shortened_in_the_middle() -> None:
     """A recursion of a thousand calls shows where it began and where it broke."""
-    text = render(crashed())
+    text = render(crashed(), verbose=True)
     assert "(7 more calls)" in text
     assert "velocity_publisher.py:31 in <module>" in text
     assert "velocity_publisher.py:14 in __init__" in text
@@ -186,8 +260,9 @@ def test_many_faults_and_notes_are_counted_not_listed() -> None:
 
 
 def test_the_report_ends_with_the_command_that_gives_it_again() -> None:
-    """Seed, versions, digests and clock stand above it."""
-    lines = render(middling(), 120).splitlines()
+    """Seed, versions, digests and clock stand above it; one line without them otherwise."""
+    assert render(middling()).splitlines()[-1] == "graded ./ada_homework in 1.8 s, seed 4711; -v shows everything"
+    lines = render(middling(), 120, verbose=True).splitlines()
     assert lines[-1] == "reproduce  grade ./ada_homework --seed 4711"
     assert [line.split()[0] for line in lines[-7:-1]] == [
         "seed",
@@ -204,22 +279,23 @@ def test_a_long_command_can_be_copied() -> None:
     """It goes on in the next line as a shell wants it to, and no word of it is broken."""
     words = ("grade", "./ada", *(w for n in range(9) for w in ("--rubric", f"/a folder/{n}.yaml")))
     sample = replace(middling(), reproduce=Reproduction(command=words))
-    command = render(sample, 60).split("reproduce", 1)[1]
+    command = render(sample, 60, verbose=True).split("reproduce", 1)[1]
     assert command.count("\n") > 4
     done = subprocess.run(["bash", "-c", f"printf '%s\\0' {command}"], capture_output=True, text=True, check=True)
     assert done.stdout.split("\0")[:-1] == list(words)
 
 
-def test_only_the_head_differs_between_two_runs() -> None:
-    """The same verdicts give the same text below; path and duration stand in one line above."""
-    one, other = render(middling()), render(replace(middling(), path="./elsewhere", duration_s=7.0))
+def test_only_one_line_differs_between_two_runs() -> None:
+    """The same verdicts give the same text; path and duration stand in one line."""
+    again = replace(middling(), path="./elsewhere", duration_s=7.0)
+    one, other = render(middling(), verbose=True), render(again, verbose=True)
     changed = [a for a, b in zip(one.splitlines(), other.splitlines(), strict=True) if a != b]
     assert changed == ["graded ./ada_homework in 1.8 s"]
 
 
 def test_a_partial_report_says_so_first() -> None:
     """What is still to be graded is named before any number below is read."""
-    lines = render(partial(), 120).splitlines()
+    lines = render(partial(), 120, verbose=True).splitlines()
     assert lines[1] == "This report is partial: it was made before exercise 2 (16 points) had been graded."
     assert lines[2].startswith("So far: 5 of 7 criteria met")
     assert "Grade again" not in "".join(lines)
@@ -298,8 +374,8 @@ def test_one_node_alone_gets_no_drawing() -> None:
     """The graph of exercise 1 would say nothing new."""
     alone = GraphSnapshot(0, ("/a",), (endpoint("publisher", "/cmd_vel", "/a"),))
     first = exercise("e", "1", "E", criterion("c", "C", 1), graph=alone)
-    assert "graph" not in render(report(first))
-    assert "Live ROS graph" in render(report(velocity(), two_nodes()))
+    assert "graph" not in render(report(first), verbose=True)
+    assert "Live ROS graph" in render(report(velocity(), two_nodes()), verbose=True)
 
 
 def test_a_place_without_a_line_is_a_file() -> None:

@@ -138,6 +138,29 @@ def test_the_nearest_misspelling_comes_first(work: Path, into: Path) -> None:
     assert len(similar) == 3
 
 
+@pytest.mark.parametrize(
+    ("files", "candidates", "likely"),
+    [
+        ({"notes.py": "", "velocity_pub.py": "import rclpy\n"}, ("velocity_pub.py", "notes.py"), True),
+        (
+            {"a.py": "import rclpy\n", "z.py": "import rclpy\nclass VelocityPublisher(Node): ..."},
+            ("z.py", "a.py"),
+            True,
+        ),
+        ({"main.py": "import rclpy\n", "setup.py": "velocity_publisher", "README.md": ""}, ("main.py",), False),
+        ({"odom_subscriber.py": "", "x.py": ""}, ("x.py",), False),
+    ],
+)
+def test_other_files_are_named_for_a_missing_one(
+    work: Path, into: Path, files: dict[str, str], candidates: tuple[str, ...], likely: bool
+) -> None:
+    """Likeliest first, by their name and by what they define; none that belongs to an exercise or a package."""
+    for name, text in files.items():
+        put(work, name, text)
+    file = stage_submission(str(work), WANTED, into).files["velocity_publisher.py"]
+    assert (file.found, file.candidates, file.likely) == (None, candidates, likely)
+
+
 def test_one_file_counts_as_a_folder_that_holds_only_it(work: Path, tmp_path: Path, into: Path) -> None:
     """A single file is found, and has the digest of a folder with the same content."""
     file = put(work, "odom_subscriber.py", "import rclpy\n")

@@ -169,8 +169,8 @@ class ThresholdResponse:
         unit = unit_of(self.input)
         wanted = number(self._expected(first.held.value))
         found = "no answer" if first.got is None else number(first.got)
-        reason = f"{moment(first.t_ns)}, {self.output}: {found} for {number(first.held.value)}{unit} on {self.input}, "
-        reason += f"expected {wanted}"
+        brief = f"{self.output}: {found} for {number(first.held.value)}{unit} on {self.input}, expected {wanted}"
+        reason = f"{moment(first.t_ns)}, {brief}"
         fault = first_fault(trace)
         if fault is not None and first.got is None:
             return faulted(fault, reason, evidence, last=True)
@@ -178,15 +178,16 @@ class ThresholdResponse:
         if len(both) > 1:
             cause = f"; {' and '.join(map(number, sorted(both)))} are published at one instant"
             hint = f"publish one answer to each number on {self.input}"
-            return not_met(reason + cause, evidence, hint=hint, problem=ProblemKind.CONTRADICTION)
+            return not_met(reason + cause, evidence, hint=hint, problem=ProblemKind.CONTRADICTION, brief=brief)
         lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
         if lag is not None:
             reason += f"; the answers are right for what was published {span(lag)} before"
             hint = f"answer what has just come on {self.input}"
-            return not_met(reason, evidence | {"lag_s": seconds(lag)}, hint=hint, problem=ProblemKind.BEHIND)
+            known = evidence | {"lag_s": seconds(lag)}
+            return not_met(reason, known, hint=hint, problem=ProblemKind.BEHIND, brief=brief)
         cause, hint = self._diagnosis(violations, inputs, answers)
         kind = ProblemKind.NO_ANSWER if first.got is None else ProblemKind.WRONG_ANSWER
-        return not_met(reason + cause, evidence, hint=hint, problem=kind)
+        return not_met(reason + cause, evidence, hint=hint, problem=kind, brief=brief)
 
     def _diagnosis(
         self, violations: Sequence[_Violation], inputs: Sequence[Held], answers: Sequence[Reading]

@@ -62,9 +62,8 @@ class FieldEqual:
         clause = breach(wrong[0].value, path, as_rule(self.fields[path], self.tolerance))
         reason = f"{moment(wrong[0].t_ns)}, {self.topic}: {clause}; wrong in {len(wrong)} of "
         reason += counted(len(messages), "message")
-        return not_met(
-            reason, evidence | {"field": path, "first_wrong_s": seconds(wrong[0].t_ns)}, problem=ProblemKind.WRONG_VALUE
-        )
+        known = evidence | {"field": path, "first_wrong_s": seconds(wrong[0].t_ns)}
+        return not_met(reason, known, problem=ProblemKind.WRONG_VALUE, brief=f"{self.topic}: {clause}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,9 +270,10 @@ class FieldFunction:
         reason += f"wrong in {len(wrong)} of {counted(len(samples), 'message')}"
         instead = followed_instead(wanted, samples, self.tolerance)
         reason += f"; {instead.said}" if instead.said else ""
+        brief = f"{self.topic}: {self.field} is {number(first.value)}, expected {self.formula} = {expected}"
         kind = ProblemKind.WRONG_VALUE if instead.start is None else ProblemKind.COUNT_START
-        problem = Problem(kind, start=instead.start)
-        return not_met(reason, evidence | {"first_wrong_s": seconds(t_ns)}, hint=instead.hint, problem=problem)
+        problem, known = Problem(kind, start=instead.start), evidence | {"first_wrong_s": seconds(t_ns)}
+        return not_met(reason, known, hint=instead.hint, problem=problem, brief=brief)
 
 
 #: Rounding to single precision must not push a value out of its range.

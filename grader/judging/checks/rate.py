@@ -119,9 +119,8 @@ class TopicRate:
             return None
         reason = f"{self.topic}: {found.sentence()}; {rate_hz:.3f} Hz from {moment(later[0])} on; "
         reason += f"{self._wanted} to the end"
-        return not_met(
-            reason, evidence | {"later_rate_hz": rate_hz}, hint=self._hint(rate_hz), problem=ProblemKind.RATE_CHANGES
-        )
+        known, brief = evidence | {"later_rate_hz": rate_hz}, self._brief(rate_hz, f" from {moment(later[0])} on")
+        return not_met(reason, known, hint=self._hint(rate_hz), problem=ProblemKind.RATE_CHANGES, brief=brief)
 
     def _evidence(self, found: _Measured) -> dict[str, object]:
         return {
@@ -141,10 +140,15 @@ class TopicRate:
         reason = f"{self.topic}: {found.sentence()}; {self._wanted}"
         if within(found.rate_hz, self.rate, self.tolerance):
             return met(reason, evidence)
-        problem = ProblemKind.WRONG_RATE
+        hint, problem, brief = self._hint(found.rate_hz), ProblemKind.WRONG_RATE, self._brief(found.rate_hz)
         if self.partly_tolerance is not None and within(found.rate_hz, self.rate, self.partly_tolerance):
-            return partly(reason, evidence, hint=self._hint(found.rate_hz), problem=problem)
-        return not_met(reason, evidence, hint=self._hint(found.rate_hz), problem=problem)
+            return partly(reason, evidence, hint=hint, problem=problem, brief=brief)
+        return not_met(reason, evidence, hint=hint, problem=problem, brief=brief)
+
+    def _brief(self, rate_hz: float, when: str = "") -> str:
+        """Return the rate in a few words, with as many decimals as show that it is wrong."""
+        digits = next((n for n in (1, 2) if not within(round(rate_hz, n), self.rate, self.tolerance)), 3)
+        return f"{self.topic}: {rate_hz:.{digits}f} Hz{when}, {self._wanted}"
 
     def _flaw(self, trace: Trace, found: _Measured, evidence: dict[str, object]) -> Finding | None:
         """Return why the average of a window is not meaningful, or None if it is."""
@@ -152,14 +156,16 @@ class TopicRate:
         seen = f"{self.topic}: {found.sentence()}"
         if not found.steady:
             hint = f"publish one message every {self._period_s} s rather than several at once"
-            problem = ProblemKind.BURSTS
-            return not_met(f"{seen}; the messages come in bursts; {self._wanted}", evidence, hint=hint, problem=problem)
+            reason, problem = f"{seen}; the messages come in bursts; {self._wanted}", ProblemKind.BURSTS
+            brief = f"{self.topic}: the messages come in bursts, {self._wanted}"
+            return not_met(reason, evidence, hint=hint, problem=problem, brief=brief)
         silence = found.stop_ns - last
         if silence > max(2 * self._period_ns, 2 * found.average_ns) + _END_SLACK_NS[trace.clock]:
             ended, fault = _ending(trace, first, last)
             hint = fault_hint(fault) if fault else ""
             reason, problem = f"{seen}; {ended}; {self._wanted}", ProblemKind.STOPPED
-            return not_met(reason, evidence, hint=hint, fault=fault, problem=problem)
+            brief = "" if fault else f"{self.topic}: the messages {ended}, {self._wanted}"
+            return not_met(reason, evidence, hint=hint, fault=fault, problem=problem, brief=brief)
         length = found.stop_ns - first
         if self.window is not None and length < self.window - self._period_ns - _END_SLACK_NS[trace.clock]:
             observed = f"only {span(length)} could be observed, the first message came at {moment(first)}"
@@ -168,7 +174,8 @@ class TopicRate:
             off = fault is None and not within(found.rate_hz, self.rate, self.tolerance)
             hint = self._hint(found.rate_hz) if off else ""
             reason, problem = f"{seen}; {observed}; {self._wanted}", ProblemKind.TOO_LATE
-            return not_met(reason, evidence, hint=hint, fault=fault, problem=problem)
+            brief = "" if fault else f"{self.topic}: the first message came at {moment(first)}"
+            return not_met(reason, evidence, hint=hint, fault=fault, problem=problem, brief=brief)
         return None
 
     def _too_few(self, trace: Trace, times: tuple[int, ...]) -> Finding:

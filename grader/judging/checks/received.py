@@ -200,7 +200,8 @@ class LogsValues:
         reason += f"rightly, the first at {moment(first.t_ns)}: expected {wanted}, {wrote}"
         cause, hint = self._cause(received, unlogged, outputs)
         problem = ProblemKind.WRONG_VALUE if found else ProblemKind.NOT_LOGGED
-        return not_met(f"{reason}; {cause}" if cause else reason, evidence, hint=hint, problem=problem)
+        brief = f"{self.topic}: expected a log of {wanted}, {wrote}"
+        return not_met(f"{reason}; {cause}" if cause else reason, evidence, hint=hint, problem=problem, brief=brief)
 
     def _cause(
         self, received: Sequence[_Received], unlogged: Sequence[_Received], outputs: Sequence[Output]
@@ -325,7 +326,8 @@ class LogsReceived:
                 "; the subscription asks for transient_local durability, which a volatile publisher does not offer"
             )
         hint = "log msg.data in the callback of the subscription to " + self.topic
-        return not_met(reason, evidence, hint=hint, problem=ProblemKind.NOT_LOGGED)
+        brief = f"{self.topic}: {number(first.value)} is never logged"
+        return not_met(reason, evidence, hint=hint, problem=ProblemKind.NOT_LOGGED, brief=brief)
 
     def chart(self, trace: Trace) -> Chart | None:
         """Return the numbers published to a node and what it wrote meanwhile, or None without numbers."""

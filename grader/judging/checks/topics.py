@@ -159,7 +159,8 @@ class FieldValues:
         wanted = ", ".join(number(self.values[p]) for p in fields)
         share = f"in all {total} messages" if len(wrong) == total else f"in {len(wrong)} of {total} messages"
         reason = f"{where}: {found}, expected {wanted}; wrong {'in the only message' if total == 1 else share}"
-        return not_met(reason, evidence, hint=self._hint(first), problem=ProblemKind.WRONG_VALUE)
+        brief = f"{self.topic}: {found}, expected {wanted}"
+        return not_met(reason, evidence, hint=self._hint(first), problem=ProblemKind.WRONG_VALUE, brief=brief)
 
     def _hint(self, message: Message) -> str:
         """Return the very likely slip in a message: field, sign or unit; empty if there is none."""
