@@ -9,7 +9,7 @@ from pathlib import Path
 
 from grader.classroom.class_page import RunOfClass, class_page
 from grader.classroom.gradebook import Gradebook, Row, Status, number, remarks, render_gradebook
-from grader.classroom.platforms import Export, export_canvas, export_gradescope, export_moodle
+from grader.classroom.platforms import Export, export_canvas, export_gradescope, export_moodle, feedback
 from grader.classroom.roster import Table, read_table
 from grader.core.report import JsonObject
 from grader.reporting.class_page.contents import PageLink
@@ -112,7 +112,7 @@ def render_summary(graded: Graded) -> str:
 def summary_json(graded: Graded) -> str:
     """Render the class as JSON."""
     book = graded.book
-    matching = book.matching
+    matching, to_export = book.matching, book.to_export
     return json_text(
         {
             "schema": SCHEMA,
@@ -120,7 +120,7 @@ def summary_json(graded: Graded) -> str:
             "done_before": graded.kept_before,
             "not_replaced": list(graded.not_replaced),
             "counts": {status.value: book.count(status) for status in Status},
-            "students": [_row(row) for row in book.rows],
+            "students": [_row(row, exported=any(row is each for each in to_export)) for row in book.rows],
             "unmatched": list(matching.unmatched),
             "ambiguous": list(matching.ambiguous),
             "duplicates": [list(names) for names in matching.duplicates],
@@ -133,7 +133,7 @@ def summary_json(graded: Graded) -> str:
     )
 
 
-def _row(row: Row) -> JsonObject:
+def _row(row: Row, *, exported: bool) -> JsonObject:
     person, adjusted = row.person, row.adjusted
     return {
         "name": row.name or None,
@@ -150,6 +150,9 @@ def _row(row: Row) -> JsonObject:
         "problem": json_value(row.problem) or None,
         "remarks": json_value(remarks(row)),
         "outdated": row.outdated,
+        "exported": exported,
+        "platform_ids": {} if person is None else json_value(person.platform_ids),
+        "feedback": json_value(feedback(row)) if exported else None,
     }
 
 

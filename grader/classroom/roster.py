@@ -47,7 +47,14 @@ class Person:
     handles: frozenset[str] = frozenset()  # all ids that are unique to this person, normalised by `fold_handle`
     names: frozenset[str] = frozenset()  # spellings of the name, without spaces and accents
     row: Mapping[str, str] | None = None  # column -> value on the roster; None for a person who is not on a roster
+    canvas: str = ""  # number of the account in Canvas; empty if the roster has none
     surname: str = ""  # as the roster has it; empty if it does not tell the surname
+
+    @property
+    def platform_ids(self) -> dict[str, str]:
+        """The ids that platforms know the person by, without empty ones, the most reliable first."""
+        ids = {"canvas": self.canvas, "id": self.id, "email": self.email, "username": self.user}
+        return {kind: value for kind, value in ids.items() if value}
 
     @property
     def sort_key(self) -> tuple[str, str]:
@@ -153,8 +160,9 @@ def person_of(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> P
         user=value("user"),
         email=value("email"),
         id=value("id"),
+        canvas=value("canvas"),
         handles=frozenset(map(fold_handle, [*exact, *numbers])),
-        names=frozenset(_spellings(name)),
+        names=frozenset(spellings(name)),
         row=row,
     )
 
@@ -164,7 +172,7 @@ def _in_reading_order(name: str) -> str:
     return f"{first.strip()} {last.strip()}" if comma else name
 
 
-def _spellings(name: str) -> Iterator[str]:
+def spellings(name: str) -> Iterator[str]:
     """Yield all rotations of a name's words, because platforms order first and last names differently."""
     words = name.split()
     for cut in range(len(words)):

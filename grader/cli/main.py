@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import grader
-from grader.cli import batch, export, rejudge, rubric
+from grader.cli import batch, export, rejudge, rubric, upload
 from grader.cli.options import (
     EVIDENCE,
     PATH,
@@ -276,6 +276,7 @@ _grade.context_settings = app.context_settings
 app.add_command(_observe)
 app.add_command(rejudge.command)
 app.add_command(batch.command)
+app.add_command(upload.command)
 app.add_command(_explain)
 app.add_command(_doctor)
 app.add_command(export.command)
