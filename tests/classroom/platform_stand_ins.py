@@ -110,7 +110,7 @@ class CanvasHandler(_Handler):
         host, path = self.headers["Host"], urlsplit(self.path).path
         following = "&".join(f"{k}={v}" for k, values in query.items() if k != "page" for v in values)
         link = {"Link": f'<http://{host}{path}?{following}&page={number + 1}>; rel="next"'} if more else {}
-        self.answer(entries[(number - 1) * PAGE : number * PAGE], **link)
+        self.answer(entries[(number - 1) * PAGE : number * PAGE], 200, **link)
 
     def user(self, number: int) -> dict[str, Any]:
         person = self.course.people[number]
