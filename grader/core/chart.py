@@ -121,7 +121,41 @@ class GraphFigure:
     stages: tuple[Stage, ...]
 
 
-Figure = Chart | GraphFigure
+@dataclass(frozen=True, slots=True)
+class Column:
+    """The values of one field of a topic."""
+
+    name: str  # path of the field, dotted
+    values: tuple[float | str, ...]  # one for each time of its topic; a single one if it never changes
+
+
+@dataclass(frozen=True, slots=True)
+class TopicValues:
+    """What one side published on a topic, thinned for showing."""
+
+    topic: str
+    type: str
+    sender: str  # `student` or `grader`
+    messages: int  # how many there were before thinning
+    times_s: tuple[float, ...]  # when each of the kept ones was published, in seconds
+    columns: tuple[Column, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Playback:
+    """A recording that can be played: what was published, logged and connected at each moment."""
+
+    id: str
+    title: str
+    about: str
+    criteria: tuple[str, ...]
+    timeline: Chart  # what was logged, printed and called, and faults
+    topics: tuple[TopicValues, ...]
+    # The graph from each moment on, in seconds, without topics that every node has
+    graphs: tuple[tuple[float, GraphSnapshot], ...]
+
+
+Figure = Chart | GraphFigure | Playback
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Makes the figures of an exercise: charts of its checks, the graph, timelines, and lines of the source."""
+"""Makes the figures of an exercise: charts of its checks, the graph, recordings to play, and lines of the source."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from grader.core.chart import (
     Look,
     Moment,
     Panel,
+    Playback,
     Point,
     Series,
     Stage,
@@ -27,6 +28,7 @@ from grader.core.submission import Submission
 from grader.core.trace import GraphSnapshot, LogRecord, OutputLine, Request, Response, Trace
 from grader.judging.findings import fault_sentence
 from grader.judging.output import printed_lines
+from grader.judging.recorded_values import recorded_values
 from grader.judging.texts import clean
 from grader.judging.values import Reading, on_student_topic
 from grader.judging.wording import counted, number, quote, unit_of
@@ -61,14 +63,14 @@ def expectation(check: Check) -> str:
 
 
 def figures_of(exercise: Exercise, traces: Mapping[str, Trace]) -> tuple[Figure, ...]:
-    """Return the charts of an exercise in rubric order, then the graph, then a timeline of each scenario."""
+    """Return the charts of an exercise in rubric order, the graph if a criterion shows it, then each recording."""
     drawn = [chart for c in exercise.criteria for chart in _drawn(c, traces)]
     figures: list[Figure] = list(_merged(drawn))
     graph = graph_figure(exercise, traces)
-    if graph is not None:
-        graphs = tuple(c.id for c in exercise.criteria if getattr(c.check, "shows_graph", False))
+    graphs = tuple(c.id for c in exercise.criteria if getattr(c.check, "shows_graph", False))
+    if graph is not None and graphs:
         figures.append(replace(graph, criteria=graphs))
-    figures += _timelines(exercise, traces)
+    figures += _playbacks(exercise, traces)
     return tuple(replace(f, id=f"{exercise.id}-{number}") for number, f in enumerate(figures, 1))
 
 
@@ -93,14 +95,39 @@ def _merged(charts: Iterable[Chart]) -> Iterable[Chart]:
     return merged.values()
 
 
-def _timelines(exercise: Exercise, traces: Mapping[str, Trace]) -> Sequence[Chart]:
+def _playbacks(exercise: Exercise, traces: Mapping[str, Trace]) -> Iterable[Playback]:
     recorded = [s for s in exercise.scenarios if s.id in traces]
-    charts = []
     for scenario in recorded:
-        chart = timeline_chart(traces[scenario.id], scenario.processes)
-        title = f"{chart.title}: {scenario.id.replace('_', ' ')}" if len(recorded) > 1 else chart.title
-        charts.append(replace(chart, title=title, scenario=scenario.id))
-    return charts
+        trace = traces[scenario.id]
+        timeline = replace(timeline_chart(trace, scenario.processes), scenario=scenario.id)
+        graphs = _changes(trace)
+        connected = f" {_said(graphs[-1][1])}." if graphs and graphs[-1][1].nodes else ""
+        title = f"The run: {scenario.id.replace('_', ' ')}" if len(recorded) > 1 else "The run"
+        yield Playback(
+            id="run",
+            title=title,
+            about=f"{timeline.about}{connected}",
+            criteria=(),
+            timeline=timeline,
+            topics=recorded_values(trace),
+            graphs=graphs,
+        )
+
+
+#: Maximum number of changes of the graph that can be played.
+_MOST_CHANGES = 40
+
+
+def _changes(trace: Trace) -> tuple[tuple[float, GraphSnapshot], ...]:
+    """Return the student's own graph from each moment at which it changed, in seconds."""
+    last: dict[float, GraphSnapshot] = {}
+    for graph in trace.graphs():
+        if graph.t_ns <= trace.stop_ns:
+            last[seconds(graph.t_ns)] = _own(graph)
+    times = list(last)
+    changed = [t for k, t in enumerate(times) if k == 0 or last[t] != last[times[k - 1]]]
+    stride = -(-len(changed) // _MOST_CHANGES) or 1
+    return tuple((t, last[t]) for t in dict.fromkeys((*changed[::stride], *changed[-1:])))
 
 
 #: Lines shown before and after the referenced one.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import graded
 import pytest
 
+from grader.core.chart import Playback
 from grader.reporting.html.assets import bundle
 from grader.reporting.html.render import render_html
 
@@ -60,8 +62,7 @@ def visit(browser: Browser, tmp_path: Path) -> Iterator[Open]:
 def unfold(page: Page) -> None:
     """Unfold everything, and wait until the charts inside are drawn."""
     page.evaluate("document.querySelectorAll('details:not(.table)').forEach((details) => { details.open = true; })")
-    drawn = "[...document.querySelectorAll('[data-figure] .drawing')].every((drawing) => drawing.querySelector('svg'))"
-    page.wait_for_function(drawn)
+    page.locator("[data-figure] .drawing:not(:has(svg))").first.wait_for(state="detached")
 
 
 def drawings(page: Page) -> list[tuple[str, bool]]:
@@ -150,7 +151,7 @@ def test_a_pointer_over_a_timeline_is_told_what_was_logged(visit: Open) -> None:
     """The text of the record, as it was written."""
     page, said, _ = visit(render_html(graded.perfect()))
     unfold(page)
-    chart = page.locator("#odom_subscriber figure").last.locator(".drawing")
+    chart = page.locator("#odom_subscriber .recording figure > .drawing")
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
     assert box is not None
@@ -250,7 +251,7 @@ def test_the_graph_lights_up_and_grows(visit: Open) -> None:
     """Hovering or focusing a node shows what it is connected to; the buttons enlarge the drawing."""
     page, said, _ = visit(render_html(graded.perfect()))
     unfold(page)
-    figure = page.locator("[data-figure]", has=page.locator(".stages")).last
+    figure = page.locator("[data-figure]", has=page.locator(".stages"))
     node = figure.locator("[data-box]").first
     node.focus()
     assert figure.locator(".edge.lit").count() > 0
@@ -353,6 +354,90 @@ def test_every_series_of_a_chart_has_a_look_of_its_own(visit: Open) -> None:
     expected = [look for entries in legends for look, name in entries if "points" in name or name == "expected"]
     assert len(expected) > 3
     assert all("--c-faint" in look for look in expected)
+
+
+def moment_of(page: Page, exercise: str) -> dict[str, Any]:
+    """Return what the player of an exercise's first recording shows."""
+    shown: dict[str, Any] = page.evaluate(
+        """(id) => {
+            const player = document.querySelector(`#${id} .recording figure`);
+            const robot = player.querySelector(".robot");
+            const at = (name) => player.querySelector(`.moment .${name}`);
+            return {
+                time: Number(player.querySelector("input").value),
+                button: player.querySelector("button").textContent,
+                log: [...at("log").querySelectorAll("li:not([hidden])")].map((line) => line.innerText),
+                values: at("values").innerText,
+                absent: [...at("live").querySelectorAll(".absent[data-box]")].length,
+                robot: robot && !robot.hidden && [robot.style.left, robot.style.top, robot.style.transform],
+                heads: [...document.querySelectorAll(`#${id} .playhead`)].filter((head) => !head.hidden).length,
+            };
+        }""",
+        exercise,
+    )
+    return shown
+
+
+def scrub(page: Page, exercise: str, time_s: float) -> dict[str, Any]:
+    """Move the slider of an exercise's first recording."""
+    slider = page.locator(f"#{exercise} .recording input").first
+    slider.evaluate("(e, t) => { e.value = t; e.dispatchEvent(new Event('input')); }", time_s)
+    return moment_of(page, exercise)
+
+
+def test_a_slider_shows_each_moment_of_the_run(visit: Open) -> None:
+    """Robot, values, log and graph as they were then; charts of the run show where that is."""
+    page, said, _ = visit(render_html(graded.perfect()))
+    unfold(page)
+    before, early, late = (scrub(page, "odom_subscriber", t) for t in (2.0, 8.0, 20.0))
+    assert before["robot"] is False
+    assert before["log"] == []
+    assert "nothing yet" in before["values"]
+    assert early["robot"] != late["robot"]
+    assert 0 < len(early["log"]) < len(late["log"])
+    assert early["log"] == late["log"][: len(early["log"])]
+    assert "pose.pose.position.x" in late["values"]
+    assert early["values"] != late["values"]
+    assert late["heads"] == 2
+    assert said == []
+
+
+def test_a_run_plays_until_it_is_paused_and_from_the_start_after_its_end(visit: Open) -> None:
+    """With the pointer, and with the space bar on the slider; arrow keys move it."""
+    page, said, _ = visit(render_html(graded.perfect()))
+    unfold(page)
+    run = page.locator("#odom_subscriber .recording")
+    assert moment_of(page, "odom_subscriber")["time"] == pytest.approx(24, abs=0.1)
+    run.get_by_label("Speed").select_option("5")
+    run.get_by_role("button", name="Play").click()
+    run.locator(".log li:not([hidden])").first.wait_for()
+    run.get_by_role("button", name="Pause").click()
+    paused = moment_of(page, "odom_subscriber")
+    assert 0 < paused["time"] < 24
+    assert len(paused["log"]) > 0
+    slider = run.get_by_label("Time in the run")
+    slider.focus()
+    page.keyboard.press("ArrowRight")
+    assert moment_of(page, "odom_subscriber")["time"] > paused["time"]
+    assert "seconds" in (slider.get_attribute("aria-valuetext") or "")
+    page.keyboard.press(" ")
+    run.get_by_role("button", name="Play").wait_for()
+    assert moment_of(page, "odom_subscriber")["time"] == pytest.approx(24, abs=0.1)
+    assert said == []
+
+
+def test_the_graph_of_a_moment_lacks_what_came_later(visit: Open) -> None:
+    """A publisher that appears after four seconds is faint until then."""
+    report = graded.perfect()
+    exercise = report.exercises[0]
+    played = next(f for f in exercise.figures if isinstance(f, Playback))
+    (_, graph), *_ = played.graphs
+    grown = replace(played, graphs=((0.0, replace(graph, endpoints=())), (4.0, graph)))
+    figures = tuple(grown if f is played else f for f in exercise.figures)
+    page, said, _ = visit(render_html(replace(report, exercises=(replace(exercise, figures=figures),))))
+    unfold(page)
+    assert [scrub(page, exercise.id, t)["absent"] for t in (3.9, 4.1)] == [1, 0]
+    assert said == []
 
 
 PAGES = re.compile(rb"/Type\s*/Page[^s]")

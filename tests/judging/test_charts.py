@@ -21,7 +21,7 @@ from tracing import (
     velocity,
 )
 
-from grader.core.chart import Chart, GraphFigure, Look, Tone
+from grader.core.chart import Chart, Figure, GraphFigure, Look, Playback, Tone
 from grader.core.exercise import Exercise
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import FaultKind, Mark, Request, Response, Trace
@@ -29,6 +29,7 @@ from grader.judging.charts import MOST_POINTS, MOST_TEXTS, expectation, figures_
 from grader.judging.checks import CHECKS
 from grader.judging.checks.rate import TopicRate
 from grader.judging.judge_run import judge_exercise
+from grader.judging.recorded_values import MOST_SAMPLES, recorded_values
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 
@@ -41,8 +42,10 @@ def submission_of(exercise: Exercise, tmp_path: Path) -> Submission:
     return Submission("ada", "./ada", tmp_path, "sha256:" + "0" * 64, files)
 
 
-def titled(figures: Iterable[Chart | GraphFigure], start: str) -> Chart:
-    return next(f for f in figures if isinstance(f, Chart) and f.title.startswith(start))
+def titled(figures: Iterable[Figure], start: str) -> Chart:
+    """Return the first chart whose title begins like this; timelines are those of recordings."""
+    charts = [f.timeline if isinstance(f, Playback) else f for f in figures]
+    return next(f for f in charts if isinstance(f, Chart) and f.title.startswith(start))
 
 
 def test_a_rate_is_drawn_with_its_bands_and_its_intervals() -> None:
@@ -187,7 +190,10 @@ def test_a_flood_becomes_a_picture_of_bounded_size() -> None:
     for k in range(20_000):
         rec.message(k / 2000, "/cmd_vel", twist((k % 7, 0, 0)), TWIST).log(k / 2000, "x" * 1000)
     figures = figures_of(ONE, {"alone": rec.trace()})
-    series = [s for f in figures if not isinstance(f, GraphFigure) for p in f.panels for s in p.series]
+    charts = [f for f in figures if isinstance(f, Chart)] + [titled(figures, "Logs")]
+    series = [s for chart in charts for panel in chart.panels for s in panel.series]
+    (values,) = next(f for f in figures if isinstance(f, Playback)).topics
+    assert (values.messages, len(values.times_s)) == (20_000, MOST_SAMPLES)
     assert max(len(s.points) for s in series) <= MOST_POINTS + 2
     assert max(len(s.texts) for s in series) <= MOST_TEXTS + 2
     assert max(len(text) for s in series for text in s.texts) <= 200
@@ -230,13 +236,13 @@ def test_a_picture_that_fails_costs_only_itself(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(CHECKS["topic_rate"], "chart", broken)
     titles = [f.title for f in figures_of(ONE, {"alone": velocity().trace()})]
     assert not any(t.startswith("How often") for t in titles)
-    assert len(titles) == 4
+    assert len(titles) == 3
 
 
 def test_figure_ids_are_unique_and_of_their_exercise() -> None:
     """A page with several exercises can link to each."""
     ids = [f.id for f in figures_of(ONE, {"alone": velocity().trace()})]
-    assert ids == [f"velocity_publisher-{number}" for number in range(1, 6)]
+    assert ids == [f"velocity_publisher-{number}" for number in range(1, 5)]
 
 
 def test_every_check_says_what_it_expects() -> None:
@@ -273,6 +279,41 @@ def test_a_line_that_the_source_does_not_have_is_not_shown(line: int, tmp_path: 
     source = {"velocity_publisher.py": "one\ntwo\n"}
     report = illustrated(judge_exercise(ONE, traces, submission, source), ONE, traces, submission, source)
     assert report.excerpts == ()
+
+
+def test_a_recording_holds_the_values_of_every_topic() -> None:
+    """Who published, when, and each field; what never changes is there once, and what is always 0 is left out."""
+    trace = position_logs(lambda x, y: f"x={x:.3f} y={y:.3f}").trace("waiting_then_driving")
+    (odometry,) = recorded_values(trace)
+    assert (odometry.topic, odometry.type, odometry.sender) == ("/odom", "nav_msgs/msg/Odometry", "grader")
+    assert odometry.messages > len(odometry.times_s) > MOST_SAMPLES / 3
+    assert odometry.times_s == tuple(sorted(odometry.times_s))
+    columns = {column.name: column.values for column in odometry.columns}
+    assert len(columns["pose.pose.position.x"]) == len(odometry.times_s) <= MOST_SAMPLES
+    assert not any(name.startswith("header") or "covariance" in name for name in columns)
+    assert all(values != (0.0,) for values in columns.values())
+    (twist_,) = recorded_values(velocity().trace())
+    assert {c.name: c.values for c in twist_.columns}["linear.x"] == (0.5,)
+
+
+def test_elements_of_short_lists_and_texts_are_values() -> None:
+    """Joint positions and names are what people look for; a scan is too long."""
+    value = {"name": ["a"], "position": [0.5, float("nan")], "on": True, "ranges": [1.0] * 360, "header": {"x": 1}}
+    (topic,) = recorded_values(Recording(10).message(1, "/joints", value, "sensor_msgs/msg/JointState").trace())
+    assert [c.name for c in topic.columns] == ["name.0", "position.0", "position.1", "on"]
+    assert [c.values[0] for c in topic.columns[:2]] == ["a", 0.5]
+    assert topic.columns[3].values == ("True",)
+
+
+def test_a_recording_holds_every_change_of_the_graph() -> None:
+    """Without the topics that every node has; what changes nothing of the student's is no change."""
+    rec = Recording(10).endpoint("publisher", "/rosout", "rcl_interfaces/msg/Log", "/node")
+    rec.endpoint("publisher", "/cmd_vel", TWIST, "/node")
+    first = replace(rec.trace().graphs()[-1], t_ns=0)
+    later = replace(first, t_ns=3 * 10**9, endpoints=())
+    trace = replace(rec.trace(), observations=(first, replace(first, t_ns=10**9), later))
+    (played,) = [f for f in figures_of(ONE, {"alone": trace}) if isinstance(f, Playback)]
+    assert [(t, [e.topic for e in graph.endpoints]) for t, graph in played.graphs] == [(0.0, ["/cmd_vel"]), (3.0, [])]
 
 
 def test_driving_alone_has_no_dots() -> None:

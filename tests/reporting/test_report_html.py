@@ -26,7 +26,18 @@ from report_samples import (
     velocity,
 )
 
-from grader.core.chart import Chart, Excerpt, GraphFigure, Moment, Panel, Series, Stage
+from grader.core.chart import (
+    Chart,
+    Column,
+    Excerpt,
+    GraphFigure,
+    Moment,
+    Panel,
+    Playback,
+    Series,
+    Stage,
+    TopicValues,
+)
 from grader.core.report import Report, Reproduction
 from grader.reporting.html.assets import bundle
 from grader.reporting.html.render import render_html
@@ -99,6 +110,9 @@ def pictured(text: str = "fine") -> Report:
     ends = tuple(replace(e, node=text, topic=f"/{text}", type=text) for e in both_ways().endpoints[:1])
     graph = replace(both_ways(), nodes=(text,), endpoints=ends)
     drawn = GraphFigure("velocity_publisher-2", text, text, ("rate",), (Stage(text, graph),))
+    topic = TopicValues(f"/{text}", text, "student", 1, (0.5,), (Column(text, (text,)),))
+    timeline = replace(chart, until_s=1.0)
+    played = Playback("velocity_publisher-3", text, text, (), timeline, (topic,), ((0.0, graph),))
     made = next(e for e in middling().exercises if e.id == "velocity_publisher")
     place = next(v.location for v in made.verdicts if v.location)
     verdicts = tuple(replace(v, reason=text, hint=text, title=text) for v in made.verdicts)
@@ -107,7 +121,7 @@ def pictured(text: str = "fine") -> Report:
         made,
         verdicts=verdicts,
         notes=(text,),
-        figures=(chart, drawn),
+        figures=(chart, drawn, played),
         excerpts=(Excerpt(text, place.line, place.line, (text,)),),
         expected={"rate": text},
         faults=tuple(replace(f, file=text, text=text, frames=(text,)) for f in crashed().exercises[0].faults),
@@ -137,6 +151,7 @@ def test_the_data_of_the_charts_survives_hostile_text(text: str) -> None:
     shown = text.replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
     assert figures["velocity_publisher-1"]["panels"][0]["series"][0]["texts"] == [shown, shown]
     assert figures["velocity_publisher-2"]["stages"][0]["nodes"][0]["name"] == shown
+    assert figures["velocity_publisher-3"]["topics"][0]["fields"] == [{"name": shown, "values": [shown]}]
 
 
 @pytest.mark.parametrize("name", SAMPLES)

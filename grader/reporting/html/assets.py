@@ -30,7 +30,7 @@ def page_environment(package: str) -> Environment:
 _LIBRARIES = "vendor/echarts/dist/echarts.common.min.js", "vendor/@dagrejs/dagre/dist/dagre.min.js"
 #: Licences of libraries whose file does not contain them; they ship together with the library.
 _LICENCES = "vendor/echarts/licenses/LICENSE-d3", "vendor/@dagrejs/dagre/LICENSE"
-_OWN = ("assets/charts.js", "assets/graphs.js", "assets/page.js")
+_OWN = ("assets/charts.js", "assets/graphs.js", "assets/player.js", "assets/page.js")
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,14 +7,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
+from typing import Any
 
 from jinja2 import Environment
 from markupsafe import Markup
 
-from grader.core.chart import Excerpt, Figure, GraphFigure, Panel, Series, Stage
+from grader.core.chart import Chart, Excerpt, Figure, GraphFigure, Panel, Playback, Series, Stage, TopicValues
 from grader.core.exercise import Location, Outcome, exercise_name
-from grader.core.report import ExerciseReport, JsonObject, Report, ReportedFault, Verdict
-from grader.core.trace import ClockKind, Endpoint
+from grader.core.report import ExerciseReport, JsonObject, JsonValue, Report, ReportedFault, Verdict
+from grader.core.trace import ClockKind, Endpoint, GraphSnapshot
 from grader.reporting import wording
 from grader.reporting.escape import script_json, shown
 from grader.reporting.html.assets import bundle, page_environment
@@ -29,6 +30,51 @@ def figure_values(figure: Figure) -> JsonObject:
     """Return a figure as JSON values; numbers that JSON cannot represent become None."""
     if isinstance(figure, GraphFigure):
         return {"kind": "graph", "title": shown(figure.title), "stages": [_stage(stage) for stage in figure.stages]}
+    if isinstance(figure, Playback):
+        return {
+            "kind": "run",
+            "timeline": _chart(figure.timeline),
+            "topics": [_topic(topic) for topic in figure.topics],
+            "graph": _living_graph(figure),
+        }
+    return _chart(figure)
+
+
+def _topic(topic: TopicValues) -> JsonObject:
+    return {
+        "name": shown(topic.topic, limit=_NAME_LIMIT),
+        "type": shown(topic.type, limit=_NAME_LIMIT),
+        "sender": topic.sender,
+        "messages": topic.messages,
+        "times": [round(t, 3) for t in topic.times_s],
+        "fields": [
+            {"name": shown(c.name, limit=_NAME_LIMIT), "values": [_value(v) for v in c.values]} for c in topic.columns
+        ],
+    }
+
+
+def _value(value: float | str) -> JsonValue:
+    return shown(value, limit=_NAME_LIMIT) if isinstance(value, str) else _number(value, digits=5)
+
+
+def _living_graph(figure: Playback) -> JsonObject:
+    """Return everything that was ever in the graph, each part with the indices of the moments at which it was there."""
+    graphs = [graph for _, graph in figure.graphs]
+    nodes = tuple(dict.fromkeys(node for graph in graphs for node in graph.nodes))
+    endpoints = tuple(dict.fromkeys(e for graph in graphs for e in graph.endpoints))
+    whole = _stage(Stage("", GraphSnapshot(0, nodes, endpoints)))
+    stages = [_stage(Stage("", graph)) for graph in graphs]
+    names = [{box["name"] for box in (*stage["nodes"], *stage["topics"])} for stage in stages]
+    edges = [{edge["text"] for edge in stage["edges"]} for stage in stages]
+    boxes = {
+        kind: [{**box, "alive": [k for k, some in enumerate(names) if box["name"] in some]} for box in whole[kind]]
+        for kind in ("nodes", "topics")
+    }
+    arrows = [{**e, "alive": [k for k, some in enumerate(edges) if e["text"] in some]} for e in whole["edges"]]
+    return {"title": "", "times": [round(t, 3) for t, _ in figure.graphs], **boxes, "edges": arrows}
+
+
+def _chart(figure: Chart) -> JsonObject:
     return {
         "kind": "chart",
         "title": shown(figure.title),
@@ -69,7 +115,7 @@ def _series(series: Series) -> JsonObject:
     }
 
 
-def _stage(stage: Stage) -> JsonObject:
+def _stage(stage: Stage) -> dict[str, Any]:
     """Return nodes, topics and arrows; ids tell a node from a topic of the same name."""
     endpoints = [e for e in stage.graph.endpoints if "/_" not in e.topic]
     nodes = list(dict.fromkeys((*stage.graph.nodes, *(e.node for e in endpoints))))[:_MOST_BOXES]
@@ -99,11 +145,11 @@ def _edge(endpoint: Endpoint, node: str, topic: str) -> JsonObject:
     return {"from": ends[0], "to": ends[1], "text": shown(text, limit=_TEXT_LIMIT)}
 
 
-def _number(value: float) -> float | int | None:
+def _number(value: float, digits: int = 7) -> float | int | None:
     """Return a number with as many digits as a chart shows."""
     if not math.isfinite(value):
         return None
-    short = float(f"{value:.7g}")
+    short = float(f"{value:.{digits}g}")
     return int(short) if short.is_integer() and abs(short) < 1e15 else short
 
 
@@ -140,6 +186,7 @@ def _templates() -> Environment:
         "excerpt_at": _excerpt_at,
         "excerpts_left": _excerpts_left,
         "placed_in": _placed_in,
+        "open_runs": _open_runs,
         "segments": _segments,
     }
     return templates
@@ -188,6 +235,11 @@ def _placed_in(exercise: ExerciseReport) -> _Placed:
     verdicts = sorted(exercise.verdicts, key=lambda verdict: not _open_at_first(verdict))
     homes = [next((v.id for v in verdicts if v.id in figure.criteria), "") for figure in exercise.figures]
     return _Placed(tuple(zip(homes, exercise.figures, strict=True)))
+
+
+def _open_runs(exercise: ExerciseReport) -> list[str]:
+    """Return the scenarios whose recording starts unfolded: those that cost points."""
+    return [exercise.situations.get(v.id, "") for v in exercise.verdicts if _open_at_first(v)]
 
 
 def _segments(verdicts: Iterable[Verdict]) -> list[tuple[float, float, str]]:

@@ -366,6 +366,8 @@ const Charts = (() => {
     });
     return {
       height: place.height,
+      top: place.rows[0].top,
+      bottom: place.rows.at(-1).top + place.rows.at(-1).height,
       known,
       option: {
         animation: false,
@@ -392,11 +394,37 @@ const Charts = (() => {
     let chart = null;
     let known = {};
     let cursor = null;
+    let area = null;
+    let moment = null;
+    let pointer = null;
+
+    // Shows a moment of the run: a line at its time, or in a path the robot with its place and heading in radians.
+    function at(place) {
+      moment = place;
+      if (!pointer && moment) {
+        pointer = element.appendChild(document.createElement("div"));
+        pointer.className = figure.square ? "robot" : "playhead";
+        chart.on("datazoom", mark);
+      }
+      mark();
+    }
+
+    function mark() {
+      if (!pointer) return;
+      const ends = moment && chart.convertToPixel({ xAxisIndex: 0, yAxisIndex: 0 }, [moment.x, moment.y || 0]);
+      pointer.hidden = !moment || ends[0] < SIDE - 1 || ends[0] > chart.getWidth() - 13;
+      if (pointer.hidden) return;
+      pointer.style.left = `${ends[0]}px`;
+      pointer.style.top = `${figure.square ? ends[1] : area.top}px`;
+      if (figure.square) pointer.style.transform = `rotate(${-moment.heading}rad)`;
+      else pointer.style.height = `${area.bottom - area.top}px`;
+    }
 
     function paint(width, how) {
       const window = chart ? shown() : { start: 0, end: 100 };
       const made = option(figure, width, window, said, how);
       known = made.known;
+      area = made;
       element.style.height = `${made.height}px`;
       const size = { width, height: made.height };
       if (chart) chart.resize(size);
@@ -412,6 +440,7 @@ const Charts = (() => {
       if (!picture) return;
       picture.setAttribute("aria-hidden", "true");
       picture.setAttribute("viewBox", `0 0 ${width} ${made.height}`);
+      mark();
     }
 
     function shown() {
@@ -461,7 +490,7 @@ const Charts = (() => {
       element.addEventListener(name, pass, { capture: true, passive: true });
     }
     paint(element.clientWidth || 640);
-    return { zoom, pan, step, hide, paint, reset: () => show(0, 100), width: () => element.clientWidth };
+    return { zoom, pan, step, hide, paint, at, square: figure.square, reset: () => show(0, 100), width: () => element.clientWidth };
   }
 
   return { draw, tones, number, withUnit, colour, SYMBOLS, BANDS, FONT, TOOLTIP };

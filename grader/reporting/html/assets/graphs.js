@@ -75,30 +75,57 @@ const Graphs = (() => {
   function drawStage(parent, stage, width, said) {
     const section = parent.appendChild(document.createElement("div"));
     section.className = "stage";
-    section.appendChild(document.createElement("h5")).textContent = stage.title;
+    if (stage.title) section.appendChild(document.createElement("h5")).textContent = stage.title;
     const canvas = section.appendChild(document.createElement("div"));
     canvas.className = "canvas";
     const graph = arranged(stage, width < NARROW);
     const size = graph.graph();
     section.style.flex = `1 1 ${Math.min(Math.ceil(size.width) + 2, width)}px`;
-    const picture = make(canvas, "svg", { viewBox: `0 0 ${size.width} ${size.height}`, role: "group", "aria-label": stage.title });
+    const picture = make(canvas, "svg", { viewBox: `0 0 ${size.width} ${size.height}`, role: "group", "aria-label": stage.title || "ROS graph" });
     const edges = graph.edges().map((key) => {
-      const { text, points: laid } = graph.edge(key);
+      const { text, alive } = stage.edges[Number(key.name)];
+      const laid = graph.edge(key).points;
       const points = touching(graph, key, laid);
       const group = make(picture, "g", { class: "edge", "data-from": key.v, "data-to": key.w });
       make(group, "title", {}, text);
       make(group, "path", { class: "arrow", d: curve(points) });
       make(group, "path", arrowHead(points));
-      return { group, text, from: key.v, to: key.w };
+      return { group, text, alive, from: key.v, to: key.w };
     });
     const groups = {};
     for (const box of [...stage.nodes, ...stage.topics]) groups[box.id] = drawBox(picture, graph.node(box.id), box);
     highlight(groups, edges, said);
-    return (scale) => {
+    const resize = (scale) => {
       const fit = Math.min(1, Math.max(canvas.clientWidth - 2, 120) / size.width);
       picture.setAttribute("width", size.width * fit * scale);
       picture.setAttribute("height", size.height * fit * scale);
     };
+    return { resize, groups, edges };
+  }
+
+  // Draws everything that is ever in the graph of a run; returns what shows only what is there at a moment.
+  function live(element, stage, said) {
+    let drawn = null;
+    function paint() {
+      element.replaceChildren();
+      drawn = drawStage(element, stage, element.clientWidth || 480, said);
+      drawn.resize(1);
+    }
+    // Moment: index of the last change of the graph. Busy: names of the topics on which something was just published.
+    function at(moment, busy) {
+      const boxes = [...stage.nodes, ...stage.topics];
+      for (const { id, name, alive } of boxes) {
+        drawn.groups[id].classList.toggle("absent", !alive.includes(moment));
+        drawn.groups[id].classList.toggle("busy", busy.has(name) && id.startsWith("t"));
+      }
+      for (const { group, alive, from, to } of drawn.edges) {
+        const topic = boxes.find((box) => box.id === (from.startsWith("t") ? from : to));
+        group.classList.toggle("absent", !alive.includes(moment));
+        group.classList.toggle("busy", busy.has(topic.name) && alive.includes(moment));
+      }
+    }
+    paint();
+    return { paint, at };
   }
 
   // Lights up what a box under the pointer or the focus is connected to.
@@ -126,7 +153,7 @@ const Graphs = (() => {
       element.replaceChildren();
       const stages = element.appendChild(document.createElement("div"));
       stages.className = "stages";
-      sizers = figure.stages.map((stage) => drawStage(stages, stage, width, said));
+      sizers = figure.stages.map((stage) => drawStage(stages, stage, width, said).resize);
       sizers.forEach((size) => size(scale));
     }
     function rescale(value) {
@@ -145,5 +172,5 @@ const Graphs = (() => {
     };
   }
 
-  return { draw };
+  return { draw, live };
 })();

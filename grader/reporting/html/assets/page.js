@@ -136,8 +136,10 @@
       if (status.textContent !== words && drawing.matches(":hover, :focus-within")) status.textContent = words;
     };
     const graph = figure.kind === "graph";
-    const picture = (graph ? Graphs : Charts).draw(drawing, figure, said, `${element.closest("section").id} ${figure.run}`);
-    if (!graph) legend(element.querySelector(".legend"), figure);
+    const chart = figure.timeline || figure;
+    const run = `${element.closest("section").id} ${chart.run}`;
+    const picture = graph ? Graphs.draw(drawing, figure, said) : Charts.draw(drawing, chart, said, run);
+    if (!graph) legend(element.querySelector(".legend"), chart);
     tools(element.querySelector(".tools"), picture, !graph && !figure.square);
     drawing.addEventListener("keydown", (event) => {
       const act = KEYS[event.key];
@@ -148,9 +150,16 @@
     const details = element.querySelector(".table");
     details.addEventListener("toggle", () => {
       const place = details.querySelector(".scroll");
-      if (details.open && !place.hasChildNodes()) fill(place, figure);
+      if (details.open && !place.hasChildNodes()) fill(place, chart);
     });
     drawn.set(element, picture);
+    picture.run = run;
+    if (figure.kind === "run") {
+      // The charts of the criteria follow the player of their run.
+      Player.open(element, figure, (moment) => {
+        for (const other of drawn.values()) if (other.run === run && other.at) other.at(other.square ? moment.pose : moment);
+      });
+    }
     watch(drawing, picture);
   }
 

@@ -1,0 +1,71 @@
+"""The values of every topic over time, thinned for showing: columns of numbers and short texts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+
+from grader.core.chart import Column, TopicValues
+from grader.core.quantities import seconds
+from grader.core.trace import Delivery, Message, Trace
+from grader.judging.texts import clean
+from grader.judging.values import HIDDEN_TOPICS, as_number
+from grader.judging.wording import quote
+
+#: Maximum number of topics, of messages of a topic, and of fields of a message that are kept.
+MOST_TOPICS, MOST_SAMPLES, MOST_FIELDS = 12, 300, 16
+#: Longer lists, such as covariances and ranges of a scan, are left out.
+_LONGEST_LIST = 6
+#: Of messages with more fields than this, those that are always 0 are left out.
+_MANY_FIELDS = 8
+_TEXT_LENGTH = 60
+#: Time and frame of a message, and the layout of an array: no values of a topic.
+_LEFT_OUT = frozenset({"header", "layout"})
+
+Value = float | str
+
+
+def recorded_values(trace: Trace) -> tuple[TopicValues, ...]:
+    """Return what was published on each topic while nodes were observed, first what the grader published."""
+    sent: dict[tuple[str, str], list[Message | Delivery]] = {}
+    published: list[Message | Delivery] = [*trace.of(Delivery), *trace.messages()]
+    for message in published:
+        if message.t_ns <= trace.stop_ns and message.topic not in HIDDEN_TOPICS:
+            sender = "grader" if isinstance(message, Delivery) else "student"
+            sent.setdefault((message.topic, sender), []).append(message)
+    return tuple(_values(topic, sender, found) for (topic, sender), found in islice(sent.items(), MOST_TOPICS))
+
+
+def _values(topic: str, sender: str, messages: Sequence[Message | Delivery]) -> TopicValues:
+    stride = -(-len(messages) // (MOST_SAMPLES - 1))
+    kept = [*messages[:-1:stride], messages[-1]]
+    rows = [dict(islice(_fields(message.value), 4 * MOST_FIELDS)) for message in kept]
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = [Column(name, _shortened([row.get(name, math.nan) for row in rows])) for name in names]
+    if len(columns) > _MANY_FIELDS:
+        columns = [column for column in columns if column.values not in ((0.0,), ("",))]
+    times = tuple(seconds(message.t_ns) for message in kept)
+    return TopicValues(topic, messages[0].type, sender, len(messages), times, tuple(columns[:MOST_FIELDS]))
+
+
+def _shortened(values: list[Value]) -> tuple[Value, ...]:
+    """Return the values, or a single one if all are equal."""
+    return (values[0],) if all(value == values[0] for value in values) else tuple(values)
+
+
+def _fields(value: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, Value]]:
+    """Yield every number and text of a message by path; elements of short lists count from 0."""
+    for name, inner in value.items():
+        path = f"{prefix}{name}"
+        if path in _LEFT_OUT:
+            continue
+        if isinstance(inner, Mapping):
+            yield from _fields(inner, f"{path}.")
+        elif isinstance(inner, (list, tuple)):
+            elements = inner if len(inner) <= _LONGEST_LIST else ()
+            yield from _fields({str(n): element for n, element in enumerate(elements)}, f"{path}.")
+        elif isinstance(inner, (bool, str)):
+            yield path, quote(clean(str(inner)), _TEXT_LENGTH)
+        elif (number := as_number(inner)) is not None:
+            yield path, number
