@@ -18,7 +18,8 @@ from pathlib import Path
 import grader
 from grader.app.seeds import read_key
 from grader.core.errors import EnvironmentFault, GraderError, RubricError
-from grader.rubrics.builtin import builtin_rubrics, require_exercises, shipped
+from grader.core.shipped import shipped
+from grader.rubrics.builtin import builtin_rubrics, require_exercises
 from grader.rubrics.loader import own_check_files, read_rubric
 from grader.rubrics.variants import First
 

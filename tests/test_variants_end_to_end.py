@@ -9,7 +9,8 @@ from click.testing import CliRunner, Result
 from report_samples import report_schema
 
 from grader.cli import main
-from grader.rubrics.builtin import builtin_rubrics, shipped
+from grader.core.shipped import shipped
+from grader.rubrics.builtin import builtin_rubrics
 
 SOLUTION = shipped("rubrics").parent / "reference_solutions" / "velocity_publisher.py"
 

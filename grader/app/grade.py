@@ -19,6 +19,7 @@ from grader.core.exercise import Exercise, exercise_name
 from grader.core.releases import TRIED
 from grader.core.report import Environment, Report
 from grader.core.scenario import OdometryStream
+from grader.core.shipped import PACKAGE
 from grader.core.submission import Run, Submission
 from grader.core.trace import Trace
 from grader.execution.bag import Odometry, read_odometry
@@ -29,7 +30,7 @@ from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
 from grader.reporting.json_report import dumps
-from grader.rubrics.builtin import PACKAGE, builtin_exercises, builtin_odometry, compiled, require_exercises
+from grader.rubrics.builtin import builtin_exercises, builtin_odometry, compiled, require_exercises
 from grader.rubrics.loader import read_rubric
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import read_reaches, read_sources

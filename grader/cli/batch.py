@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from grader.cli.completion import complete_exercise
 from grader.cli.options import (
     PATH,
     complain,
@@ -38,7 +39,14 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Submissions at a time; by default one a core.")
 @click.option("--scheduler", metavar="ADDRESS", help="Grade on the Dask cluster of this scheduler, or scheduler file.")
 @click.option("--rerun", type=click.Choice(_RERUNS), default="changed", help="What is graded again besides the new.")
-@click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
+@click.option(
+    "--exercise",
+    "exercises",
+    metavar="ID",
+    multiple=True,
+    shell_complete=complete_exercise,
+    help="Grade only this exercise; repeatable.",
+)
 @click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which a student has a file.")
 @click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw everybody's values from N.")
@@ -114,7 +122,7 @@ def command(  # noqa: PLR0913  one parameter an option
     from grader.classroom.grading import ClassRequest
     from grader.classroom.outputs import platforms, render_summary, summary_json
     from grader.classroom.watching import shown_watcher
-    from grader.rubrics.builtin import shipped
+    from grader.core.shipped import shipped
     from grader.similarity.finding import read_given
 
     if canvas_gradebook is not None and canvas is None:

@@ -6,11 +6,19 @@ from pathlib import Path
 
 import click
 
+from grader.cli.completion import complete_exercise
 from grader.cli.options import PATH, complain, print_for_programs, write_file
 from grader.core.checkup import NO_SANDBOX, TIERS
 from grader.core.errors import ALL_MET
 
-_exercises = click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this; repeatable.")
+_exercises = click.option(
+    "--exercise",
+    "exercises",
+    metavar="ID",
+    multiple=True,
+    shell_complete=complete_exercise,
+    help="Grade only this; repeatable.",
+)
 _rubrics = click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
 _tiers = click.Choice(("auto", *TIERS))
 

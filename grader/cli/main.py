@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import grader
-from grader.cli import batch, export, rejudge, rubric, upload
+from grader.cli import batch, completion, export, rejudge, rubric, upload
+from grader.cli.completion import complete_criterion, complete_exercise, complete_file, complete_output
 from grader.cli.options import (
     EVIDENCE,
     PATH,
@@ -42,6 +43,8 @@ from grader.reporting.formats import FORMATS
 if TYPE_CHECKING:
     from fractions import Fraction
 
+    from click.shell_completion import CompletionItem
+
     from grader.app.grade import EvidenceWriter
     from grader.app.request import GradeRequest
     from grader.reporting.delivery import Output
@@ -65,7 +68,15 @@ class CommandLine(click.Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Insert the default command unless the first argument is a subcommand."""
+        if ctx.resilient_parsing and not args:
+            return super().parse_args(ctx, args)  # a shell completes the first word
         return super().parse_args(ctx, args if args and args[0] in self.commands else [_DEFAULT, *args])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[Any]]:
+        """Complete the first word: what it may be for the default command, or a subcommand."""
+        with self.default.make_context(None, [], parent=ctx, resilient_parsing=True) as default:
+            first, word = (self.default if incomplete.startswith("-") else self.default.params[0]), incomplete
+            return [*first.shell_complete(default, word), *super().shell_complete(ctx, incomplete)]
 
     def invoke(self, ctx: click.Context) -> None:
         """Run the command and exit with its code; errors are printed on standard error."""
@@ -86,8 +97,15 @@ class _Default(click.Command):
 
 
 @click.command(cls=_Default, epilog=_EPILOG, hidden=True)
-@click.argument("submission")
-@click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
+@click.argument("submission", shell_complete=complete_file)
+@click.option(
+    "--exercise",
+    "exercises",
+    metavar="ID",
+    multiple=True,
+    shell_complete=complete_exercise,
+    help="Grade only this exercise; repeatable.",
+)
 @click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which there is a file.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, as a report names it.")
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key and the files handed in.")
@@ -100,6 +118,7 @@ class _Default(click.Command):
     metavar="FORMAT=PATH",
     multiple=True,
     callback=parse_outputs,
+    shell_complete=complete_output,
     help=f"Write a report ({', '.join(FORMATS)}), `-` is standard output; or keep evidence=FOLDER; repeatable.",
 )
 @click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
@@ -251,7 +270,7 @@ def _doctor(*, as_json: bool) -> int:
 
 
 @click.command(name="explain")
-@click.argument("name", metavar="CRITERION")
+@click.argument("name", metavar="CRITERION", shell_complete=complete_criterion)
 @click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Look in this rubric; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 def _explain(*, name: str, rubrics: tuple[Path, ...], as_json: bool) -> int:
@@ -279,6 +298,7 @@ app.add_command(batch.command)
 app.add_command(upload.command)
 app.add_command(_explain)
 app.add_command(_doctor)
+app.add_command(completion.command)
 app.add_command(export.command)
 app.add_command(rubric.command)
 app.add_command(rubric.selftest_command)

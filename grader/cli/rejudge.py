@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from grader.cli.completion import complete_exercise, complete_output
 from grader.cli.options import (
     EVIDENCE,
     PATH,
@@ -30,7 +31,14 @@ if TYPE_CHECKING:
 
 @click.command(name="rejudge")
 @click.argument("evidence", metavar="EVIDENCE...", nargs=-1, required=True, type=PATH)
-@click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Judge only this exercise; repeatable.")
+@click.option(
+    "--exercise",
+    "exercises",
+    metavar="ID",
+    multiple=True,
+    shell_complete=complete_exercise,
+    help="Judge only this exercise; repeatable.",
+)
 @click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 @click.option(
@@ -40,6 +48,7 @@ if TYPE_CHECKING:
     metavar="FORMAT=PATH",
     multiple=True,
     callback=parse_outputs,
+    shell_complete=complete_output,
     help=f"Write a report ({', '.join(FORMATS)}); of a class, one file a submission in the folder PATH; repeatable.",
 )
 @click.option(

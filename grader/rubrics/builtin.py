@@ -17,20 +17,14 @@ from typing import Any, TypeVar
 
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
+from grader.core.shipped import PACKAGE, shipped
 from grader.rubrics.loader import NOTES, read_rubric
 from grader.rubrics.yaml_tree import read_yaml
 from grader.submissions.collected import shown
 
-#: The package, and where Python keeps its byte code: who may write there decides what the grader executes anyway.
-PACKAGE = Path(__file__).resolve().parent.parent
+#: Where Python keeps the byte code of the package: who may write there decides what the grader executes anyway.
 COMPILED = PACKAGE / "__pycache__"
 _Value = TypeVar("_Value")
-
-
-def shipped(name: str) -> Path:
-    """Return a shipped folder: `rubrics`, `student_template` or `integrations`."""
-    inside = PACKAGE / "shipped" / name
-    return inside if inside.is_dir() else PACKAGE.parent / name
 
 
 def builtin_odometry() -> Path:

@@ -1,0 +1,13 @@
+"""Where the files are that ship with the grader: in a checkout beside the package, in a wheel inside of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parent.parent
+
+
+def shipped(name: str) -> Path:
+    """Return a shipped folder: `rubrics`, `student_template` or `integrations`."""
+    inside = PACKAGE / "shipped" / name
+    return inside if inside.is_dir() else PACKAGE.parent / name
