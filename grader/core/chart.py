@@ -166,3 +166,12 @@ class Excerpt:
     line: int  # the line of interest, from 1
     first: int  # number of the first line shown
     lines: tuple[str, ...]  # the text, student-controlled, without line ends
+
+
+@dataclass(frozen=True, slots=True)
+class SourceFile:
+    """A student's file as handed in."""
+
+    file: str  # relative to the submission
+    lines: tuple[str, ...]  # the text, student-controlled, without line ends
+    omitted: int = 0  # how many more lines it has

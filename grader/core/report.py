@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, TypeAlias
 
-from grader.core.chart import Excerpt, Figure
+from grader.core.chart import Excerpt, Figure, SourceFile
 from grader.core.checkup import Property
 from grader.core.exercise import Audience, Feedback, Location, Outcome, Problem, Variant
 from grader.core.trace import ClockKind, Endpoint, Fault, GraphSnapshot, LogRecord, Offer, OutputLine, Start
@@ -73,6 +73,7 @@ class ExerciseReport:
     graph: GraphSnapshot | None = None  # the ROS graph of the exercise, if one was recorded with all its processes
     figures: tuple[Figure, ...] = ()  # charts of what the nodes did; left out in plain-text and data formats
     excerpts: tuple[Excerpt, ...] = ()  # the source around the places that verdicts and faults name
+    sources: tuple[SourceFile, ...] = ()  # the student's files, left out in plain-text and data formats
     expected: Mapping[str, str] = field(default_factory=dict)  # criterion id -> what it requires, in one phrase
     # Criterion id -> how much of its result a student sees; not shown in reports
     feedback: Mapping[str, Feedback] = field(default_factory=dict)

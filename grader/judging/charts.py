@@ -17,6 +17,7 @@ from grader.core.chart import (
     Playback,
     Point,
     Series,
+    SourceFile,
     Stage,
     Tone,
 )
@@ -47,11 +48,13 @@ def illustrated(
     submission: Submission,
     sources: Mapping[str, str],
 ) -> ExerciseReport:
-    """Return the report with figures, lines of the source, and the expected results."""
+    """Return the report with figures, the source, the lines of it that matter, and the expected results."""
+    files = {name: submission.files[name] for name in exercise.files if name in submission.files}
     return replace(
         report,
         figures=figures_of(exercise, traces),
         excerpts=excerpts_for(report, submission, sources),
+        sources=tuple(_whole(f.found, sources[name]) for name, f in files.items() if f.found and name in sources),
         expected={c.id: phrase for c in exercise.criteria if (phrase := expectation(c.check))},
     )
 
@@ -134,6 +137,8 @@ def _changes(trace: Trace) -> tuple[tuple[float, GraphSnapshot], ...]:
 AROUND = 3
 #: Longest line shown, in characters; a source line may be a megabyte long.
 _LONGEST_LINE = 400
+#: Maximum number of lines of a file that are shown.
+_MOST_LINES = 1000
 _TAB = 4
 
 
@@ -151,8 +156,16 @@ def _excerpt(place: Location, lines: list[str]) -> Excerpt | None:
     if not 1 <= place.line <= len(lines):
         return None
     first = max(1, place.line - AROUND)
-    shown = lines[first - 1 : place.line + AROUND]
-    return Excerpt(place.file, place.line, first, tuple(line[:_LONGEST_LINE].expandtabs(_TAB) for line in shown))
+    return Excerpt(place.file, place.line, first, _showable(lines[first - 1 : place.line + AROUND]))
+
+
+def _whole(name: str, text: str) -> SourceFile:
+    lines = text.splitlines()
+    return SourceFile(name, _showable(lines[:_MOST_LINES]), max(0, len(lines) - _MOST_LINES))
+
+
+def _showable(lines: Sequence[str]) -> tuple[str, ...]:
+    return tuple(line[:_LONGEST_LINE].expandtabs(_TAB) for line in lines)
 
 
 def graph_figure(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphFigure | None:

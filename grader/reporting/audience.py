@@ -164,6 +164,7 @@ def _exercise(exercise: ExerciseReport, day: str) -> ExerciseReport:
         graph=None,
         figures=tuple(figure for figure in exercise.figures if _is_open(figure, exercise, shown)),
         excerpts=_excerpts(exercise, verdicts, faults, shown),
+        sources=(),
         expected={id_: text for id_, text in exercise.expected.items() if shown.get(id_) is Shows.ALL},
     )
 

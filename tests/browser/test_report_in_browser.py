@@ -455,7 +455,7 @@ def test_a_print_is_short_and_shows_every_criterion(visit: Open) -> None:
     )
     page.evaluate("window.dispatchEvent(new Event('afterprint'))")
     assert page.locator("details.criterion:not([open])").count() == folded
-    assert 2 <= len(PAGES.findall(page.pdf(prefer_css_page_size=True))) <= 10
+    assert 2 <= len(PAGES.findall(page.pdf(prefer_css_page_size=True))) <= 4
     assert said == []
 
 
@@ -464,6 +464,17 @@ def test_a_link_to_a_folded_criterion_unfolds_it(visit: Open) -> None:
     page, _, _ = visit(render_html(graded.perfect()))
     page.evaluate("location.hash = '#velocity_publisher-rate'")
     page.wait_for_selector("#velocity_publisher-rate[open]")
+
+
+def test_a_place_leads_to_its_line_in_the_whole_file(visit: Open) -> None:
+    """The file is folded until somebody wants to see it."""
+    page, said, _ = visit(render_html(graded.crashed()))
+    line = page.locator("#velocity_publisher .file .meant").first
+    assert not line.is_visible()
+    page.locator("#velocity_publisher details.file summary").click()
+    assert line.is_visible()
+    assert line.inner_text().startswith("6")
+    assert said == []
 
 
 def test_headings_landmarks_and_names_are_there(visit: Open) -> None:

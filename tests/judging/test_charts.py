@@ -267,6 +267,16 @@ def test_the_source_around_a_fault_is_shown(tmp_path: Path) -> None:
     (excerpt,) = report.excerpts
     assert (excerpt.file, excerpt.line, excerpt.first) == ("velocity_publisher.py", 5, 2)
     assert excerpt.lines == ("two", "three", "four", "    five", "six", "seven", "eight")
+    (whole,) = report.sources
+    assert (whole.file, whole.lines, whole.omitted) == ("velocity_publisher.py", ("one", *excerpt.lines), 0)
+
+
+def test_a_huge_file_is_cut(tmp_path: Path) -> None:
+    """A thousand lines of four hundred characters, and how many more there are."""
+    traces, submission = {"alone": velocity().trace()}, submission_of(ONE, tmp_path)
+    source = {"velocity_publisher.py": "\n".join(["x" * 1000] * 5000)}
+    (whole,) = illustrated(judge_exercise(ONE, traces, submission, source), ONE, traces, submission, source).sources
+    assert (len(whole.lines), len(whole.lines[0]), whole.omitted) == (1000, 400, 4000)
 
 
 @pytest.mark.parametrize("line", [0, -1, 9, 10**9])

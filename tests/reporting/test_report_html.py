@@ -35,6 +35,7 @@ from grader.core.chart import (
     Panel,
     Playback,
     Series,
+    SourceFile,
     Stage,
     TopicValues,
 )
@@ -123,6 +124,7 @@ def pictured(text: str = "fine") -> Report:
         notes=(text,),
         figures=(chart, drawn, played),
         excerpts=(Excerpt(text, place.line, place.line, (text,)),),
+        sources=(SourceFile(text, (text,) * place.line, 3),),
         expected={"rate": text},
         faults=tuple(replace(f, file=text, text=text, frames=(text,)) for f in crashed().exercises[0].faults),
     )
@@ -220,6 +222,22 @@ def test_a_criterion_says_what_was_expected_and_found_and_what_to_do() -> None:
     ):
         assert piece in text
     assert "self.create_timer(0.1, self.tick) (this line)" in text
+
+
+def test_the_whole_source_is_there_with_what_its_lines_cost() -> None:
+    """Folded; a line that a criterion names is marked, linked from the criterion and links to it."""
+    made = middling().exercises[0]
+    verdict = next(v for v in made.verdicts if v.location)
+    assert verdict.location is not None
+    lines = tuple(f"line {n}" for n in range(1, 41))
+    page = Page(render_html(report(replace(made, sources=(SourceFile(verdict.location.file, lines, 2),)))))
+    assert "line 40" in page.text
+    assert "and 2 more lines" in page.text
+    mark = f"{made.id}-file1-{verdict.location.line}"
+    assert ("span", "id", mark) in page.attributes
+    assert ("a", "href", f"#{mark}") in page.attributes
+    assert ("a", "href", f"#{made.id}-{verdict.id}") in page.attributes
+    assert ("details", "class", "file") in page.attributes
 
 
 def test_what_cost_points_is_unfolded_and_the_rest_is_folded() -> None:

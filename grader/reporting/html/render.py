@@ -185,8 +185,10 @@ def _templates() -> Environment:
         "percent": _percent,
         "excerpt_at": _excerpt_at,
         "excerpts_left": _excerpts_left,
+        "marked_in": _marked_in,
+        "line_id": _line_id,
         "placed_in": _placed_in,
-        "open_runs": _open_runs,
+        "open_run": _open_run,
         "segments": _segments,
     }
     return templates
@@ -205,6 +207,26 @@ def _excerpt_at(exercise: ExerciseReport, place: Location | None) -> Excerpt | N
     if place is None:
         return None
     return next((e for e in exercise.excerpts if (e.file, e.line) == (place.file, place.line)), None)
+
+
+def _marked_in(exercise: ExerciseReport, file: str) -> dict[int, list[Verdict | None]]:
+    """Return the criteria that name each line of a file; None stands for a fault that no criterion names."""
+    marked: dict[int, list[Verdict | None]] = {}
+    for verdict in exercise.verdicts:
+        if verdict.location is not None and verdict.location.file == file:
+            marked.setdefault(verdict.location.line, []).append(verdict)
+    for fault in exercise.faults:
+        if fault.file == file:
+            marked.setdefault(fault.line, [None])
+    return marked
+
+
+def _line_id(exercise: ExerciseReport, place: Location) -> str:
+    """Return the id of a line of the source; empty if the report does not have it."""
+    for number, source in enumerate(exercise.sources, 1):
+        if source.file == place.file and 1 <= place.line <= len(source.lines):
+            return f"{exercise.id}-file{number}-{place.line}"
+    return ""
 
 
 def _excerpts_left(exercise: ExerciseReport, fault: ReportedFault) -> list[Excerpt]:
@@ -237,9 +259,9 @@ def _placed_in(exercise: ExerciseReport) -> _Placed:
     return _Placed(tuple(zip(homes, exercise.figures, strict=True)))
 
 
-def _open_runs(exercise: ExerciseReport) -> list[str]:
-    """Return the scenarios whose recording starts unfolded: those that cost points."""
-    return [exercise.situations.get(v.id, "") for v in exercise.verdicts if _open_at_first(v)]
+def _open_run(exercise: ExerciseReport) -> str:
+    """Return the scenario whose recording starts unfolded: the first that cost points; empty if none did."""
+    return next((exercise.situations.get(v.id, "") for v in exercise.verdicts if _open_at_first(v)), "")
 
 
 def _segments(verdicts: Iterable[Verdict]) -> list[tuple[float, float, str]]:

@@ -109,12 +109,12 @@ const Charts = (() => {
   }
 
   // Where each panel lies, from the top; heights in pixels.
-  function places(figure, width, slider) {
+  function places(figure, width, { slider, share }) {
     const rowsAbove = momentRows(figure, extentX(figure), width).filter((row) => row !== null);
     let top = rowsAbove.length ? 6 + LABEL * (1 + Math.max(...rowsAbove)) : 0;
     const rows = figure.panels.map((panel) => {
       const lone = figure.panels.length === 1;
-      const height = panel.lanes.length ? panel.lanes.length * LANE : lone ? LONE_PANEL : PANEL;
+      const height = panel.lanes.length ? panel.lanes.length * LANE : share * (lone ? LONE_PANEL : PANEL);
       top += panel.title ? HEADER : 8;
       const place = { top, height };
       top += height + 8;
@@ -124,11 +124,11 @@ const Charts = (() => {
   }
 
   // Extents and height with which a metre is as long upwards as sideways.
-  function squared(figure, width) {
+  function squared(figure, width, share) {
     const inner = width - SIDE - 14;
     const [x, y] = [extentX(figure), extentY(figure.panels[0])];
     const [dx, dy] = [(x[1] - x[0]) * 1.12 || 1, (y[1] - y[0]) * 1.12 || 1];
-    const height = Math.round(Math.min(Math.max((inner * dy) / dx, 240), Math.max(240, Math.min(inner, 460))));
+    const height = Math.round(Math.min(Math.max((inner * dy) / dx, 240), Math.max(240, Math.min(inner, 460) * share)));
     const perPixel = Math.max(dx / inner, dy / height);
     const around = (ends, pixels) => {
       const middle = (ends[0] + ends[1]) / 2;
@@ -346,9 +346,10 @@ const Charts = (() => {
     return visible ? [inside, slider] : [inside];
   }
 
-  function option(figure, width, window, said, { slider = !figure.square } = {}) {
-    const square = figure.square ? squared(figure, width) : null;
-    const place = places(figure, width, slider);
+  // How: whether there is a slider below, and the share of the usual height that panels have.
+  function option(figure, width, window, said, { slider = !figure.square, share = 1 } = {}) {
+    const square = figure.square ? squared(figure, width, share) : null;
+    const place = places(figure, width, { slider, share });
     const toneOf = tones(figure);
     if (square) {
       place.height += square.height - place.rows[0].height;

@@ -3,7 +3,7 @@
   const holder = document.getElementById("figures");
   if (!holder) return; // another page, which only wants the charts
   const figures = JSON.parse(holder.textContent);
-  const PRINTED_WIDTH = 640;
+  const PRINTED_WIDTH = 720;
   const drawn = new Map();
 
   function button(parent, label, text, act) {
@@ -196,7 +196,7 @@
       details.classList.add("words");
       details.open = true;
     }
-    for (const picture of drawn.values()) picture.paint(PRINTED_WIDTH, { slider: false });
+    for (const picture of drawn.values()) picture.paint(PRINTED_WIDTH, { slider: false, share: 0.55 });
   }
   function shownAgain() {
     for (const details of folded) {
