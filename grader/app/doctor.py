@@ -18,6 +18,7 @@ from grader.execution.machine import software, system
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.choose import inspect_tiers, sandbox_memory
 from grader.execution.sandbox.tiers import is_for_others
+from grader.submissions.foreign_archives import INSTALL, is_installed
 
 #: Messages that the trial node sends, one every 0.1 s starting at 0.1 s, and how long it is observed.
 TRIAL_MESSAGES = 10
@@ -39,7 +40,7 @@ def examine(progress: Progress) -> Checkup:
     """Find out what this machine can do; takes a few seconds."""
     progress("looking for ROS 2")
     ros, lack = _ros()
-    facts = (*software(ros), *lack, *system())
+    facts = (*software(ros), *lack, *system(), _archives())
     if ros is None:
         return Checkup(facts, None, (), "", "", Limits())
     progress("looking at the byte code")
@@ -58,6 +59,13 @@ def _ros() -> tuple[RosInstallation | None, tuple[Fact, ...]]:
         return find_ros(), ()
     except EnvironmentFault as fault:
         return None, (Fact("ROS 2", fault.message.removeprefix("ROS 2: "), fits=False, remedy=fault.hint),)
+
+
+def _archives() -> Fact:
+    """Report which archives students may hand in."""
+    if is_installed():
+        return Fact("archives", "zip and tar, .rar and .7z by libarchive")
+    return Fact("archives", "zip and tar; .rar and .7z need libarchive", remedy=INSTALL)
 
 
 def _remedy(tiers: Sequence[TierReport]) -> str:

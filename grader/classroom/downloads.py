@@ -17,12 +17,8 @@ from grader.core.errors import ClassError, HarnessError
 from grader.reporting.delivery import write_whole
 from grader.submissions.archives import (
     ARCHIVE_SUFFIXES,
-    FILE,
-    FOLDER,
     HEAD_BYTES,
     MAX_ARCHIVE_BYTES,
-    Member,
-    UnusableArchiveError,
     archive_kind,
     is_tar,
     tar_members,
@@ -30,6 +26,7 @@ from grader.submissions.archives import (
     zip_members,
 )
 from grader.submissions.collected import collision, is_skipped, listed, name_problem, shown, why_skipped
+from grader.submissions.members import FILE, FOLDER, Member, UnusableArchiveError
 
 #: Groups that a pattern may have; with `file`, several files of one student form one submission.
 GROUPS = ("name", "user", "email", "id", "late", "file")

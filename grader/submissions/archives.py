@@ -13,7 +13,6 @@ import tarfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from grader.core.errors import SubmissionError
@@ -32,32 +31,10 @@ from grader.submissions.collected import (
     name_problem,
     shown,
 )
+from grader.submissions.foreign_archives import INSTALL, KINDS, foreign_members, is_installed
+from grader.submissions.members import FEWER, FILE, FOLDER, LINK, REPACK, Member, UnusableArchiveError
 
-FILE, FOLDER, LINK = "a file", "a folder", "a link"
-
-REPACK = "pack the folder again with your system's own zip and hand that in"
 HAND_IN_ZIP = "pack the folder with your .py files as a zip"
-FEWER = "pack only your own .py files"
-
-
-@dataclass(frozen=True, slots=True)
-class Member:
-    """A member of an archive, not yet unpacked."""
-
-    name: str  # name in the archive, with `/` between the parts and none at the end; may be hostile
-    kind: str  # `FILE`, `FOLDER`, or words for anything else, such as `a link`
-    size: int
-    read: Callable[[int], bytes]
-
-
-class UnusableArchiveError(Exception):
-    """An archive cannot be used; the caller adds its name."""
-
-    def __init__(self, problem: str, hint: str = REPACK) -> None:
-        super().__init__(problem)
-        self.problem = problem
-        self.hint = hint
-
 
 BLOCK = 512
 
@@ -334,14 +311,18 @@ def _members(data: bytes) -> list[Member]:
     kind = archive_kind(data[:HEAD_BYTES])
     if kind is None:
         raise UnusableArchiveError("expected a zip or tar archive, found another kind of file", HAND_IN_ZIP)
+    allowed = _allowed(len(data))
+    limit = _RATIO if allowed < MAX_UNPACKED_BYTES else f"{MAX_UNPACKED_BYTES >> 20} MiB unpacked"
+    total = min(MAX_UNPACKED_BYTES, allowed)
+    if kind in KINDS and is_installed():
+        return foreign_members(data, kind, most=MAX_ENTRIES, file=MAX_FILE_BYTES, total=total, limit=limit)
     if kind not in _READABLE:
-        raise UnusableArchiveError(f"expected a zip or tar archive, found {kind}, which cannot be read", HAND_IN_ZIP)
+        hint = f"{HAND_IN_ZIP}; who grades can read {kind} after {INSTALL}" if kind in KINDS else HAND_IN_ZIP
+        raise UnusableArchiveError(f"expected a zip or tar archive, found {kind}, which cannot be read", hint)
     if kind == "zip":
         return zip_members(data, most=MAX_ENTRIES)
     if kind != "tar":
-        allowed = _allowed(len(data))
-        limit = _RATIO if allowed < MAX_UNPACKED_BYTES else f"{MAX_UNPACKED_BYTES >> 20} MiB unpacked"
-        data = unpacked(data, kind, most=min(MAX_UNPACKED_BYTES, allowed), limit=limit)
+        data = unpacked(data, kind, most=total, limit=limit)
         if not is_tar(data[:HEAD_BYTES]):
             found = f"expected a tar archive inside the {kind}, found another kind of file"
             raise UnusableArchiveError(found, HAND_IN_ZIP)
