@@ -1,4 +1,4 @@
-"""The files that platforms read: they follow the public schemas, and linters find nothing in them."""
+"""The files that platforms read, the project's own among them: they follow schemas, and linters find nothing."""
 
 import re
 import subprocess
@@ -9,10 +9,13 @@ import pytest
 from ruamel.yaml import YAML
 from stand_in_runner import ROOT
 
+import grader
 from grader.core.errors import GraderError
 from grader.packaging import workflow
 
 BIN = Path(sys.executable).parent
+OWN = ROOT / ".github"
+WORKFLOWS = sorted((OWN / "workflows").glob("*.yml"))
 ACTION, TEMPLATE = ROOT / "action.yml", ROOT / "student_template" / ".github" / "workflows" / "grade.yml"
 AT = "school/rclpy-grader@" + "0123456789" * 4
 
@@ -32,10 +35,23 @@ def complaints(program: str, *words: str) -> str:
     return "" if done.returncode == 0 else f"{program} ended with {done.returncode}:\n{done.stdout}{done.stderr}"
 
 
-@pytest.mark.parametrize(("schema", "path"), [("github-actions", ACTION), ("github-workflows", TEMPLATE)])
-def test_files_follow_the_public_schemas(schema: str, path: Path) -> None:
+@pytest.mark.parametrize(
+    ("schema", "paths"),
+    [
+        ("github-actions", [ACTION]),
+        ("github-workflows", [TEMPLATE, *WORKFLOWS]),
+        ("dependabot", [OWN / "dependabot.yml"]),
+        ("github-issue-forms", sorted(set(OWN.glob("ISSUE_TEMPLATE/*.yml")) - {OWN / "ISSUE_TEMPLATE" / "config.yml"})),
+        ("github-issue-config", [OWN / "ISSUE_TEMPLATE" / "config.yml"]),
+        ("gitlab-ci", [ROOT / "integrations" / "gitlab" / "grade.yml"]),
+        ("citation-file-format", [ROOT / "CITATION.cff"]),
+    ],
+)
+def test_files_follow_the_public_schemas(schema: str, paths: list[Path]) -> None:
     """Those that editors use, as check-jsonschema carries them."""
-    assert complaints("check-jsonschema", "--builtin-schema", f"vendor.{schema}", str(path)) == ""
+    assert paths
+    read_as = ["--data-transform", "gitlab-ci"] if schema == "gitlab-ci" else ["--default-filetype", "yaml"]
+    assert complaints("check-jsonschema", *read_as, "--builtin-schema", f"vendor.{schema}", *map(str, paths)) == ""
 
 
 def test_the_schema_can_fail(tmp_path: Path) -> None:
@@ -47,7 +63,10 @@ def test_the_schema_can_fail(tmp_path: Path) -> None:
 
 def test_no_linter_complains(filled: Path) -> None:
     """The strictest persona of zizmor: versions pinned to commits, no permission too many, no input in a script."""
-    assert complaints("zizmor", "--offline", "--no-config", "--persona", "pedantic", str(ACTION), str(filled)) == ""
+    options = ["--offline", "--no-config", "--persona", "pedantic"]
+    assert complaints("zizmor", *options, str(ACTION), str(filled), str(OWN)) == ""
+    shellcheck = ["-shellcheck", str(BIN / "shellcheck")]
+    assert complaints("actionlint", *shellcheck, str(filled), *map(str, WORKFLOWS)) == ""
 
 
 def test_the_linter_can_complain(tmp_path: Path, filled: Path) -> None:
@@ -58,6 +77,8 @@ def test_the_linter_can_complain(tmp_path: Path, filled: Path) -> None:
     assert "template-injection" in complaints("zizmor", "--offline", "--no-config", str(loose))
     filled.write_text(filled.read_text().replace(AT, "school/rclpy-grader@main"))
     assert "unpinned-uses" in complaints("zizmor", "--offline", "--no-config", str(filled))
+    filled.write_text(filled.read_text().replace("github.ref", "github.reff"))
+    assert '"reff" is not defined' in complaints("actionlint", str(filled))
 
 
 @pytest.mark.parametrize("name", ["prepare", "gradescope/setup.sh"])
@@ -99,3 +120,52 @@ def test_another_form_of_action_is_refused(action: str) -> None:
     """With the one that is expected."""
     with pytest.raises(GraderError, match="expected OWNER/NAME@COMMIT"):
         workflow(action)
+
+
+@pytest.fixture
+def release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a repository that can be released as 1.2.0; it is the current folder."""
+    (tmp_path / "grader").mkdir()
+    (tmp_path / "grader" / "__init__.py").write_text('"""Doc."""\n\n__version__ = "1.2.0"\n')
+    (tmp_path / "pyproject.toml").write_text('repository = "https://github.com/school/rclpy-grader"\n')
+    (tmp_path / "CITATION.cff").write_text("title: T\nversion: 1.2.0\n")
+    (tmp_path / "CHANGELOG.md").write_text(
+        "# Changelog\n\n## [Unreleased]\n\n## [1.2.0] - 2026-12-01\n\n### Added\n\n- A.\n\n"
+        "## [1.1.0] - 2026-01-01\n\n- B.\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def released(tag: str) -> tuple[str, str]:
+    """Return what `.ci/release` prints for a tag, and the error."""
+    command = [sys.executable, str(ROOT / ".ci" / "release"), tag]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == bool(done.stderr)
+    return done.stdout, done.stderr
+
+
+def test_release_notes_are_the_section_of_the_version(release: Path) -> None:
+    """Not those of other versions."""
+    assert released("v1.2.0") == ("### Added\n\n- A.\n", "")
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "said"),
+    [
+        ("grader/__init__.py", "1.2.0", "1.3.0", "expected the tag v1.3.0"),
+        ("CITATION.cff", "1.2.0", "1.1.0", "CITATION.cff: expected version: 1.2.0"),
+        ("pyproject.toml", "school", "__OWNER__", "found the placeholder"),
+        ("CHANGELOG.md", "[1.2.0] - 2026-12-01", "[1.2.0]", "expected entries below"),
+        ("CHANGELOG.md", "### Added\n\n- A.\n", "", "expected entries below"),
+    ],
+)
+def test_what_is_not_ready_is_not_released(release: Path, name: str, old: str, new: str, said: str) -> None:
+    """With the file and what it lacks."""
+    (release / name).write_text((release / name).read_text().replace(old, new))
+    assert said in released("v1.2.0")[1]
+
+
+def test_the_citation_names_this_version() -> None:
+    """It is cited between releases, too."""
+    assert YAML(typ="safe").load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))["version"] == grader.__version__
