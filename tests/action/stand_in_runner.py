@@ -1,7 +1,8 @@
-"""A runner for composite actions, written again: expressions, environment files, outputs, and commands in the log."""
+"""A runner for composite actions, written again: expressions, environment files, outputs, a cache, commands in logs."""
 
 import os
 import re
+import shutil
 import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -46,7 +47,7 @@ def run_action(action: Path, workspace: Path, folder: Path, environment: Mapping
     Args:
         action: The folder of action.yml.
         workspace: The checkout.
-        folder: Where the runner keeps its files.
+        folder: Where the runner keeps its files; the folder `cache` beside it is the cache of the repository.
         environment: The job's environment.
         inputs: What the workflow gives, with `_` for `-`.
     """
@@ -61,7 +62,7 @@ def run_action(action: Path, workspace: Path, folder: Path, environment: Mapping
     steps: dict[str, Any] = {}
     names = {"GITHUB_ACTION_PATH": action, "GITHUB_WORKSPACE": workspace, "RUNNER_TEMP": temporary}
     environment = {**environment, **{name: str(value) for name, value in names.items()}, "GITHUB_ACTIONS": "true"}
-    contexts = {"inputs": given, "steps": steps}
+    contexts = {"inputs": given, "steps": steps, "runner": {"temp": str(temporary)}}
     for number, step in enumerate(described["runs"]["steps"]):
         condition = step.get("if", "${{ true }}")
         expression = EXPRESSION.fullmatch(condition)
@@ -86,7 +87,15 @@ def run_step(
     """Run one step in the checkout, and take what it left in the environment files."""
     if "uses" in step:
         given = {name: filled(str(value), contexts) for name, value in step["with"].items()}
-        job.uploads[step["uses"]] = given
+        kept = folder.parent.parent / "cache" / given.get("key", "")
+        if step["uses"].startswith("actions/cache/restore@"):
+            contexts["steps"][step["id"]] = {"outputs": {"cache-hit": str(kept.exists()).lower()}}
+            if kept.exists():
+                shutil.copytree(kept, given["path"], symlinks=True)
+        elif step["uses"].startswith("actions/cache/save@"):
+            shutil.copytree(given["path"], kept, symlinks=True)
+        else:
+            job.uploads[step["uses"]] = given
         return
     folder.mkdir()
     files = {name: folder / name for name in ("OUTPUT", "STEP_SUMMARY", "ENV", "PATH", "STATE")}

@@ -3,6 +3,7 @@
 import base64
 import json
 import os
+import shutil
 import stat
 import sys
 from pathlib import Path
@@ -33,6 +34,38 @@ print("::add-path::/mine", end="")
 sys.exit(code)
 """
 STEPS = ("Set up the grader and its sandbox", "Grade", "Say whether it passed")
+
+
+@pytest.fixture
+def action(tmp_path: Path) -> Path:
+    """Return an action whose set-up only notes that it installs."""
+    folder = tmp_path / "action"
+    for name in ("integrations", "grader", "rubrics", "student_template"):
+        (folder / name).mkdir(parents=True)
+    for name in ("action.yml", "integrations/github/step.py"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / name, folder / name)
+    for name in ("hatch_build.py", "pyproject.toml", "README.md", "grader/a module.py"):
+        (folder / name).write_text("x")
+    program = tmp_path / "bin" / "grade"
+    script = f'[ $# = 1 ] && exit\necho "installed $2 $3"\nmkdir -p "$1/bin"\ncp {program} "$1/bin"\n'
+    (folder / "integrations" / "prepare").write_text(script)
+    return folder
+
+
+def test_a_push_installs_nothing_that_an_earlier_one_installed(checkout: Path, action: Path, tmp_path: Path) -> None:
+    """Also where that one failed; another version of the grader is installed anew."""
+    logs = []
+    for number, code in enumerate("110"):
+        if number == 2:
+            (action / "grader" / "a module.py").write_text("y")
+        environment = job_environment(HOME=code)
+        job = run_action(action, checkout, tmp_path / f"runner{number}", environment)
+        assert job.failed == (STEPS[2] if code == "1" else "")
+        logs.append(job.log)
+    installed = f"installed {action} {action}/integrations/constraints.txt"
+    assert [installed in log for log in logs] == [True, False, True]
+    assert len(list((tmp_path / "cache").iterdir())) == 2
 
 
 @pytest.fixture

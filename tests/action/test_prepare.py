@@ -29,7 +29,12 @@ def machine(tmp_path: Path) -> Prepare:
         path.chmod(0o755)
 
     def prepare(
-        *, user: int = 0, restricted: str | None = "1", bwrap: bool = True, sysctl: int = 0, **environment: str
+        *package: str,
+        user: int = 0,
+        restricted: str | None = "1",
+        bwrap: bool = True,
+        sysctl: int = 0,
+        **environment: str,
     ) -> tuple[list[str], str]:
         stand_in(tmp_path / "venv" / "bin" / "python")
         stand_in(programs / "id", does=f"echo {user}")
@@ -45,8 +50,7 @@ def machine(tmp_path: Path) -> Prepare:
             programs / "bash",
             ROOT / "integrations" / "prepare",
             tmp_path / "venv",
-            "a wheel.whl",
-            "pins.txt",
+            *package,
         ]
         surroundings = {"PATH": str(programs), "PROC": str(tmp_path), **environment}
         done = subprocess.run(words, env=surroundings, capture_output=True, text=True, check=False)
@@ -56,36 +60,44 @@ def machine(tmp_path: Path) -> Prepare:
     return prepare
 
 
+PACKAGE = ("a wheel.whl", "pins.txt")
 PIP = "python -I -m pip install --quiet --disable-pip-version-check --constraint pins.txt a wheel.whl"
 
 
 def test_on_github_s_machines_namespaces_are_allowed(machine: Prepare) -> None:
     """Their user is not root, but may become it."""
-    calls, _ = machine(user=1001, RUNNER_ENVIRONMENT="github-hosted")
+    calls, _ = machine(*PACKAGE, user=1001, RUNNER_ENVIRONMENT="github-hosted")
     assert calls == [f"sudo -n {SYSCTL}", SYSCTL, PIP]
 
 
 @pytest.mark.parametrize("environment", [{"RUNNER_ENVIRONMENT": "self-hosted"}, {}])
 def test_nobody_else_s_machine_is_changed(machine: Prepare, environment: dict[str, str]) -> None:
     """It may live for years."""
-    assert machine(user=1001, **environment)[0] == [PIP]
+    assert machine(*PACKAGE, user=1001, **environment)[0] == [PIP]
 
 
 @pytest.mark.parametrize("restricted", ["0", None])
 def test_what_is_not_restricted_is_left_alone(machine: Prepare, restricted: str | None) -> None:
     """Other systems do not even have the setting."""
-    assert machine(restricted=restricted, RUNNER_ENVIRONMENT="github-hosted")[0] == [PIP]
+    assert machine(*PACKAGE, restricted=restricted, RUNNER_ENVIRONMENT="github-hosted")[0] == [PIP]
 
 
 def test_a_setting_that_cannot_be_changed_is_not_the_end(machine: Prepare) -> None:
     """In a container it is read-only; which sandbox holds is found out later."""
-    calls, said = machine(sysctl=1, RUNNER_ENVIRONMENT="github-hosted")
+    calls, said = machine(*PACKAGE, sysctl=1, RUNNER_ENVIRONMENT="github-hosted")
     assert calls == [SYSCTL, PIP]
     assert "another sandbox will be tried" in said
 
 
 def test_bubblewrap_is_installed_where_it_is_missing(machine: Prepare) -> None:
     """From the distribution."""
-    calls, _ = machine(bwrap=False)
+    calls, _ = machine(*PACKAGE, bwrap=False)
     assert calls[0] == "apt-get update -qq"
     assert calls[1] == "apt-get install -y -qq --no-install-recommends bubblewrap"
+
+
+def test_a_complete_environment_is_left_alone(machine: Prepare) -> None:
+    """It comes from a cache; the machine is new all the same."""
+    calls, _ = machine(bwrap=False, user=1001, RUNNER_ENVIRONMENT="github-hosted")
+    assert "apt-get install -y -qq --no-install-recommends bubblewrap" in calls
+    assert calls[-1] == SYSCTL
