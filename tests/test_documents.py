@@ -1,10 +1,22 @@
-"""What the documents name exists: every link, and every path of this repository in code."""
+"""What the documents name exists: links, paths of this repository, commands with their options, and messages.
 
+What the site adds, it takes from the code.
+"""
+
+import ast
 import re
+import shlex
 from collections.abc import Iterator
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
+import click
+import generated
 import pytest
+
+from grader.cli.main import app
+from grader.judging.checks import CHECKS
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [
@@ -45,7 +57,8 @@ def paths(text: str) -> Iterator[str]:
 
 def missing(text: str, folder: Path) -> list[str]:
     """Return what a document in a folder names and nobody finds."""
-    dead = [target for target in links(text) if not (folder / target).exists()]
+    made = [f"examples/{exercise}.html" for exercise in generated.EXAMPLES]
+    dead = [target for target in links(text) if not (folder / target).exists() and target not in made]
     named = [path for path in paths(text) if not _SCHEMA.search(path)]
     return dead + [path for path in named if not any(ROOT.glob(path.rstrip("/")))]
 
@@ -65,3 +78,110 @@ def test_what_does_not_exist_is_found() -> None:
     )
     wanted = ["docs/none.md", "grader/none.py", "tests/none.py", "grader/student_host/none.py", "rubrics/*.none"]
     assert missing(text, ROOT) == wanted
+
+
+#: What stands for a value in commands, where a command needs one of a certain kind.
+_STAND_INS = {
+    "N": "1",
+    "S": "10",
+    "P": "60",
+    "P%": "5%",
+    "FORMAT=PATH": "json=report.json",
+    "OWNER/NAME@COMMIT": f"school/grader@{'0' * 40}",
+}
+_GRADE = re.compile(r"^(?:\$ )?(?:\S+/bin/)?grade (.*)$")
+#: What follows a command in its line: a remark, or a redirection.
+_REST = re.compile(r"(?: {2,}| [>|#]>? ).*$")
+#: A drawing, and what is quoted of other tools.
+_NO_COMMAND = ("(reads", "<", "-ohtml", "--")
+
+
+def grade_commands(text: str) -> Iterator[str]:
+    """Yield what follows `grade` where a document shows it with arguments: in blocks, and in sentences."""
+    lines = re.findall(r"^(?: {4,}|\$ )(.*)$", text, re.MULTILINE)
+    for shown in (*lines, *_CODE.findall(text)):
+        found = _GRADE.match(shown.strip())
+        if found and not found[1].startswith(_NO_COMMAND):
+            yield _REST.sub("", found[1])
+
+
+def parsed(words: list[str]) -> None:
+    """Parse a command without running it; raises click.ClickException if it has no such subcommand or option."""
+    command: click.Command = app
+    while isinstance(command, click.Group) and words and words[0] in command.commands:
+        command, words = command.commands[words[0]], words[1:]
+    if command is app:
+        command = app.default
+    # In a sentence, `grade batch` and `grade rubric` name a command.
+    if [word for word in words if not word.startswith("-")]:
+        with suppress(click.exceptions.Exit):  # `--help`
+            command.make_context("grade", [_STAND_INS.get(word, word) for word in words])
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_every_command_shown_can_be_parsed(document: str) -> None:
+    """Its subcommand and its options exist and take what they are given; those of the tutorials are also run."""
+    for command in grade_commands((ROOT / document).read_text(encoding="utf-8")):
+        parsed(shlex.split(command))
+
+
+@pytest.mark.parametrize("command", ["rejudge a --rubrik b", "nonsense --exercise", "a -o nothing=b", "batch a"])
+def test_a_wrong_command_is_found(command: str) -> None:
+    """An option that does not exist, one without its value, a value that is none, and a missing option."""
+    with pytest.raises(click.ClickException):
+        parsed(shlex.split(command))
+
+
+@cache
+def _said() -> str:
+    """Return all texts of the grader's code, values in them as `...`, and what students of the tests are told."""
+    texts = []
+    for path in sorted((ROOT / "grader").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                texts.append(node.value)
+            elif isinstance(node, ast.JoinedStr):
+                texts.append("".join(str(p.value) if isinstance(p, ast.Constant) else "..." for p in node.values))
+    golden = (ROOT / "tests" / "submissions" / "golden.yaml").read_text(encoding="utf-8")
+    return "\n".join([*texts, golden])
+
+
+def _messages() -> list[str]:
+    text = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    return re.findall(r"^\| `([^`]+)` \|", text, re.MULTILINE)
+
+
+def _exists(message: str) -> bool:
+    return re.search(".*".join(map(re.escape, message.split("..."))), _said()) is not None
+
+
+@pytest.mark.parametrize("message", _messages())
+def test_a_message_explained_still_exists(message: str) -> None:
+    """In the code, or in what students of the tests are told; `...` stands for anything."""
+    assert _exists(message)
+
+
+def test_a_message_that_nothing_says_is_found() -> None:
+    """The comparison can fail, and the table is read at all."""
+    assert not _exists("the robot ... is sad")
+    assert len(_messages()) > 30
+
+
+def test_the_site_names_every_command_option_check_and_key() -> None:
+    """The pages are made from the code when the site is built; nothing of it is left out."""
+    commands, checks, grammar, gallery = (make() for make in generated.NAMES.values())
+    for name, command in app.commands.items():
+        options = [option for parameter in command.params for option in parameter.opts if option.startswith("--")]
+        assert command.hidden or f"`grade {name}`" in commands
+        assert [option for option in options if option not in commands] == []
+    assert [name for name in CHECKS if f"\n## {name}\n" not in checks] == []
+    assert [
+        word for word in ("just_above", "stimuli", "cancel_after", "some_of", "copies") if f"`{word}`" not in grammar
+    ] == []
+    assert [name for name in generated.exercises() if f"#{name} }}" not in gallery] == []
+
+
+def test_every_part_that_is_generated_stands_on_a_page() -> None:
+    """A comment in the Markdown says where."""
+    text = "".join((ROOT / d).read_text(encoding="utf-8") for d in DOCUMENTS)
+    assert [name for name in generated.NAMES if f"<!-- generated: {name} -->" not in text] == []

@@ -1,0 +1,338 @@
+"""Makes the parts of the site that are written in the code: commands, the grammar of rubrics, checks, and exercises.
+
+A page says where such a part goes with a comment, `<!-- generated: NAME -->`; NAMES lists the names.
+"""
+
+from __future__ import annotations
+
+import inspect
+import io
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import click
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as MatplotlibFigure
+
+from grader.app.explain import explain_checks, explain_rubrics
+from grader.cli.main import app
+from grader.core.chart import Chart, Panel
+from grader.core.exercise import Exercise
+from grader.core.report import CheckExplanation, CriterionExplanation, Parameter, Report
+from grader.judging.run_check import check_name
+from grader.reporting.html.render import render_html
+from grader.rubrics.schema import rubric_schema
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / "tests" / "recorded"))
+import archive  # noqa: E402  the recordings of the test submissions
+
+#: A recording of each exercise that shows what a report and its charts look like.
+EXAMPLES = {
+    "velocity_publisher": "wrong/velocity_18_5_hz",
+    "odom_subscriber": "wrong/odom_swapped_xy",
+    "two_node_communication": "wrong/fan_on_at_25",
+    "joint_publisher": "wrong/joint_amplitude",
+    "joint_subscriber": "wrong/angle_pi_is_3",
+    "battery_service": "wrong/battery_client_limit_30",
+}
+
+
+# --- the command line -------------------------------------------------------------------------------------------------
+
+
+def commands() -> str:
+    """Return a section for each command: usage, description and options."""
+    return "\n".join(_sections("grade", app.default)) + "\n".join(_subcommands("grade", app))
+
+
+def _subcommands(path: str, group: click.Group) -> Iterator[str]:
+    for name, command in sorted(group.commands.items()):
+        if command.hidden:
+            continue
+        if isinstance(command, click.Group):
+            yield f"\n## `{path} {name}`\n\n{_described(command)}\n"
+            yield from _subcommands(f"{path} {name}", command)
+        else:
+            yield from _sections(f"{path} {name}", command)
+
+
+def _sections(path: str, command: click.Command) -> Iterator[str]:
+    context = click.Context(command, info_name=path)
+    level = "##" if path.count(" ") < 2 else "###"
+    usage = " ".join([path, *command.collect_usage_pieces(context)])
+    yield f"\n{level} `{path}`\n\n    {usage}\n\n{_described(command)}\n"
+    yield "| option | meaning |\n|---|---|"
+    for parameter in command.get_params(context):
+        record = parameter.get_help_record(context)
+        if record is not None:
+            yield f"| {', '.join(f'`{name}`' for name in record[0].split(', '))} | {_cell(record[1])} |"
+
+
+def _described(command: click.Command) -> str:
+    return "\n\n".join(filter(None, [inspect.cleandoc(command.help or ""), command.epilog or ""]))
+
+
+def _cell(text: str) -> str:
+    """Return text for a cell of a table, in one line."""
+    parts = re.split(r"(`[^`]*`)", " ".join(text.split()))
+    return "".join(part if part.startswith("`") else part.replace("|", "\\|").replace("<", "&lt;") for part in parts)
+
+
+# --- the grammar of rubrics -------------------------------------------------------------------------------------------
+
+_VARIANT = "VariantReference"
+#: The pattern of texts that may be anything but blank.
+_ANY_TEXT = r"^(?:[\s\S]*\S[\s\S]*)$"
+
+
+def grammar() -> str:
+    """Return a table of keys for each mapping of a rubric, except those that are the parameters of a check."""
+    schema = rubric_schema()
+    parts = schema["$defs"]
+    checks = {reference["$ref"].rpartition("/")[2] for reference in parts["Check"]["properties"].values()}
+    todo, done = _referred(schema["properties"]), [_table("A rubric", schema)]
+    seen: list[str] = []
+    while todo:
+        name = todo.pop(0)
+        if name in seen or name in checks or name in ("Check", _VARIANT):
+            continue
+        seen.append(name)
+        done.append(_table(_title(name), parts[name]))
+        todo += _referred(parts[name])
+    # What only checks refer to, such as the cases of a reaction, is a part of their grammar.
+    rest = {inner for check in checks for inner in _nested(check, parts)} - {*seen, *checks, _VARIANT}
+    done += [_table(_title(name), parts[name]) for name in sorted(rest)]
+    return "\n\n".join(done)
+
+
+def _nested(name: str, parts: Mapping[str, Any]) -> set[str]:
+    found = set(_referred(parts[name]))
+    return found | {inner for part in found if part != _VARIANT for inner in _nested(part, parts)}
+
+
+def _referred(node: object) -> list[str]:
+    """Return the names of the definitions that a part of the schema refers to, in order."""
+    if isinstance(node, dict):
+        own = [node["$ref"].rpartition("/")[2]] if "$ref" in node else []
+        return list(dict.fromkeys([*own, *(name for value in node.values() for name in _referred(value))]))
+    return list(dict.fromkeys(name for item in node for name in _referred(item))) if isinstance(node, list) else []
+
+
+def _title(name: str) -> str:
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.removesuffix("Shape")).lower()
+    return words[0].upper() + words[1:]
+
+
+def _link(name: str) -> str:
+    if name == "Check":
+        return "[a check](checks.md)"
+    return f"[{_title(name).lower()}](#{_title(name).lower().replace(' ', '-')})"
+
+
+def _table(title: str, node: Mapping[str, Any]) -> str:
+    required = node.get("required", [])
+    about = node.get("description", "").removeprefix("A stimulus: ")
+    about = about[:1].upper() + about[1:]
+    rows = [
+        f"| `{key}` | {'yes' if key in required else ''} | {_kind(value)} | {_remark(value)} |"
+        for key, value in node.get("properties", {}).items()
+    ]
+    head = f"### {title}\n\n{about}\n"
+    if not rows:
+        return f"{head}\nWritten as {_kind({key: value for key, value in node.items() if key != 'description'})}."
+    one = "Exactly one of these keys:\n\n" if node.get("maxProperties") == 1 else ""
+    return "\n".join([f"{head}\n{one}| key | required | value | |", "|---|---|---|---|", *rows])
+
+
+def _remark(node: Mapping[str, Any]) -> str:
+    least = f"at least {node['minimum']}" if "minimum" in node else ""
+    default = node.get("default")
+    usual = f"`{str(default).lower()}` by default" if default not in (None, [], {}) else ""
+    return _cell("; ".join(filter(None, [node.get("description", ""), least, usual])))
+
+
+def _kind(node: Mapping[str, Any]) -> str:
+    """Return what may be written for a value. Null and a variant are left out: the page says where they may stand."""
+    options = node.get("anyOf", node.get("oneOf"))
+    if options:
+        kept = [o for o in options if o.get("type") != "null" and not o.get("$ref", "").endswith(_VARIANT)]
+        return " or ".join(dict.fromkeys(map(_kind, kept)))
+    if "$ref" in node:
+        return _link(node["$ref"].rpartition("/")[2])
+    words = node.get("enum", [node["const"]] if "const" in node else [])
+    return " or ".join(f"`{word}`" for word in words) or _type(node)
+
+
+def _type(node: Mapping[str, Any]) -> str:
+    """Return the JSON type of a value, and an example or what is inside."""
+    kind = node.get("type", "anything")
+    if kind == "array":
+        return f"list of {_kind(node['items'])}" if "items" in node else "list"
+    if kind == "object":
+        inner = node.get("additionalProperties") or next(iter(node.get("patternProperties", {}).values()), None)
+        keys = node.get("propertyNames", {}).get("examples", ["name"])
+        return f"mapping of keys such as `{keys[0]}` to {_kind(inner)}" if inner else "mapping"
+    if kind == "string" and node.get("pattern") != _ANY_TEXT and "examples" in node:
+        return f"text such as `{node['examples'][0]}`"
+    kinds = kind if isinstance(kind, list) else [kind]
+    return " or ".join("text" if one == "string" else one for one in kinds)
+
+
+# --- checks -----------------------------------------------------------------------------------------------------------
+
+
+def checks() -> str:
+    """Return a list of all checks, then for each its manual, its parameters, its uses, and a chart if it has one."""
+    found = [e for e in explain_checks() if isinstance(e, CheckExplanation)]
+    pictures = charts()
+    rows = [f"| [`{e.name}`](#{e.name}) | {_cell(e.asks)} |" for e in found]
+    return (
+        "\n".join(["| check | asks |", "|---|---|", *rows]) + "\n\n" + "\n\n".join(_check(e, pictures) for e in found)
+    )
+
+
+def _check(e: CheckExplanation, pictures: Mapping[str, Chart]) -> str:
+    lines = [f"## {e.name}", e.asks, e.details]
+    if e.parameters:
+        lines.append("\n".join(["| parameter | default | meaning |", "|---|---|---|", *map(_parameter, e.parameters)]))
+    if e.used_by:
+        lines.append(f"Used by {', '.join(map(_gallery_link, e.used_by))}.")
+    if e.name in pictures:
+        chart = pictures[e.name]
+        lines.append(f"![{_cell(f'{chart.title}. {chart.about}')}](charts/{e.name}.svg)")
+    return "\n\n".join(filter(None, lines))
+
+
+def _parameter(parameter: Parameter) -> str:
+    default = "required" if parameter.required else f"`{parameter.value}`"
+    return f"| `{parameter.name}` | {default} | {_cell(parameter.meaning)} |"
+
+
+def _gallery_link(used: str) -> str:
+    exercise, _, criterion = used.partition("/")
+    return f"[`{criterion}`](../gallery.md#{exercise}) of {exercise}"
+
+
+@cache
+def charts() -> dict[str, Chart]:
+    """Return a chart for each check that has one, of the reports in EXAMPLES."""
+    found: dict[str, Chart] = {}
+    for name, exercise in exercises().items():
+        of = {criterion.id: check_name(criterion) for criterion in exercise.criteria}
+        for report in example_report(name).exercises:
+            for figure in report.figures:
+                if isinstance(figure, Chart):
+                    found |= {of[id_]: figure for id_ in figure.criteria if of[id_] not in found}
+    return found
+
+
+_COLOURS = {"main": "#2f6fde", "second": "#c2571a", "third": "#6d4bb5", "faint": "#8a8f98"}
+_COLOURS |= {"good": "#1f8a4c", "warning": "#b77400", "bad": "#cc2f2f"}
+#: Readable on a light page and on a dark one.
+_STYLE: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "rclpy-grader",
+    "font.size": 9,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+}
+_STYLE |= dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.color", "axes.edgecolor"), "#808590")
+
+
+def drawn(chart: Chart) -> bytes:
+    """Return a chart as SVG, without a background."""
+    with rc_context(_STYLE):
+        height = 5.0 if chart.square else 0.6 + 1.7 * len(chart.panels)
+        figure = MatplotlibFigure(figsize=(7.2, height), layout="constrained")
+        axes = figure.subplots(len(chart.panels), sharex=True, squeeze=False)[:, 0]
+        for ax, panel in zip(axes, chart.panels, strict=True):
+            _draw(ax, panel)
+            for moment in chart.moments:
+                ax.axvline(moment.x, color=_COLOURS[moment.tone.value], linestyle=":")
+            if chart.square:
+                ax.set_aspect("equal", adjustable="datalim")
+        axes[-1].set_xlabel(" ".join(filter(None, [chart.x_title, chart.x_unit and f"({chart.x_unit})"])))
+        out = io.BytesIO()
+        figure.savefig(out, format="svg", transparent=True, metadata={"Date": None})
+    return out.getvalue()
+
+
+_LOOKS: Mapping[str, Mapping[str, Any]] = {
+    "line": {},
+    "step": {"drawstyle": "steps-post"},
+    "dots": {"linestyle": "", "marker": "o", "markersize": 3},
+}
+
+
+def _draw(ax: Axes, panel: Panel) -> None:
+    for band in panel.bands:
+        ax.axhspan(band.low, band.high, color=_COLOURS[band.tone.value], alpha=0.15, label=band.label)
+    for level in panel.levels:
+        ax.axhline(level.value, color="#8a8f98", linestyle="--", label=level.label)
+    for series in panel.series:
+        x, y = [p[0] for p in series.points], [p[1] for p in series.points]
+        ax.plot(x, y, color=_COLOURS[series.tone.value], label=series.name, **_LOOKS[series.look.value])
+    if panel.lanes:
+        ax.set_yticks(range(len(panel.lanes)), panel.lanes)
+        ax.invert_yaxis()
+    ax.set_ylabel(" ".join(filter(None, [panel.title, panel.unit and f"({panel.unit})"])))
+    ax.legend(loc="upper right", fontsize=7, frameon=False)
+
+
+# --- exercises --------------------------------------------------------------------------------------------------------
+
+
+def gallery() -> str:
+    """Return a section for each exercise that ships with the grader: its files, its criteria, and a report."""
+    explained = [e for e in explain_rubrics() if isinstance(e, CriterionExplanation)]
+    return "\n\n".join(_exercise(e, explained) for e in exercises().values())
+
+
+def _exercise(exercise: Exercise, explained: list[CriterionExplanation]) -> str:
+    mine = [e for e in explained if e.exercise.endswith(f"({exercise.id})")]
+    files = ", ".join(f"`{file}`" for file in exercise.files)
+    points = sum(e.points for e in mine)
+    checks_used = [f"[`{e.check}`](reference/checks.md#{e.check})" for e in mine]
+    rows = [
+        f"| {_cell(e.title)} `{e.id}` | {float(e.points):g} | {check} |"
+        for e, check in zip(mine, checks_used, strict=True)
+    ]
+    lines = [
+        f"## {exercise.title} {{ #{exercise.id} }}",
+        f"{files}; {float(points):g} points; `grade . --exercise {exercise.id}`",
+        "\n".join(["| criterion | points | check |", "|---|---|---|", *rows]),
+        f"[A report of a real submission](examples/{exercise.id}.html), with one mistake.",
+    ]
+    return "\n\n".join(lines)
+
+
+@cache
+def exercises() -> dict[str, Exercise]:
+    """Return the exercises that ship with the grader, by id."""
+    return archive.builtin_exercises()
+
+
+@cache
+def example_report(exercise: str) -> Report:
+    """Return the report of the recorded submission that stands for an exercise."""
+    return archive.judged(archive.read_archive()[EXAMPLES[exercise]])
+
+
+def files() -> dict[str, str | bytes]:
+    """Return the files of the site that are no pages, by their path: the reports of the examples, and the charts."""
+    reports = {f"examples/{exercise}.html": render_html(example_report(exercise)) for exercise in exercises()}
+    return reports | {f"reference/charts/{check}.svg": drawn(chart) for check, chart in charts().items()}
+
+
+NAMES: Mapping[str, Callable[[], str]] = {
+    "commands": commands,
+    "checks": checks,
+    "grammar": grammar,
+    "gallery": gallery,
+}
