@@ -154,12 +154,12 @@ def _used(conditions: Conditions, given: Reproduction) -> Conditions:
 
 def _files(report: Report, task: Task, today: str) -> Mapping[str, str]:
     assets = None if task.standalone else ASSETS
-    page, seen = render_html(report, assets=assets), for_student(report, today)
+    page, seen = render_html(report, assets=assets, recordings=EVIDENCE), for_student(report, today)
     return {
         REPORT: dumps(report),
         PAGE: page,
         HANDED_BACK: dumps(seen),
-        HANDED_BACK_PAGE: page if seen is report else render_html(seen, assets=assets),
+        HANDED_BACK_PAGE: render_html(seen, assets=assets),
         GRADESCOPE: render_gradescope(report, day=today),
     }
 

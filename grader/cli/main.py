@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -201,6 +202,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
         **as_given,
     )
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
+    wanted = tuple(replace(output, evidence=next(iter(folders), None)) for output in wanted)
     writer = _evidence_writer(folders, request) if folders else None
     remember = writer.remember if writer is not None else None
     pictures = any(FORMATS[output.format].illustrated for output in wanted)

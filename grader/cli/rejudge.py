@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -118,7 +119,7 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
     from grader.reporting.audience import told
     from grader.reporting.delivery import deliver, prepared
 
-    wanted = prepared(outputs)
+    wanted = tuple(replace(output, evidence=folder) for output in prepared(outputs))
     report = rejudge.rejudge(open_evidence(folder), how)
     deliver(report, wanted, for_whom)
     return exit_code(told(report, for_whom), min_score)

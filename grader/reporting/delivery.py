@@ -86,6 +86,7 @@ class Output:
     format: str
     path: Path | None = None
     verbose: bool = False  # whether a text shows everything
+    evidence: Path | None = None  # the folder of the kept evidence, which a page names; None if none is kept
 
 
 def prepared(outputs: Sequence[Output], *, verbose: bool = False) -> tuple[Output, ...]:
@@ -169,7 +170,8 @@ def _unwritable(output: Output, error: OSError) -> GraderError:
 def write_report(report: Report, output: Output, readers: Readers) -> None:
     """Write a report to its destination; raises OSError if that fails."""
     if output.path is not None:
-        layout = PageLayout(_FILE_WIDTH, colour=False, verbose=output.verbose)
+        recordings = os.path.relpath(output.evidence, output.path.parent) if output.evidence else ""
+        layout = PageLayout(_FILE_WIDTH, colour=False, verbose=output.verbose, recordings=recordings)
         write_whole(output.path, rendered(output.format, report, layout, readers).encode("utf-8"))
         return
 

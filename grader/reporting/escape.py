@@ -189,10 +189,12 @@ def json_value(value: object) -> Any:
     Fractions become numbers of six digits, NaN and the infinities their names, integers beyond 64 bits a sentence, lone
     surrogates U+FFFD, and everything else its text.
     """
-    if isinstance(value, Mapping):
-        return {valid_unicode(str(key)): json_value(item) for key, item in value.items()}
+    if type(value) is float:  # the common case: charts are numbers, and abstract classes are slow to ask
+        return value if math.isfinite(value) else str(value)
     if isinstance(value, (list, tuple)):
         return [json_value(item) for item in value]
+    if isinstance(value, Mapping):
+        return {valid_unicode(str(key)): json_value(item) for key, item in value.items()}
     if isinstance(value, Enum):
         return json_value(value.value)
     if value is None or isinstance(value, bool):

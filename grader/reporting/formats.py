@@ -22,6 +22,7 @@ class PageLayout:
     width: int
     colour: bool
     verbose: bool = False  # whether to show everything, not only what a student acts on
+    recordings: str = ""  # folder of the kept evidence, relative to the report; empty if none is kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +32,7 @@ class Format:
     renderer: str  # the rendering function: `module:function` in `grader.reporting`
     suffix: str  # file name suffix of this format
     for_students: bool = False  # whether students read it unless an option says otherwise: a platform shows it to them
-    needs: str = ""  # what its renderer is given besides the report: `layout`, `folder` or `handed_in`
+    needs: str = ""  # what its renderer is given besides the report: `layout`, `folder`, `handed_in` or `recordings`
     # Whether the renderer itself hides what students must not see yet, because its platform shows it later
     withholds: bool = False
     illustrated: bool = False  # whether it shows figures, which take about as long to draw as judging takes
@@ -50,6 +51,8 @@ class Format:
 def _arguments(needs: str, report: Report, layout: PageLayout) -> Mapping[str, object]:
     if needs == "layout":
         return {"width": layout.width, "colour": layout.colour, "verbose": layout.verbose}
+    if needs == "recordings":
+        return {"recordings": layout.recordings}
     if needs == "folder":
         return {"folder": repository_folder(report.path, os.environ)}
     return {"handed_in": _handed_in()} if needs else {}
@@ -65,7 +68,7 @@ def _handed_in() -> HandedIn:
 FORMATS: dict[str, Format] = {
     "json": Format("json_report:dumps", ".json"),
     "text": Format("text:render_text", ".txt", needs="layout"),
-    "html": Format("html.render:render_html", ".html", illustrated=True),
+    "html": Format("html.render:render_html", ".html", illustrated=True, needs="recordings"),
     "markdown": Format("markdown:render_markdown", ".md"),
     "junit": Format("junit:render_junit", ".xml", needs="folder"),
     "github": Format("platforms.github:render_github", ".txt", for_students=True, needs="folder"),
@@ -95,7 +98,7 @@ def rendered(name: str, report: Report, layout: PageLayout, readers: Readers) ->
     report = replace(report, audience=Audience.STUDENT)
     if format_.withholds:
         return format_(report, layout, day=readers.day)
-    return format_(for_student(report, readers.day), layout)
+    return format_(for_student(report, readers.day), replace(layout, recordings=""))
 
 
 def repository_folder(path: str, environment: Mapping[str, str]) -> str | None:

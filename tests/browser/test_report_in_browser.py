@@ -8,6 +8,7 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
+from urllib.parse import quote
 
 import graded
 import pytest
@@ -475,6 +476,21 @@ def test_a_place_leads_to_its_line_in_the_whole_file(visit: Open) -> None:
     assert line.is_visible()
     assert line.inner_text().startswith("6")
     assert said == []
+
+
+def test_a_page_on_a_web_server_opens_its_recordings_in_foxglove(browser: Browser) -> None:
+    """By their address; a page on a disk only names the file."""
+    context = browser.new_context()
+    html = render_html(graded.perfect(), recordings="evidence")
+    context.route("https://class.example/**", lambda route: route.fulfill(body=html, content_type="text/html"))
+    page = context.new_page()
+    page.goto("https://class.example/ada/report.html")
+    page.wait_for_selector("html[data-ready=yes]")
+    links = page.evaluate("[...document.querySelectorAll('[data-foxglove]')].map((link) => link.href)")
+    context.close()
+    name = "odom_subscriber.waiting_then_driving"
+    address = f"https://class.example/ada/evidence/{name}/{name}_0.mcap"
+    assert f"https://app.foxglove.dev/~/view?ds=remote-file&ds.url={quote(address, safe='')}" in links
 
 
 def test_headings_landmarks_and_names_are_there(visit: Open) -> None:

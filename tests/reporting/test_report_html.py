@@ -112,7 +112,7 @@ def pictured(text: str = "fine") -> Report:
     graph = replace(both_ways(), nodes=(text,), endpoints=ends)
     drawn = GraphFigure("velocity_publisher-2", text, text, ("rate",), (Stage(text, graph),))
     topic = TopicValues(f"/{text}", text, "student", 1, (0.5,), (Column(text, (text,)),))
-    timeline = replace(chart, until_s=1.0)
+    timeline = replace(chart, scenario=text, until_s=1.0)
     played = Playback("velocity_publisher-3", text, text, (), timeline, (topic,), ((0.0, graph),))
     made = next(e for e in middling().exercises if e.id == "velocity_publisher")
     place = next(v.location for v in made.verdicts if v.location)
@@ -173,6 +173,15 @@ def test_nothing_is_loaded_from_elsewhere(assets: str | None) -> None:
     assert {a for a in addresses if not a.startswith("#")} == beside
     assert "@import" not in bundle().style
     assert "url(" not in bundle().style
+
+
+def test_kept_recordings_are_named_for_foxglove() -> None:
+    """With the path from the page to the file; a page without evidence names none."""
+    page = Page(render_html(pictured("<b>"), recordings="../the evidence"))
+    path = "../the%20evidence/velocity_publisher.%3Cb%3E/velocity_publisher.%3Cb%3E_0.mcap"
+    assert ("a", "href", path) in page.attributes
+    assert "Open this recording in Foxglove" in page.text
+    assert "Foxglove" not in Page(render_html(pictured())).text
 
 
 def test_the_policy_lets_only_our_script_run() -> None:

@@ -156,11 +156,12 @@ def _number(value: float, digits: int = 7) -> float | int | None:
 _CIRCUMFERENCE = 100
 
 
-def render_html(report: Report, *, assets: str | None = None) -> str:
+def render_html(report: Report, *, assets: str | None = None, recordings: str = "") -> str:
     """Return a report, all of whose text is treated as hostile, as an HTML page that makes no network requests.
 
     The page finds the files of `bundle` at `assets`, relative to itself, e.g. `../assets`. None puts them into
-    the page, which then stands alone.
+    the page, which then stands alone. Recordings is the folder of the kept evidence, relative to the page; empty if
+    its readers have none.
     """
     page = _templates().get_template("report.html")
     figures = {figure.id: figure_values(figure) for e in report.exercises for figure in e.figures}
@@ -168,6 +169,7 @@ def render_html(report: Report, *, assets: str | None = None) -> str:
         report=report,
         bundle=bundle(),
         assets=assets,
+        recordings=recordings,
         figures=Markup(script_json(figures)),  # noqa: S704  the function exists to make it safe in a script element
         embedded=Markup,
         clock_wall=ClockKind.WALL,

@@ -207,6 +207,14 @@
     printing = false;
   }
 
+  // Foxglove loads a recording by its address only from a web server.
+  if (location.protocol === "https:") {
+    for (const link of document.querySelectorAll("[data-foxglove]")) {
+      const address = new URL(link.dataset.foxglove, location.href).href;
+      link.href = `https://app.foxglove.dev/~/view?ds=remote-file&ds.url=${encodeURIComponent(address)}`;
+    }
+  }
+
   drawVisible();
   document.addEventListener("toggle", () => { if (!printing) drawVisible(); }, true);
   window.addEventListener("beforeprint", printed);
