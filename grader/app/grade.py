@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import grader
-from grader.app.request import GradeRequest, reproduction, request_to_json
+from grader.app.kept_recordings import PlannedRun, kept_traces, plays_odometry, recorded_alike
+from grader.app.request import GradeRequest, recording_digest, reproduction, request_to_json
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
-from grader.core.errors import SubmissionError
+from grader.core.errors import EvidenceError, SubmissionError
 from grader.core.exercise import Exercise, exercise_name
 from grader.core.releases import TRIED
 from grader.core.report import Environment, Report
-from grader.core.scenario import OdometryStream
 from grader.core.shipped import PACKAGE
 from grader.core.submission import Run, Submission
 from grader.core.trace import Trace
 from grader.execution.bag import Odometry, read_odometry
-from grader.execution.evidence.store import check_place, keep
+from grader.execution.evidence.store import check_place, keep, open_evidence
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
 from grader.execution.supervisor import Job
@@ -59,7 +59,7 @@ class EarlyReports:
         self._awaited = set(scenarios)
         self._run = run
         self._on_report = on_report
-        self._traces: dict[Key, Trace] = {}
+        self._traces = dict(run.traces)
         self._started = time.perf_counter()
 
     def take(self, key: Key, trace: Trace) -> None:
@@ -126,15 +126,19 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         root.chmod(0o755)  # as the folder of the session
         submission = _staged(request, exercises, root)
         if request.every:
-            exercises, submission = _begun(exercises, submission)
+            exercises, submission = begun(exercises, submission)
         odometry = read_recording(request, exercises)
         seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
-        jobs = plan_jobs(request, exercises, submission, odometry, seed)
+        environment = _environment(session)
+        kept = _kept(request, exercises, submission, odometry, seed, environment)
+        done = {exercise for exercise, _ in kept}
+        unrecorded = [exercise for exercise in exercises if exercise.id not in done]
+        jobs = plan_jobs(request, unrecorded, submission, odometry, seed)
         run = Run(
             submission=submission,
-            traces={},
+            traces=kept,
             sources=read_sources(submission),
-            environment=_environment(session),
+            environment=environment,
             seed=seed,
             duration_s=time.perf_counter() - started,
             notes=(*submission.notes, *_notes(request, session)),
@@ -149,10 +153,31 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_one, session, progress, RealTimeBudget(request.time_budget_s))
             traces = check(checks, jobs, traces, record, take or (lambda *_: None))
-        run = replace(run, traces=traces, duration_s=time.perf_counter() - started)
+        run = replace(run, traces={**kept, **traces}, duration_s=time.perf_counter() - started)
         if on_recorded is not None:
             on_recorded(run, exercises)
         return judge_run(exercises, run, pictures=pictures)
+
+
+def _kept(  # noqa: PLR0913  all that a recording depends on
+    request: GradeRequest,
+    exercises: Sequence[Exercise],
+    submission: Submission,
+    odometry: Odometry | None,
+    seed: int,
+    environment: Environment,
+) -> Mapping[Key, Trace]:
+    """Return the kept recordings that this run would make again with the same software; none if one is damaged."""
+    if request.recordings is None:
+        return {}
+    planned = PlannedRun(submission.digest, seed, "" if odometry is None else recording_digest(odometry))
+    try:
+        evidence = open_evidence(request.recordings)
+        if evidence.manifest.environment != environment:
+            return {}
+        return kept_traces(evidence, recorded_alike(evidence, exercises, planned))
+    except EvidenceError:
+        return {}
 
 
 def _record_one(session: RecordingSession, progress: Progress, budget: RealTimeBudget, job: Job) -> Trace:
@@ -187,8 +212,7 @@ def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odom
     """Read the /odom recording if one was given or an exercise plays one."""
     if request.odom_bag is not None:
         return read_odometry(request.odom_bag)
-    stimuli = (stimulus for e in exercises for scenario in e.scenarios for stimulus in scenario.stimuli)
-    return builtin_recording() if any(isinstance(s, OdometryStream) for s in stimuli) else None
+    return builtin_recording() if plays_odometry(exercises) else None
 
 
 def plan_jobs(
@@ -207,7 +231,7 @@ def plan_jobs(
     }
 
 
-def _begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[Exercise], Submission]:
+def begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[Exercise], Submission]:
     """Return the exercises that a submission has a file for, and the submission limited to their files."""
     begun = [e for e in exercises if any(submission.files[name].found for name in e.files)]
     if not begun:

@@ -14,11 +14,20 @@ from pathlib import Path
 from typing import cast
 
 from grader.app.grade import read_exercises
+from grader.app.kept_recordings import kept_traces, plays_odometry
 from grader.app.request import GradeRequest, command_words, request_of
 from grader.core.errors import ALL_MET, NOT_ALL_MET, UNDECIDED, UNUSABLE, EvidenceError, GraderError, exit_code
 from grader.core.exercise import Exercise
-from grader.core.report import Report
-from grader.execution.evidence.store import Evidence, first_report, found_under, is_evidence, open_evidence, run_of
+from grader.core.report import Report, Reproduction
+from grader.execution.evidence.store import (
+    Evidence,
+    first_report,
+    found_under,
+    is_evidence,
+    open_evidence,
+    run_from,
+    run_of,
+)
 from grader.judging.judge_run import judge_run
 from grader.reporting.audience import ANYBODY, Readers, told
 from grader.reporting.delivery import Output, write_report
@@ -73,6 +82,21 @@ def rejudge(evidence: Evidence, how: Judgement) -> Report:
         request = replace(request, exercises=how.chosen)
     again = replace(run.reproduce, command=command_words(request, kept.seed))
     return judge_run(exercises, replace(run, reproduce=again), pictures=how.pictures)
+
+
+def judged_again(evidence: Evidence, exercises: Sequence[Exercise], request: GradeRequest, odometry: str) -> Report:
+    """Judge kept recordings as the report of a request that would record the same; raises EvidenceError for damage.
+
+    The odometry is the digest of the recording that exercises play.
+    """
+    run = run_from(evidence.manifest, exercises, kept_traces(evidence, exercises))
+    given = Reproduction(
+        command=command_words(request, run.seed),
+        rubrics=run.reproduce.rubrics,
+        recording=odometry if plays_odometry(exercises) else "",
+    )
+    submission = replace(run.submission, path=request.submission)
+    return judge_run(exercises, replace(run, submission=submission, reproduce=given), pictures=True)
 
 
 def what_changed(name: str, evidence: Evidence, report: Report) -> ReportChange | None:

@@ -41,6 +41,9 @@ class GradeRequest:
     spot_checks: float = 0.0  # share of submissions, from 0 to 1, that are also recorded on the wall clock
     # The files of the submission if they were read before, perhaps on another machine; None to read them now
     collected: Collected | None = None
+    # Evidence of the same submission, graded under the same conditions by perhaps another rubric; its recordings of
+    # unchanged exercises are used instead of a run. None to record everything.
+    recordings: Path | None = None
     student: str = ""  # id of the student whose variant is graded; empty if nothing varies
     variant_key: Path | None = None  # file with the course key, as the user typed it; None if not given
     draw: Draw | None = None  # supplies variant values; if None, rubrics with variants are refused

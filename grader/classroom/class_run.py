@@ -32,17 +32,18 @@ from grader.classroom.grading import (
 )
 from grader.classroom.intake import HandedInEntry, Intake, take_in
 from grader.classroom.local import LocalScheduler, MakeScheduler
-from grader.classroom.outputs import CLASS, Graded, class_files, exports, summary_json
+from grader.classroom.outputs import CHANGES, CLASS, Graded, class_files, exports, summary_json
 from grader.classroom.roster import RosterMatch, match, read_roster
-from grader.classroom.store import SEED_KEY, Conditions, Store, open_store
+from grader.classroom.store import BEFORE, REPORT, SEED_KEY, Conditions, Store, open_store
 from grader.classroom.watching import Watcher
-from grader.classroom.worker import GRADESCOPE, HANDED_BACK, PAGE, REPORT
-from grader.core.errors import GraderError, HarnessError
+from grader.classroom.worker import GRADESCOPE, HANDED_BACK, PAGE
+from grader.core.errors import GraderError, HarnessError, SubmissionError
 from grader.core.exercise import Exercise
 from grader.execution.temp_dirs import scratch_folder
 from grader.reporting.class_page.contents import PageLink
 from grader.reporting.html.class_links import with_class_links
 from grader.reporting.json_report import ReportData
+from grader.reporting.rejudged import ReportChange, change, render_changes_table
 from grader.rubrics.variants import First
 from grader.similarity.finding import find_similar, read_programs
 from grader.similarity.library import ComparedProgram, Handed, Similar
@@ -75,19 +76,21 @@ def grade_class(
         own = own_conditions(course, intake.entries, matching.people, exercises, conditions)
         decisions_for(intake.entries, matching, adjustments)  # reports mistakes before hours of grading
         with scratch_folder() as scratch:
-            digests = {entry.name: _digest(entry, scratch) for entry in intake.entries}
+            read = {entry.name: _digest(entry, scratch) for entry in intake.entries}
+        digests = {name: digest for name, (digest, _) in read.items()}
+        refusals = {name: error for name, (_, error) in read.items() if error is not None}
         own = _seeded(own, digests, course)
         # If a digest is unknown, grading the submission in its own process will report why.
         keys = {name: own[name].key(digest) if digest else "" for name, digest in digests.items()}
         due = due_now(store, intake.entries, keys, course.rerun)
+        run = ClassRun(course, exercises, own, store, watcher, refusals).with_recordings(due, digests)
         before = len(intake.entries) - len(due)
-        watcher.begin(len(due), before)
-        run = ClassRun(course, exercises, own, store, watcher)
+        watcher.begin(len(due), before, recorded=run.from_recordings)
         book = partial(_book, store, intake, matching, adjustments, keys)
         began = time.monotonic()
         try:
-            not_replaced = run.grade(due, warn, make_scheduler)
-            graded = _compared(Graded(book(), len(due), before, not_replaced), intake, course, store)
+            now = run.grade(due, warn, make_scheduler)
+            graded = _compared(Graded(book(), len(due), before, now, changes=_changes(store)), intake, course, store)
         except (KeyboardInterrupt, HarnessError):
             with suppress(GraderError):  # the error that stopped the run is more useful
                 stopped = book()
@@ -113,7 +116,7 @@ def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Condi
     )
 
 
-def _digest(entry: HandedInEntry, scratch: Path) -> str:
+def _digest(entry: HandedInEntry, scratch: Path) -> tuple[str, SubmissionError | None]:
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
         return digest_of(entry, Path(folder))
 
@@ -175,9 +178,23 @@ def _written(graded: Graded, run: RunOfClass, store: Store, course: ClassRequest
     remarks = (*graded.remarks, *(export.remark for export in made.values() if export.remark))
     graded = replace(graded, left_out=left_out, remarks=remarks)
     files = class_files(graded.book, made, run, links=graded.links, standalone=course.standalone)
+    if graded.changes:
+        files = {CHANGES: render_changes_table(graded.changes).encode(), **files}
     written = _write({CLASS: summary_json(graded).encode(), **files}, store)
     _link_students(graded.book, store)
+    store.forget_before()
     return replace(graded, files=(*graded.files, *written))
+
+
+def _changes(store: Store) -> tuple[ReportChange, ...]:
+    """Compare each submission that was graded again with its report from before."""
+    found = []
+    for name in store.names():
+        before, after = _report(store.place(name) / BEFORE), _report(store.place(name) / REPORT)
+        if before is not None and after is not None:
+            with suppress(KeyError, TypeError, ValueError):  # a report that somebody edited
+                found.append(change(name, before, after))
+    return tuple(found)
 
 
 def _write(files: Mapping[str, bytes], store: Store) -> tuple[Path, ...]:

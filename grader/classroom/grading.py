@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from grader.app.grade import read_exercises
+from grader.app.grade import begun, read_exercises, wanted_files
 from grader.app.request import GradeRequest
 from grader.app.seeds import ByKey, SeedKey, checked, drawn, read_key
 from grader.classroom.downloads import AUTO
 from grader.classroom.intake import HandedInEntry
 from grader.classroom.local import MakeScheduler, Task
-from grader.classroom.outputs import Platforms
+from grader.classroom.outputs import GradedNow, Platforms
+from grader.classroom.regrading import KeptRecordings, kept_recordings, regrade
 from grader.classroom.roster import Person
 from grader.classroom.store import Conditions, Kept, ResultStatus, State, Store, refused, unusable_digest
 from grader.classroom.watching import Watcher
@@ -23,7 +25,9 @@ from grader.core.errors import ClassError, GraderError, HarnessError, Submission
 from grader.core.exercise import Exercise
 from grader.execution.recording_session import workers_for
 from grader.execution.supervisor import MARGIN_S, TRIES
+from grader.execution.temp_dirs import scratch_folder
 from grader.reporting.html.assets import bundle
+from grader.rubrics.variants import Recorded
 from grader.similarity.library import ComparedProgram
 from grader.submissions.submission import stage_submission
 
@@ -57,22 +61,27 @@ class ClassRequest:
     jobs: int | None = None  # submissions graded in parallel; None for one per processor
     rerun: str = CHANGED  # `--rerun`, one of the values above
     seed_key: SeedKey | None = None  # the key that seeds are derived from; None for the one stored with the results
+    runs_here: bool = True  # whether programs run on this machine, where the kept recordings are
     standalone: bool = False  # whether each HTML report is self-contained
     platforms: Platforms = _NO_PLATFORMS
     # Code handed out to everyone, ignored when submissions are compared; None to skip the comparison
     given: tuple[ComparedProgram, ...] | None = None
 
 
-def digest_of(entry: HandedInEntry, scratch: Path) -> str:
-    """Compute the digest of a submission, copied to an empty folder; empty if that is not possible."""
+def digest_of(entry: HandedInEntry, scratch: Path) -> tuple[str, SubmissionError | None]:
+    """Return the digest of a submission, copied to an empty folder, and why it cannot be used, if so.
+
+    The digest is empty if it cannot be computed; grading the submission in its own process will report why.
+    """
     if entry.problem:
-        return unusable_digest(SubmissionError(entry.problem))
+        error = SubmissionError(entry.problem)
+        return unusable_digest(error), error
     try:
-        return stage_submission(str(entry.path), (), scratch).digest
+        return stage_submission(str(entry.path), (), scratch).digest, None
     except SubmissionError as error:
-        return unusable_digest(error)
+        return unusable_digest(error), error
     except (GraderError, OSError, MemoryError, RecursionError):
-        return ""  # grading it in its own process will report why
+        return "", None
 
 
 def due_now(store: Store, entries: Sequence[HandedInEntry], keys: Mapping[str, str], rerun: str) -> list[HandedInEntry]:
@@ -85,6 +94,14 @@ def due_now(store: Store, entries: Sequence[HandedInEntry], keys: Mapping[str, s
         if again or is_due(kept, key, CHANGED):
             due.append(entry)
     return due
+
+
+def is_asked_for(store: Store, name: str, rerun: str) -> bool:
+    """Whether a submission has to be graded although its result is current."""
+    pending, kept = store.pending(rerun), store.kept(name)
+    if pending is not None:
+        return name in pending
+    return kept.result is None or is_due(kept, kept.result.key, rerun)
 
 
 def is_due(kept: Kept, key: str, rerun: str) -> bool:
@@ -112,32 +129,77 @@ class ClassRun:
     conditions: Mapping[str, Conditions]  # name of a submission -> what its result depends on
     store: Store
     watcher: Watcher
+    refusals: Mapping[str, SubmissionError]  # name of a submission -> why it cannot be used
+    # Name of a submission -> its recordings that can be used instead of a run
+    recordings: Mapping[str, KeptRecordings] = field(default_factory=dict)
 
-    def grade(self, due: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler) -> tuple[str, ...]:
-        """Grade submissions, and return the names of those whose earlier, better result was kept.
+    def with_recordings(self, due: Sequence[HandedInEntry], digests: Mapping[str, str]) -> ClassRun:
+        """Find the kept recordings of the submissions that are due only because of a changed rubric."""
+        found: dict[str, KeptRecordings] = {}
+        for entry in due:
+            result, own = self.store.kept(entry.name).result, self.conditions[entry.name]
+            if entry.name in self.refusals or is_asked_for(self.store, entry.name, self.course.rerun):
+                continue
+            if result is not None and result.recorded == own.recorded(digests[entry.name]):
+                exercises = _graded_by(self.course, entry, own, self.exercises)
+                kept = kept_recordings(self.store.place(entry.name), result, own, exercises, digests[entry.name])
+                if kept is not None and (kept.suffice or self.course.runs_here):
+                    found[entry.name] = kept
+        return replace(self, recordings=found)
+
+    @property
+    def from_recordings(self) -> int:
+        """How many submissions need no run, because their kept recordings suffice."""
+        return sum(kept.suffice for kept in self.recordings.values())
+
+    def grade(self, due: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler) -> GradedNow:
+        """Grade submissions, from kept recordings where these suffice.
 
         Raises EnvironmentFault if nothing can be graded here, HarnessError if a disk is full; results so far are kept.
         """
         left = {entry.name for entry in due}
         self._note(left)
         for entry in due:
-            if entry.problem:
-                status = refused(entry.label, self.conditions[entry.name], SubmissionError(entry.problem))
+            if entry.name in self.refusals:
+                status = refused(entry.label, self.conditions[entry.name], self.refusals[entry.name])
                 self._take(entry.name, self.store.fresh(entry.name), status, left)
-        usable = [entry for entry in due if not entry.problem]
+        usable = [entry for entry in due if entry.name not in self.refusals]
         if not usable:
-            return ()
-        return self._schedule(usable, warn, make, left)
-
-    def _schedule(
-        self, usable: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler, left: set[str]
-    ) -> tuple[str, ...]:
+            return GradedNow()
         for name, data in ({} if self.course.standalone else bundle().files).items():
             self.store.write(f"assets/{name}", data)
-        cores = len(os.sched_getaffinity(0))
-        jobs = self.course.jobs or cores
-        tasks = [self._task(entry, workers_for(cores // jobs)) for entry in usable]
-        scheduler = make(jobs)
+        judged = self._judge(usable, warn, left)
+        to_run = [entry for entry in usable if entry.name not in judged]
+        partly = [e.name for e in to_run if e.name in self.recordings and not self.recordings[e.name].suffice]
+        not_replaced = self._schedule(to_run, warn, make, left) if to_run else ()
+        return GradedNow(len(judged), len(to_run), len(partly), not_replaced)
+
+    def _judge(self, usable: Sequence[HandedInEntry], warn: Callable[[str], None], left: set[str]) -> set[str]:
+        """Judge kept recordings where these suffice, and return the names of the submissions that this worked for."""
+        found = {entry.name: self.recordings[entry.name] for entry in usable if entry.name in self.recordings}
+        work = {e.name: (self._task(e), found[e.name]) for e in usable if e.name in found and found[e.name].suffice}
+        judged = set()
+        with closing(regrade(work, self._jobs)) as attempts:
+            for attempt in attempts:
+                name, status = attempt.task.name, attempt.status
+                if status.state is State.FAILED:
+                    shutil.rmtree(attempt.task.into, ignore_errors=True)
+                    warn(f"{name}: its recordings cannot be used, so it is run again: {status.problem}")
+                    continue
+                before = self.store.kept(name).result
+                self._take(name, attempt.task.into, replace(status, usage={} if before is None else before.usage), left)
+                judged.add(name)
+        return judged
+
+    @property
+    def _jobs(self) -> int:
+        return self.course.jobs or len(os.sched_getaffinity(0))
+
+    def _schedule(
+        self, to_run: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler, left: set[str]
+    ) -> tuple[str, ...]:
+        tasks = [self._task(entry) for entry in to_run]
+        scheduler = make(self._jobs)
         for line in scheduler.prepare(self.course.grading.isolation):
             warn(line)
         not_replaced = []
@@ -151,6 +213,7 @@ class ClassRun:
 
     def _take(self, name: str, fresh: Path, status: ResultStatus, left: set[str]) -> bool:
         """Store the result of an attempt; return whether it replaced the earlier one."""
+        self.store.remember(name, fresh, status)
         replaced = self.store.commit(name, fresh, status)
         left.discard(name)
         self._note(left)
@@ -162,8 +225,9 @@ class ClassRun:
         if self.course.rerun != CHANGED:
             self.store.note_pending(self.course.rerun, left)
 
-    def _task(self, entry: HandedInEntry, workers: int) -> Task:
+    def _task(self, entry: HandedInEntry) -> Task:
         grading = self.course.grading
+        kept = self.recordings.get(entry.name)
         return Task(
             name=entry.name,
             label=entry.label,
@@ -174,9 +238,10 @@ class ClassRun:
             odom_bag=grading.odom_bag,
             conditions=self.conditions[entry.name],
             variant_key=grading.variant_key,
-            workers=workers,
+            workers=workers_for(len(os.sched_getaffinity(0)) // self._jobs),
             standalone=self.course.standalone,
             deadline_s=deadline_s(self.course.grading.time_budget_s),
+            recordings=None if kept is None else kept.evidence.resolve(),
         )
 
     def _stop_if_full(self, status: ResultStatus) -> None:
@@ -187,6 +252,19 @@ class ClassRun:
             if place.free_bytes < LEAST_FREE_BYTES:
                 hint = "free some space; the same command goes on where it was"
                 raise HarnessError(f"{place.folder}: expected room for results, found the disk full", hint)
+
+
+def _graded_by(
+    course: ClassRequest, entry: HandedInEntry, conditions: Conditions, exercises: Sequence[Exercise]
+) -> Sequence[Exercise]:
+    """Return the exercises of one submission: of its student's variant, and with `every` only those with a file."""
+    if conditions.variants is not None:
+        exercises = read_exercises(replace(course.grading, draw=Recorded(conditions.variants)), course.sources)
+    if not conditions.every:
+        return exercises
+    with scratch_folder() as scratch:
+        staged = stage_submission(str(entry.path), wanted_files(exercises), scratch)
+        return begun(exercises, staged)[0]
 
 
 def student_of(person: Person | None) -> str:

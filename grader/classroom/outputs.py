@@ -16,8 +16,11 @@ from grader.reporting.class_page.contents import PageLink
 from grader.reporting.class_page.render import class_assets, render_class
 from grader.reporting.escape import json_value, shown
 from grader.reporting.json_report import json_text
+from grader.reporting.rejudged import ReportChange, change_summary
 
 PAGE, GRADEBOOK, CLASS, ASSETS = "index.html", "gradebook.csv", "batch.json", "assets"
+#: What a run that graded again changed.
+CHANGES = "changes.csv"
 SCHEMA = "grader/batch/v1"
 #: Most names in one line of the summary.
 _MOST = 10
@@ -81,14 +84,28 @@ def class_files(
 
 
 @dataclass(frozen=True, slots=True)
+class GradedNow:
+    """What one run of the command graded."""
+
+    judged: int = 0  # submissions judged again from kept recordings, without running anything
+    run: int = 0  # submissions whose programs ran
+    partly_run: int = 0  # those of them that ran only for the exercises that had to be recorded again
+    not_replaced: tuple[str, ...] = ()  # names of submissions whose earlier, better result was kept
+
+
+_NOTHING = GradedNow()
+
+
+@dataclass(frozen=True, slots=True)
 class Graded:
     """A class after grading."""
 
     book: Gradebook
     graded: int  # number of submissions graded in this run
     kept_before: int  # number of submissions that already had results
-    # Names of submissions whose new attempt was worse than the stored result, which was kept
-    not_replaced: tuple[str, ...] = ()
+    now: GradedNow = _NOTHING  # how the submissions of this run were graded
+    # Submissions with the same files as before that were graded again, compared with their report from before
+    changes: tuple[ReportChange, ...] = ()
     files: tuple[Path, ...] = ()  # the files written for the whole class
     # Platform -> who is missing in its file, and why
     left_out: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -99,14 +116,23 @@ class Graded:
 def render_summary(graded: Graded) -> str:
     """Summarise the class in a few lines: counts, scores, and everybody who needs attention."""
     book = graded.book
-    lines = [f"graded now: {graded.graded}, done before: {graded.kept_before}"]
+    lines = [f"graded now: {graded.graded}{_how(graded.now)}, done before: {graded.kept_before}"]
+    lines += change_summary(graded.changes) if graded.changes else []
     lines += [f"{status.value}: {book.count(status)}" for status in Status if book.count(status)]
     lines += _scores(book)
-    lines += _lists(book, graded.not_replaced)
+    lines += _lists(book, graded.now.not_replaced)
     lines += [f"not in {platform}: {line}" for platform, out in graded.left_out.items() for line in out]
     lines += [f"note: {remark}" for remark in graded.remarks]
     lines += [f"written: {shown(str(path), limit=300)}" for path in graded.files if path.suffix in _OPENED]
     return "\n".join(lines) + "\n"
+
+
+def _how(now: GradedNow) -> str:
+    """Tell how many were judged from recordings and how many run; empty if all were run."""
+    if not now.judged and not now.partly_run:
+        return ""
+    partly = f", {now.partly_run} of them only for what changed" if now.partly_run else ""
+    return f" ({now.judged} from kept recordings, {now.run} run{partly})"
 
 
 def summary_json(graded: Graded) -> str:
@@ -118,7 +144,9 @@ def summary_json(graded: Graded) -> str:
             "schema": SCHEMA,
             "graded_now": graded.graded,
             "done_before": graded.kept_before,
-            "not_replaced": list(graded.not_replaced),
+            "judged_again": graded.now.judged,
+            "run_now": graded.now.run,
+            "not_replaced": list(graded.now.not_replaced),
             "counts": {status.value: book.count(status) for status in Status},
             "students": [_row(row, exported=any(row is each for each in to_export)) for row in book.rows],
             "unmatched": list(matching.unmatched),

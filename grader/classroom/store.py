@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from enum import Enum
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -54,6 +55,8 @@ class ResultStatus:
     max_score: float = 0.0
     duration_s: float = 0.0
     usage: Mapping[str, float] = field(default_factory=dict)  # resources used: `processor_s` and `peak_bytes`
+    # What its recordings depend on besides their scenarios; see `Conditions.recorded`. Empty if nothing was recorded.
+    recorded: str = ""
     schema: str = SCHEMA  # version of this format
 
 
@@ -71,7 +74,9 @@ def load(data: bytes) -> ResultStatus | None:
     return status if status.schema == SCHEMA else None
 
 
-RESULT, ATTEMPT = "result.json", "attempt.json"
+RESULT, ATTEMPT, REPORT = "result.json", "attempt.json", "report.json"
+#: The report from before a run that is not finished, of a submission that this run graded again.
+BEFORE = ".before.json"
 #: The seed key of the class; only its owner can read it, and no exported file contains it.
 SEED_KEY = ".seed.key"
 _FRESH, _OLD = ".new", ".old"
@@ -115,6 +120,14 @@ class Store:
         """Return the names of all results, in order."""
         return sorted(path.name for path in self._students.iterdir() if (path / RESULT).is_file())
 
+    def remember(self, name: str, fresh: Path, status: ResultStatus) -> None:
+        """Put the report that an unfinished run began with beside a new result of the same files, to compare them."""
+        place, result = self.place(name), self.kept(name).result
+        old = next((path for path in (place / BEFORE, place / REPORT) if path.is_file()), None)
+        if old is not None and fresh.is_dir() and result is not None and result.digest == status.digest:
+            with suppress(OSError):  # without it only the comparison lacks a line
+                shutil.copyfile(old, fresh / BEFORE)
+
     def commit(self, name: str, fresh: Path, status: ResultStatus) -> bool:
         """Store a new result, whose folder of files is moved or deleted; return whether it replaced the old one.
 
@@ -146,6 +159,11 @@ class Store:
         except OSError as error:
             raise HarnessError(f"{path}: cannot be written: {error.strerror}", "free some space") from None
         return path
+
+    def forget_before(self) -> None:
+        """Delete the reports from before a run, because it is finished."""
+        for path in self._students.glob(f"*/{BEFORE}"):
+            path.unlink(missing_ok=True)
 
     def pending(self, rerun: str) -> frozenset[str] | None:
         """Return the names that a stopped run still had to grade; None if there was no such run."""
@@ -255,7 +273,16 @@ class Conditions:
 
     def key(self, submission: str) -> str:
         """Return the cache key of a result, given the digest of the submission."""
+        return self._digest({**asdict(self), "submission": submission}, submission)
+
+    def recorded(self, submission: str) -> str:
+        """Return the key of the recordings of a submission: of all that they depend on besides the scenarios."""
         depends_on = {**asdict(self), "submission": submission}
+        for scenarios in ("rubrics", "variants", "every", "recording"):
+            del depends_on[scenarios]
+        return self._digest(depends_on, submission)
+
+    def _digest(self, depends_on: dict[str, Any], submission: str) -> str:
         # A changed share affects only submissions that are drawn with one share and not with the other.
         if is_drawn(depends_on.pop("spot_checks"), self.seed or 0, submission):
             depends_on["spot_check"] = True

@@ -30,10 +30,11 @@ class Watcher:
         self._total = self._count = 0
         self._running: set[str] = set()
 
-    def begin(self, total: int, kept: int) -> None:
-        """Start, with the numbers of submissions to grade and of those that already have results."""
+    def begin(self, total: int, kept: int, recorded: int = 0) -> None:
+        """Start, with the numbers of submissions to grade, of those with results, and of those that need no run."""
         self._total, self._started_s = total, self._clock()
-        self._write(f"to grade: {total}" + (f", done before: {kept}" if kept else ""))
+        again = f" ({recorded} of them from kept recordings)" if recorded else ""
+        self._write(f"to grade: {total}{again}" + (f", done before: {kept}" if kept else ""))
 
     def step(self, name: str, step: str) -> None:  # noqa: ARG002  steps are not shown
         """Record that a step of a submission begins."""
@@ -74,10 +75,12 @@ class LiveWatcher(Watcher):
         super().__init__(lambda line: progress.console.print(line, markup=False, highlight=False))
         self._progress = progress
 
-    def begin(self, total: int, kept: int) -> None:
+    def begin(self, total: int, kept: int, recorded: int = 0) -> None:
         """See Watcher."""
         self._total, self._started_s = total, self._clock()
         self._progress.add_task("", total=total, words="")
+        if recorded:
+            self._write(f"from kept recordings: {recorded}")
         if kept:
             self._write(f"done before: {kept}")
 

@@ -21,7 +21,7 @@ from grader.app.request import GradeRequest
 from grader.classroom import store as kept
 from grader.classroom.local import Task
 from grader.classroom.messages import read_collected
-from grader.classroom.store import Conditions, ResultStatus, State, refused
+from grader.classroom.store import REPORT, Conditions, ResultStatus, State, refused
 from grader.core.errors import GraderError, SubmissionError
 from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S
@@ -36,7 +36,7 @@ from grader.reporting.json_report import dumps
 from grader.reporting.platforms.gradescope import render_gradescope
 from grader.rubrics.variants import Recorded
 
-REPORT, PAGE, EVIDENCE = "report.json", "report.html", "evidence"
+PAGE, EVIDENCE = "report.html", "evidence"
 #: Files for students, with what the rubric lets them see on the day of grading.
 HANDED_BACK, HANDED_BACK_PAGE, GRADESCOPE = "feedback.json", "feedback.html", "gradescope.json"
 #: All files and folders of a result.
@@ -106,8 +106,20 @@ def attempt(task: Task, progress: Progress, grade: Grade) -> ResultStatus:
 
 
 def _graded(task: Task, progress: Progress, grade: Grade) -> ResultStatus:
+    request = request_for(task)
+    task.into.mkdir()
+    writer = EvidenceWriter([task.into / EVIDENCE], request)
+    report = grade(request, progress, writer.remember)
+    progress("writing the results")
+    write_reports(report, task)
+    writer.write(report)
+    return status_of(report, task)
+
+
+def request_for(task: Task) -> GradeRequest:
+    """Return the request to grade the submission of a task."""
     conditions, own = task.conditions, task.conditions.variants
-    request = GradeRequest(
+    return GradeRequest(
         submission=str(task.submission),
         exercises=task.exercises,
         every=conditions.every,
@@ -123,19 +135,23 @@ def _graded(task: Task, progress: Progress, grade: Grade) -> ResultStatus:
         student=own.student if own is not None else "",
         variant_key=task.variant_key if own is not None else None,
         draw=Recorded(own) if own is not None else None,
+        recordings=task.recordings,
     )
-    task.into.mkdir()
-    writer = EvidenceWriter([task.into / EVIDENCE], request)
-    report = grade(request, progress, writer.remember)
-    progress("writing the results")
+
+
+def write_reports(report: Report, task: Task) -> None:
+    """Write a report in all its formats into the folder of a task; raises OSError."""
     today = date.today().isoformat()  # noqa: DTZ011  the local date where it is graded
     for name, text in _files(report, task, today).items():
         write_whole(task.into / name, text.encode())
-    writer.write(report)
-    key = _used(conditions, report.reproduce).key(report.digest)
+
+
+def status_of(report: Report, task: Task) -> ResultStatus:
+    """Return the status of a submission with a report."""
     return ResultStatus(
         state=State.GRADED if report.final else State.UNDECIDED,
-        key=key,
+        key=_used(task.conditions, report.reproduce).key(report.digest),
+        recorded=task.conditions.recorded(report.digest),
         digest=report.digest,
         label=task.label,
         score=float(report.score),

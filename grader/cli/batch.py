@@ -139,6 +139,7 @@ def command(  # noqa: PLR0913  one parameter an option
         grading=GradeRequest("", exercises=tuple(dict.fromkeys(exercises)), seed=seed, **as_given),
         jobs=jobs,
         rerun=rerun,
+        runs_here=scheduler is None,
         seed_key=drawn_with(seed, seed_key),
         standalone=standalone,
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),

@@ -17,6 +17,7 @@ from grader.cli.options import (
     parse_percent,
     print_result,
     readers,
+    write_file,
 )
 from grader.core.errors import exit_code
 from grader.reporting.formats import FORMATS
@@ -59,7 +60,10 @@ if TYPE_CHECKING:
     callback=parse_percent,
     help="Exit with 0 if every score is at least P percent.",
 )
-@click.option("--diff", "show_changes", is_flag=True, help="Print what changed since grading, dropped marks first.")
+@click.option(
+    "--diff", "show_changes", is_flag=True, help="Print what changed since grading: in all, then dropped marks first."
+)
+@click.option("--csv", "table", type=PATH, metavar="FILE", help="Write the changes of --diff as a table, too.")
 @click.option("--verify", is_flag=True, help="Make sure that recordings show what is judged; slower.")
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes for a class; by default one a core.")
 @audience_options
@@ -72,6 +76,7 @@ def command(  # noqa: PLR0913  one parameter an option
     outputs: tuple[Output, ...],
     min_score: Fraction | None,
     show_changes: bool,
+    table: Path | None,
     verify: bool,
     jobs: int | None,
     audience: str | None,
@@ -93,6 +98,8 @@ def command(  # noqa: PLR0913  one parameter an option
     for_whom = readers(audience, as_of)
     if show_changes and for_whom.only_students:
         raise click.BadParameter("--diff tells reasons as they are: it is for instructors")
+    if table is not None and not show_changes:
+        raise click.BadParameter("--csv needs --diff")
     how = rejudge.judgement(
         tuple(dict.fromkeys(exercises)),
         rubrics,
@@ -109,7 +116,7 @@ def command(  # noqa: PLR0913  one parameter an option
         min_score=min_score,
         readers=for_whom,
     )
-    return _class(evidence, how, wanted, as_json=as_json, jobs=jobs)
+    return _class(evidence, how, wanted, as_json=as_json, jobs=jobs, table=table)
 
 
 def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fraction | None, for_whom: Readers) -> int:
@@ -125,14 +132,18 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
     return exit_code(told(report, for_whom), min_score)
 
 
-def _class(evidence: Sequence[Path], how: Judgement, wanted: Wanted, *, as_json: bool, jobs: int | None) -> int:
+def _class(  # noqa: PLR0913  one parameter an option
+    evidence: Sequence[Path], how: Judgement, wanted: Wanted, *, as_json: bool, jobs: int | None, table: Path | None
+) -> int:
     """Judge many submissions, print their results, and write one file for each submission and format."""
     from grader.app import rejudge
-    from grader.reporting.rejudged import render_changes, render_results, results_to_json
+    from grader.reporting.rejudged import render_changes, render_changes_table, render_results, results_to_json
 
     if any(output.path is None for output in wanted.files):
         raise click.BadParameter("a class has many reports: expected FORMAT=FOLDER, found FORMAT=-")
     results = rejudge.rejudge_class(rejudge.named_evidence(evidence), how, wanted, jobs=jobs)
+    if table is not None:
+        write_file(table, render_changes_table([r.change for r in results if r.change is not None]).encode())
     render = render_changes if wanted.changes else render_results
     print_result(lambda: results_to_json(results, changes=wanted.changes), lambda _: render(results), as_json=as_json)
     return rejudge.class_code(results)

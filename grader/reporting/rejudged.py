@@ -1,12 +1,16 @@
-"""Renders the results of judging again: what changed for each submission, as text and as JSON."""
+"""Renders the results of judging again: what changed for each submission and in all, as text, JSON and CSV."""
 
 from __future__ import annotations
 
+import csv
+import io
 import json
+from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from statistics import fmean
 
-from grader.reporting.escape import shown
+from grader.reporting.escape import csv_cell, shown
 from grader.reporting.json_report import ReportData
 
 
@@ -78,6 +82,63 @@ def dropped_first(changes: Sequence[ReportChange]) -> list[ReportChange]:
     return sorted((c for c in changes if c.criteria), key=lambda c: (c.share_gain, c.gain, c.name))
 
 
+@dataclass(frozen=True, slots=True)
+class CriterionSummary:
+    """How one criterion changed in all submissions where it did."""
+
+    exercise: str
+    criterion: str
+    changed: int  # number of submissions
+    max_before: float | None  # its points; None if no first report has the criterion
+    max_after: float | None  # its points; None if no new report has it
+    mean_before: float  # mean of the points earned, over the submissions where it changed
+    mean_after: float
+    outcomes: tuple[tuple[str, str, int], ...]  # outcome before, outcome after, how often, where these differ
+
+
+@dataclass(frozen=True, slots=True)
+class ChangesSummary:
+    """How the scores of a class changed; scores are compared as percentages, because maxima may have changed."""
+
+    compared: int  # number of submissions compared
+    changed: int  # number of submissions of which a criterion changed
+    up: int
+    down: int
+    mean_before: float  # mean score in percent, over all submissions compared
+    mean_after: float
+    criteria: tuple[CriterionSummary, ...]
+
+
+def summarise(changes: Sequence[ReportChange]) -> ChangesSummary:
+    """Summarise the changes of a class; there must be at least one, which may be empty."""
+    rows: dict[tuple[str, str], list[CriterionChange]] = {}
+    for row in (row for each in changes for row in each.criteria):
+        rows.setdefault((row.exercise, row.criterion), []).append(row)
+    return ChangesSummary(
+        compared=len(changes),
+        changed=sum(bool(each.criteria) for each in changes),
+        up=sum(each.share_gain > 0 for each in changes),
+        down=sum(each.share_gain < 0 for each in changes),
+        mean_before=100 * fmean(_share(each.before, each.before_max) for each in changes),
+        mean_after=100 * fmean(_share(each.after, each.after_max) for each in changes),
+        criteria=tuple(_criterion_summary(*key, found) for key, found in rows.items()),
+    )
+
+
+def _criterion_summary(exercise: str, criterion: str, rows: Sequence[CriterionChange]) -> CriterionSummary:
+    moves = Counter((row.before.outcome, row.after.outcome) for row in rows if row.before and row.after)
+    return CriterionSummary(
+        exercise,
+        criterion,
+        len(rows),
+        max((row.before.max_score for row in rows if row.before), default=None),
+        max((row.after.max_score for row in rows if row.after), default=None),
+        fmean(row.before.score if row.before else 0.0 for row in rows),
+        fmean(row.after.score if row.after else 0.0 for row in rows),
+        tuple((*move, count) for move, count in moves.most_common() if move[0] != move[1]),
+    )
+
+
 def _standings(report: ReportData) -> Iterator[tuple[tuple[str, str], ReportStanding]]:
     for exercise in report["exercises"]:
         for row in exercise["criteria"]:
@@ -129,7 +190,9 @@ def render_changes(results: Sequence[RejudgedResult]) -> str:
     """Return the changes by submission, losses first, then those that were refused."""
     judged = [r for r in results if not r.problem]
     changes = dropped_first([r.change for r in judged if r.change is not None])
-    lines = [line for change in changes for line in _change(change)]
+    compared = [r.change for r in judged if r.change is not None]
+    lines = change_summary(compared) if changes else []
+    lines += [line for change in changes for line in _change(change)]
     incomparable = [f"{_name(r.name)}: no first report to compare with" for r in judged if r.change is None]
     same = len(judged) - len(changes) - len(incomparable)
     return "\n".join([*lines, *incomparable, *_refused(results), f"unchanged: {same} of {len(judged)}"]) + "\n"
@@ -141,6 +204,8 @@ def results_to_json(results: Sequence[RejudgedResult], *, changes: bool) -> str:
     data: dict[str, object] = {"schema": SCHEMA}
     if changes:
         ordered = dropped_first([r.change for r in judged if r.change is not None])
+        compared = [r.change for r in judged if r.change is not None]
+        data["summary"] = asdict(summarise(compared)) if compared else None
         data["changed"] = [{**asdict(c), "gain": c.gain} for c in ordered]
         data["unchanged"] = [r.name for r in judged if r.change is not None and not r.change.criteria]
         data["not_compared"] = [r.name for r in judged if r.change is None]
@@ -148,6 +213,74 @@ def results_to_json(results: Sequence[RejudgedResult], *, changes: bool) -> str:
         data["submissions"] = [{"name": r.name, "report": json.loads(r.report)} for r in judged]
     data["refused"] = [{"name": r.name, "problem": r.problem} for r in results if r.problem]
     return json.dumps(data, indent=2, allow_nan=False) + "\n"
+
+
+def change_summary(changes: Sequence[ReportChange]) -> list[str]:
+    """Return how a class changed in a few lines: how many up and down, the mean, then each criterion."""
+    found = summarise(changes)
+    if not found.changed:
+        return [f"changed: 0 of {found.compared}"]
+    mean = f"mean {found.mean_before:.1f} -> {found.mean_after:.1f} %"
+    head = f"changed: {found.changed} of {found.compared}: {found.up} up, {found.down} down; {mean}"
+    return [head, *(f"    {_of_all(criterion)}" for criterion in found.criteria)]
+
+
+def _of_all(row: CriterionSummary) -> str:
+    """Return how a criterion changed in a class, e.g. `rate: 10 -> 5 points; 57 changed, mean 8.2 -> 4.1`."""
+    name = f"{shown(row.exercise)}/{shown(row.criterion)}"
+    if row.max_after is None:
+        return f"{name}: asked no more, it had {_points(row.max_before or 0)} points; {row.changed} changed"
+    if row.max_before is None:
+        return f"{name}: new, with {_points(row.max_after)} points; {row.changed} changed, mean {row.mean_after:.1f}"
+    of = _points(row.max_before)
+    of += f" -> {_points(row.max_after)}" if row.max_after != row.max_before else ""
+    moves = [f"{_outcome(before)} -> {_outcome(after)}: {count}" for before, after, count in row.outcomes]
+    mean = f"mean {row.mean_before:.1f} -> {row.mean_after:.1f}"
+    return "; ".join([f"{name}: {of} points", f"{row.changed} changed, {mean}", *moves])
+
+
+_COLUMNS = (
+    "submission",
+    "score_before",
+    "max_before",
+    "score_after",
+    "max_after",
+    "exercise",
+    "criterion",
+    "outcome_before",
+    "points_before",
+    "of_before",
+    "outcome_after",
+    "points_after",
+    "of_after",
+    "gain",
+    "reason",
+)
+
+
+def render_changes_table(changes: Sequence[ReportChange]) -> str:
+    """Return the changes as CSV, one row for each changed criterion, losses first; no cell is a formula."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(_COLUMNS)
+    for each in dropped_first(changes):
+        totals = [_points(n) for n in (each.before, each.before_max, each.after, each.after_max)]
+        for row in each.criteria:
+            sides = [*_side(row.before), *_side(row.after), _points(row.gain)]
+            names = [csv_cell(row.exercise), csv_cell(row.criterion)]
+            reason = csv_cell(row.after.reason) if row.after else ""
+            writer.writerow([csv_cell(each.name), *totals, *names, *sides, reason])
+    return text.getvalue()
+
+
+def _side(standing: ReportStanding | None) -> list[str]:
+    if standing is None:
+        return ["", "", ""]
+    return [csv_cell(_outcome(standing.outcome)), _points(standing.score), _points(standing.max_score)]
+
+
+def _outcome(outcome: str) -> str:
+    return shown(_OUTCOMES.get(outcome, outcome))
 
 
 def _change(change: ReportChange) -> Iterator[str]:
@@ -170,8 +303,7 @@ def _row(row: CriterionChange) -> str:
 def _standing(standing: ReportStanding | None) -> str:
     if standing is None:
         return "nothing"
-    outcome = _OUTCOMES.get(standing.outcome, standing.outcome)
-    return f"{shown(outcome)} {_points(standing.score)}/{_points(standing.max_score)}"
+    return f"{_outcome(standing.outcome)} {_points(standing.score)}/{_points(standing.max_score)}"
 
 
 def _refused(results: Sequence[RejudgedResult]) -> list[str]:

@@ -13,7 +13,7 @@ import pytest
 from grader.app.request import GradeRequest
 from grader.classroom import worker
 from grader.classroom.local import Task
-from grader.classroom.store import Conditions, ResultStatus, State
+from grader.classroom.store import REPORT, Conditions, ResultStatus, State
 from grader.core.errors import EnvironmentFault, HarnessError, SubmissionError
 from grader.core.exercise import Feedback, Outcome, Shows
 from grader.core.report import Environment, ExerciseReport, Report, Reproduction, Verdict
@@ -90,5 +90,5 @@ def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path: Path) ->
     task = Task("x", "x", tmp_path, into, (), (), None, CONDITIONS, 1, False, 60.0)
     worker.attempt(task, lambda step: None, lambda *_: report)
     found = {path.name for path in into.iterdir() if "hushhush" in path.read_text(encoding="utf-8")}
-    assert found == {worker.REPORT, worker.PAGE}
+    assert found == {REPORT, worker.PAGE}
     assert {path.name for path in into.iterdir()} == set(worker.PARTS) - {worker.EVIDENCE}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
+import io
 import json
 from pathlib import Path
 
@@ -96,10 +98,15 @@ def test_changes_are_told_with_dropped_marks_first(tmp_path: Path) -> None:
         tmp_path, ("linear.x: 0.5", "linear.x: 0.6"), ("partly_tolerance: 2 Hz", "partly_tolerance: 12 Hz")
     )
     lines = grade("--diff", tmp_path, "--rubric", path).output.splitlines()
-    assert lines[0] == "ada: 30 -> 25 of 30: -5 points"
-    assert lines[1].startswith("    velocity_publisher/linear_velocity: was met 5/5, is not met 0/5: t = 0.000 s")
-    assert lines[2] == "bob: 20 -> 20 of 30: 0 points"
-    assert lines[3].startswith("    velocity_publisher/rate: was not met 0/10, is partly 5/10: ")
+    assert lines[:3] == [
+        "changed: 2 of 3: 0 up, 1 down; mean 55.6 -> 50.0 %",
+        "    velocity_publisher/linear_velocity: 5 points; 2 changed, mean 5.0 -> 0.0; met -> not met: 2",
+        "    velocity_publisher/rate: 10 points; 1 changed, mean 0.0 -> 5.0; not met -> partly: 1",
+    ]
+    assert lines[3] == "ada: 30 -> 25 of 30: -5 points"
+    assert lines[4].startswith("    velocity_publisher/linear_velocity: was met 5/5, is not met 0/5: t = 0.000 s")
+    assert lines[5] == "bob: 20 -> 20 of 30: 0 points"
+    assert lines[6].startswith("    velocity_publisher/rate: was not met 0/10, is partly 5/10: ")
     assert lines[-1] == "unchanged: 1 of 3"
 
 
@@ -116,8 +123,27 @@ def test_changes_can_be_read_by_programs(tmp_path: Path) -> None:
         ("bob", 20, 15, -5),
     ]
     assert found["unchanged"] == []
+    assert (found["summary"]["down"], found["summary"]["mean_after"]) == (2, pytest.approx(200 / 3))
     assert found["not_compared"] == ["cyd"]
     assert [row["name"] for row in found["refused"]] == ["dan"]
+
+
+def test_changes_can_be_opened_in_a_spreadsheet(tmp_path: Path) -> None:
+    """One row for each criterion that changed; a name is no formula."""
+    kept_class(tmp_path / "=class")
+    path = changed_rubric(tmp_path, ("points: 10", "points: 5"))
+    out = tmp_path / "changes.csv"
+    text = grade("--diff", tmp_path, "--rubric", path, "--csv", out).output
+    assert text.startswith(
+        "changed: 3 of 3: 1 up, 0 down; mean 55.6 -> 60.0 %\n    velocity_publisher/rate: 10 -> 5 points;"
+    )
+    rows = list(csv.DictReader(io.StringIO(out.read_text(encoding="utf-8"), newline="")))
+    assert [(r["submission"], r["criterion"], r["points_before"], r["of_after"], r["gain"]) for r in rows] == [
+        ("'=class/ada", "rate", "10", "5", "-5"),
+        ("'=class/cyd", "rate", "0", "5", "0"),
+        ("'=class/bob", "rate", "0", "5", "0"),
+    ]
+    assert "--csv needs --diff" in grade(tmp_path, "--csv", out).output
 
 
 def test_added_and_removed_criteria_are_changes(tmp_path: Path) -> None:

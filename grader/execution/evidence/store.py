@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -75,6 +76,30 @@ def keep(folder: Path, run: Run, exercises: Sequence[Exercise], *, request: Mapp
     files.write(folder, {files.MANIFEST: kept.dump(unfinished), **written})
     files.remove(folder, set(old) - set(names))
     files.write(folder, {files.MANIFEST: kept.dump(manifest)})
+
+
+def carry_over(evidence: Evidence, into: Path, *, request: Mapping[str, Any], report: bytes) -> None:
+    """Keep the recordings of evidence in a new folder, beside the request and report of judging them again.
+
+    Files are linked where the disk allows it. Raises EvidenceError if one cannot be written.
+    """
+    names = [name for name in evidence.manifest.files if files.is_own(name) and "/" in name]
+    try:
+        for name in names:
+            (into / name).parent.mkdir(parents=True, exist_ok=True)
+            _link_or_copy(evidence.folder / name, into / name)
+    except OSError as error:
+        raise EvidenceError(f"{into}: the evidence cannot be written: {error.strerror or error}") from error
+    run = msgspec.structs.replace(evidence.manifest.run, request=dict(request))
+    manifest = msgspec.structs.replace(evidence.manifest, run=run)
+    files.write(into, {files.REPORT: report, files.MANIFEST: kept.dump(manifest)})
+
+
+def _link_or_copy(old: Path, new: Path) -> None:
+    try:
+        new.hardlink_to(old)
+    except OSError:
+        shutil.copyfile(old, new, follow_symlinks=False)
 
 
 def open_evidence(folder: Path) -> Evidence:

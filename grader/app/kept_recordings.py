@@ -1,0 +1,53 @@
+"""Finds the kept recordings that a run of the same submission would make again, so that they need no run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from grader.core.exercise import Exercise
+from grader.core.scenario import OdometryStream
+from grader.core.trace import Trace
+from grader.execution.evidence.manifest import scenario_digest
+from grader.execution.evidence.store import Evidence, run_of
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedRun:
+    """What determines the recordings of a submission besides the scenarios, on the same version of the grader."""
+
+    submission: str  # digest of the submission
+    seed: int
+    odometry: str  # digest of the /odom recording; empty if none is played
+
+
+def plays_odometry(exercises: Iterable[Exercise]) -> bool:
+    """Return whether any exercise plays the /odom recording."""
+    stimuli = (stimulus for e in exercises for scenario in e.scenarios for stimulus in scenario.stimuli)
+    return any(isinstance(stimulus, OdometryStream) for stimulus in stimuli)
+
+
+def recorded_alike(evidence: Evidence, exercises: Sequence[Exercise], planned: PlannedRun) -> tuple[Exercise, ...]:
+    """Return the exercises of which every scenario was recorded as a run would record it now.
+
+    An exercise is used as a whole, because a spot check replaces all of its recordings together.
+    """
+    manifest = evidence.manifest
+    if (manifest.submission.digest, manifest.run.seed) != (planned.submission, planned.seed):
+        return ()
+    found = {file.wanted for file in manifest.submission.files}
+    asked = {e.id: {r.scenario: r.asked for r in e.recordings} for e in manifest.exercises}
+    return tuple(
+        exercise
+        for exercise in exercises
+        if exercise.id in asked
+        and found.issuperset(exercise.files)
+        and all(asked[exercise.id].get(s.id) == scenario_digest(s) for s in exercise.scenarios)
+        and (manifest.run.recording == planned.odometry or not plays_odometry([exercise]))
+    )
+
+
+def kept_traces(evidence: Evidence, exercises: Sequence[Exercise]) -> Mapping[tuple[str, str], Trace]:
+    """Read the recordings of these exercises; raises EvidenceError for a changed or damaged one."""
+    wanted = {(exercise.id, scenario.id) for exercise in exercises for scenario in exercise.scenarios}
+    return {key: trace for key, trace in run_of(evidence, exercises).traces.items() if key in wanted}
