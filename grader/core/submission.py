@@ -55,3 +55,12 @@ def main_not_called(file: str, line: int = 0) -> str:
     place = f"{file}:{line}" if line else file
     problem = f"{place}: nothing calls main(), so `python3 {file}` would do nothing"
     return f"{problem}; add: if __name__ == '__main__': main()"
+
+
+#: What to do with a notebook that was handed in.
+EXPORT_NOTEBOOK = "export it as a Python script (File > Save and Export Notebook As > Executable Script)"
+
+
+def is_notebook(file: str) -> bool:
+    """Return whether a file is a Jupyter notebook, by its name."""
+    return file.casefold().endswith(".ipynb")

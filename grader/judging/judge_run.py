@@ -12,7 +12,7 @@ from fractions import Fraction
 from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.report import NOT_JUDGED, ExerciseReport, Pace, Report, ReportedFault, Summary, TopicSummary, Verdict
-from grader.core.submission import Run, Submission
+from grader.core.submission import EXPORT_NOTEBOOK, Run, Submission, is_notebook
 from grader.core.trace import ClockKind, Fault, GraphSnapshot, Message, Offer, StartWay, Trace
 from grader.judging.charts import excerpts_for, illustrated
 from grader.judging.diagnosis import diagnose, placed
@@ -234,7 +234,9 @@ class VerdictBuilder:
         similar, others = looked_for.similar, looked_for.candidates
         hint = f"hand in a file named {unnamed}"
         evidence: dict[str, object] = {"missing": unnamed, "similar": list(similar)}
-        if similar:
+        if similar and is_notebook(similar[0]):
+            hint = f"{quote(similar[0], 80)} is a notebook: {EXPORT_NOTEBOOK}, named {unnamed}"
+        elif similar:
             hint = f"rename {quote(similar[0], 80)} to {unnamed}"
         elif looked_for.likely:
             hint = f"if {quote(others[0], 80)} is your solution, rename it to {unnamed}"

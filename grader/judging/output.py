@@ -131,9 +131,17 @@ def shows_about(printed: Printed, value: float, *, coarsest: float, relative: fl
     return printed.step <= coarsest * (1 + 1e-9) and any(printed.shows(value + d) for d in (-slack, 0.0, slack))
 
 
+#: Factors that have a name, as text shows them.
+_NAMED_FACTORS = {
+    "1": "the value itself",
+    f"{number(180 / math.pi)}": "the value in degrees",
+    f"{number(math.pi / 180)}": "the value in radians",
+}
+
+
 def times(factor: float) -> str:
-    """Return a factor for text; a factor of 1 is the value itself."""
-    return "the value itself" if factor == 1 else f"{number(factor)} times the value"
+    """Return a factor for text; a factor of 1, and those between radians and degrees, by what they give."""
+    return _NAMED_FACTORS.get(number(factor)) or f"{number(factor)} times the value"
 
 
 def in_window(outputs: Sequence[Output], start_ns: int, stop_ns: int) -> list[Output]:
@@ -318,6 +326,8 @@ _FOR_DEGREES: tuple[tuple[float, str], ...] = (
     (200 / math.pi, "gradians, of which a full turn has 400: degrees are radians times 180 / pi"),
     (1 / _DEGREES, "the inverse conversion: degrees are radians times 180 / pi"),
     (60.0, "the conversion with 3 for pi: use math.pi or math.degrees"),
+    (180.0 * math.pi, "multiplied by pi and not divided: degrees are radians times 180 / pi"),
+    (_DEGREES**2, "converted twice: degrees are radians times 180 / pi"),
     (180.0, "not divided by pi: degrees are radians times 180 / pi"),
     (1 / math.pi, "not multiplied by 180: degrees are radians times 180 / pi"),
     (360 / math.pi, "twice as much: degrees are radians times 180 / pi"),
@@ -354,8 +364,12 @@ def _factor(left: Sequence[LoggedNumbers], factor: float) -> tuple[str, str]:
     for candidate in (n.value / first.value for n in first.numbers if math.isfinite(n.value) and n.value != 0):
         known = _known(candidate, factor)
         exact = known[0] if known else candidate
-        if _scaled(left, exact) >= _SURE:
-            text = f"instead there is {number(exact)} times the value"
+        # the value itself may stand beside a wrong conversion of it
+        itself = math.isclose(exact, 1, rel_tol=0.01)
+        if _scaled(left, exact) >= _SURE and not (
+            itself and any(not _explained(n, h, (1,)) for h in left for n in h.numbers)
+        ):
+            text = f"instead there is {times(1 if itself else exact)}"
             return (f"{text}, {known[1]}" if known else text), ""
     return "", ""
 
@@ -367,7 +381,7 @@ def _scaled(left: Sequence[LoggedNumbers], factor: float) -> float:
 def _known(candidate: float, factor: float) -> tuple[float, str] | None:
     if not math.isclose(factor, _DEGREES, rel_tol=1e-3):
         return None
-    return next(((f, text) for f, text in _FOR_DEGREES if math.isclose(candidate, f, rel_tol=0.02)), None)
+    return next(((f, text) for f, text in _FOR_DEGREES if math.isclose(candidate, f, rel_tol=0.01)), None)
 
 
 def _shows_value(printed: Printed, value: float, relative: float = CONVERSION) -> bool:

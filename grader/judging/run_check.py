@@ -13,7 +13,8 @@ from grader.core.scenario import Scenario
 from grader.core.submission import Submission
 from grader.core.trace import Fault, FaultKind, Request, Response, Trace
 from grader.judging.checks import CHECKS
-from grader.judging.findings import AT_ONCE_NS, faulted, first_fault
+from grader.judging.findings import AT_ONCE_NS, fault_sentence, faulted, first_fault
+from grader.judging.installation import lacking_package
 from grader.judging.values import student_endpoints
 from grader.judging.wording import quote, span
 
@@ -76,9 +77,20 @@ def run_check(
             return Answer(
                 problem=f"the machine was too busy: the nodes waited {waited} for a processor, which can be why"
             )
-    if answer.finding is None or not isinstance(criterion.check, SourceCheck):
+    if not isinstance(criterion.check, SourceCheck):
+        return _for_lack_of_package(answer, scenario, trace, sources or {})
+    return answer if answer.finding is None else replace(answer, finding=_placed(answer.finding, submission))
+
+
+def _for_lack_of_package(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
+    """Return the answer; no answer if points are lost because this installation lacks a package of ROS."""
+    lost = answer.finding is not None and answer.finding.credit < 1
+    lack = lacking_package(trace, scenario.processes, sources) if lost else None
+    if lack is None:
         return answer
-    return replace(answer, finding=_placed(answer.finding, submission))
+    text = f"{fault_sentence(lack.fault)}: ROS 2 brings this package, but the installation that graded lacks it"
+    hint = f"grade again where {lack.name} is installed, or leave the import out if the program does not need it"
+    return Answer(problem=text, hint=hint)
 
 
 def _without_waiting(trace: Trace) -> Iterator[Trace]:

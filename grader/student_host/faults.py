@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import sys
@@ -13,6 +14,10 @@ from typing import Any
 TEXT_CHARACTERS = 500
 #: How much of an exception's text is read.
 _READ_CHARACTERS = 4_000
+#: How many exceptions of a chain are followed.
+_LONGEST_CHAIN = 20
+#: Exceptions that end a program in order: what fails while it cleans up after them is the fault.
+_STOPS = ("ExternalShutdownException", "ShutdownException")
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]{6,16}\b")
 _NO_PATH = r"\s'\"():,;<>\[\]"
 #: The absolute path of a source or binary file. Other paths are kept, since they may be topic names.
@@ -35,13 +40,42 @@ class Describer:
         self._folders = (os.path.join(root, ""), self._root)
 
     def exception(self, error: BaseException) -> dict[str, Any]:
-        """Convert an uncaught exception to a fault."""
+        """Convert an uncaught exception to a fault; of a chain, the first one that the program did not expect."""
+        error = self._first(error)
         if isinstance(error, SyntaxError) and self._is_of_file(error):
             return self.syntax_error(error)
         frames = [(f.f_code.co_filename, line, f.f_code.co_name) for f, line in traceback.walk_tb(error.__traceback__)]
         kind = _name_of(type(error))
         message = error.msg if isinstance(error, SyntaxError) else self.one_line(error)
         return {"code": "exception", "type": kind, "message": _behind(kind, message), **self._place(frames)}
+
+    def _first(self, error: BaseException) -> BaseException:
+        """Return the exception that began a chain.
+
+        What a library raises while it handles another exception, and what an `except` for one kind of exception lets
+        happen, stands for itself.
+        """
+        first, later = error, error
+        for _ in range(_LONGEST_CHAIN):
+            earlier = later.__cause__ if later.__suppress_context__ else later.__context__
+            if earlier is None or not isinstance(earlier, Exception) or type(earlier).__name__ in _STOPS:
+                break
+            handled = self._handled(earlier, later)
+            if handled is not None:
+                if _is_expected(*handled):
+                    break
+                first = earlier
+            later = earlier
+        return first
+
+    def _handled(self, earlier: BaseException, later: BaseException) -> tuple[str, int, int] | None:
+        """Return the student's file, and the lines at which `earlier` came and `later` arose; None for a library's."""
+        passed = dict(traceback.walk_tb(earlier.__traceback__))
+        shared = [(f, line) for f, line in traceback.walk_tb(later.__traceback__) if f in passed]
+        if not shared or not self._inside(shared[-1][0].f_code.co_filename):
+            return None
+        frame, line = shared[-1]
+        return frame.f_code.co_filename, passed[frame], line
 
     def _is_of_file(self, error: SyntaxError) -> bool:
         """Return whether a file of the submission cannot be compiled: any code may raise a SyntaxError itself."""
@@ -111,6 +145,24 @@ class Describer:
             if folder in text:
                 text = re.sub(rf"{re.escape(folder)}(?:/[^{_NO_PATH}]*)?", lambda f: os.path.basename(f[0]), text)
         return text
+
+
+def _is_expected(file: str, earlier: int, later: int) -> bool:
+    """Return whether an `except` for one kind of exception leads from one line to another that raises no exception."""
+    try:
+        with open(file, "rb") as source:
+            nodes = list(ast.walk(ast.parse(source.read())))
+    except Exception:  # the file is gone, or is not Python
+        return False
+    if any(isinstance(n, ast.Raise) and _covers(n, later) for n in nodes):
+        return False
+    tried = [n for n in nodes if isinstance(n, ast.Try) and any(_covers(s, earlier) for s in n.body)]
+    kinds = [handler.type for n in tried for handler in n.handlers if _covers(handler, later)]
+    return any(kind is not None and getattr(kind, "id", "") not in ("Exception", "BaseException") for kind in kinds)
+
+
+def _covers(node: ast.stmt | ast.ExceptHandler, line: int) -> bool:
+    return node.lineno <= line <= (node.end_lineno or node.lineno)
 
 
 def _name_of(kind: type[BaseException]) -> str:

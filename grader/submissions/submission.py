@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePosixPath
 
 from grader.core.errors import SubmissionError
-from grader.core.submission import StudentFile, Submission
+from grader.core.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
 from grader.submissions.archives import ARCHIVE_SUFFIXES, HEAD_BYTES, MAX_ARCHIVE_BYTES, archive_kind, collect_archive
 from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, shown
 from grader.submissions.staging import collect_folder, read_start, write_files
@@ -29,8 +29,8 @@ _NO_NODES = ("__init__.py", "setup.py", "conftest.py")
 
 _EXPECTED = "a folder, a .py file or an archive"
 
-# Suffixes that browsers, editors and file managers add to a name: `x(1).py`, `x - Copy.py`, `x.py.txt`.
-_EXTENSIONS = re.compile(r"(?:\.(?:txt|bak|orig|old|save|py))+$")
+# Suffixes that browsers, editors and file managers add to a name: `x(1).py`, `x - Copy.py`, `x.py.txt`; and notebooks.
+_EXTENSIONS = re.compile(r"(?:\.(?:txt|bak|orig|old|save|py|ipynb))+$")
 _COPY_MARK = re.compile(r"[\s_-]*(?:\(\d+\)|copy|copia|kopie)\s*\d*$")
 
 
@@ -129,7 +129,10 @@ def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> Submi
     archives = [name for name in names if name.casefold().endswith(ARCHIVE_SUFFIXES)]
     similar = [name for want in wanted for name in _similar(want, names, wanted)]
     hint = ""
-    if similar:
+    notebooks = [name for name in names if is_notebook(name)]
+    if notebooks:
+        hint = f"{shown(notebooks[0])} is a notebook: {EXPORT_NOTEBOOK}"
+    elif similar:
         hint = f"rename {shown(similar[0])} so that it ends in .py"
     elif archives:
         hint = f"unpack {shown(archives[0])} and name the folder that holds your files"

@@ -144,7 +144,7 @@ def outcomes(report: Report) -> dict[str, str]:
 
 
 def told(report: Report) -> dict[str, dict[str, str]]:
-    """Return reason, hint and place of every criterion that lost points by a fault of its own."""
+    """Return reason, hint and place of every criterion that lost points by a fault of its own, or was not decided."""
     return {
         verdict.id: {
             "reason": verdict.reason,
@@ -153,5 +153,5 @@ def told(report: Report) -> dict[str, dict[str, str]]:
         }
         for exercise in report.exercises
         for verdict in exercise.verdicts
-        if verdict.outcome.value in ("not_met", "partly")
+        if verdict.outcome.value in ("not_met", "partly") or (verdict.outcome.value == "undecided" and verdict.hint)
     }

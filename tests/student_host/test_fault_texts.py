@@ -121,3 +121,53 @@ def test_only_a_file_that_cannot_be_compiled_has_a_syntax_error(faults: types.Mo
     for strange in stranges:
         found = told(SyntaxError("never closed", (strange, 3, 1, "x")))
         assert (found["code"], found["type"], found["message"]) == ("exception", "SyntaxError", "never closed")
+
+
+#: A program, and the exception of its chain that is told: the type and the line.
+CHAINS = {
+    "finally": ("try:\n    node = int('x')\nfinally:\n    node.destroy()\n", "ValueError", 2),
+    "a bare except": ("try:\n    int('x')\nexcept:\n    undefined\n", "ValueError", 2),
+    "except Exception": ("try:\n    int('x')\nexcept Exception as error:\n    undefined\n", "ValueError", 2),
+    "raised in its place": (
+        "try:\n    int('x')\nexcept ValueError as e:\n    raise KeyError() from e\n",
+        "ValueError",
+        2,
+    ),
+    "two links": (
+        "try:\n    try:\n        int('x')\n    finally:\n        undefined\nfinally:\n    [][0]\n",
+        "ValueError",
+        3,
+    ),
+    "an expected one": ("try:\n    int('x')\nexcept ValueError:\n    undefined\n", "NameError", 4),
+    "several expected ones": ("try:\n    int('x')\nexcept (ValueError, KeyError):\n    undefined\n", "NameError", 4),
+    "an expected one, in a function": (
+        "def spare():\n    return undefined\ntry:\n    int('x')\nexcept ValueError:\n    spare()\n",
+        "NameError",
+        2,
+    ),
+    "an expected one before a chain": (
+        "try:\n    int('x')\nexcept ValueError:\n    try:\n        undefined\n    finally:\n        [][0]\n",
+        "NameError",
+        5,
+    ),
+    "hidden by the program": (
+        "try:\n    int('x')\nexcept Exception:\n    raise KeyError('speed') from None\n",
+        "KeyError",
+        4,
+    ),
+    "of a library": ("import json\njson.loads('{')\n", "json.decoder.JSONDecodeError", 2),
+    "after Ctrl-C": ("try:\n    raise KeyboardInterrupt\nfinally:\n    undefined\n", "NameError", 4),
+}
+
+
+@pytest.mark.parametrize(("program", "kind", "line"), CHAINS.values(), ids=list(CHAINS))
+def test_the_first_exception_of_a_chain_is_told(
+    faults: types.ModuleType, tmp_path: Path, program: str, kind: str, line: int
+) -> None:
+    """But not one that the program was ready for."""
+    file = tmp_path / "node.py"
+    file.write_text(program)
+    with pytest.raises((Exception, KeyboardInterrupt)) as caught:
+        exec(compile(program, str(file), "exec"), {})
+    told = faults.Describer(str(tmp_path)).exception(caught.value)
+    assert (told["type"], told["file"], told["line"]) == (kind, "node.py", line)

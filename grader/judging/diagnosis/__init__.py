@@ -15,13 +15,13 @@ from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import RandomInRange
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.together import AnswersTogether
-from grader.judging.diagnosis import callbacks, crashes, fan, loading, logs, positions, rates, silence, values
+from grader.judging.diagnosis import callbacks, crashes, fan, loading, logs, positions, rates, services, silence, values
 from grader.judging.diagnosis.rules import Case, Clue, Rule
 from grader.judging.findings import FAULT_KEY
 from grader.judging.source import Source, first_line, last_name, read, text_of
 
 #: Modules of rules, in the order of evaluation; the rules of each follow the order of the text.
-_MODULES = (loading, callbacks, crashes, silence, rates, values, logs, positions, fan)
+_MODULES = (loading, services, callbacks, crashes, silence, rates, values, logs, positions, fan)
 #: All rules; the first that applies wins.
 RULES: tuple[Rule, ...] = tuple(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))
 _LOST = (Outcome.NOT_MET, Outcome.PARTLY)

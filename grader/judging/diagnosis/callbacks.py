@@ -9,7 +9,7 @@ from grader.core.trace import Fault, FaultKind
 from grader.judging.diagnosis.names import NODE_PROPERTIES, closest
 from grader.judging.diagnosis.rules import Clue, Crash, crash_rule, lines_of
 from grader.judging.diagnosis.wiring import Made, made
-from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, parameters
+from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, parameters, text_of
 
 _QUOTES = "\"'"
 
@@ -301,8 +301,22 @@ def _topic_arguments(crash: Crash, item: Made) -> Clue | None:
     if crash.said(r"type object 'module' has no attribute '_TYPE_SUPPORT'"):
         return Clue(f"{source.code(first)} is a module; name the message class in it")
     if crash.said(r"Expected QoSProfile or int") and item.qos is not None:
+        third = item.callback
+        if third is not None and isinstance(third, ast.Constant) and isinstance(third.value, int):
+            given = f"{source.code(item.qos)}, {source.code(third)}"
+            return Clue(f"the callback comes third, then the queue depth: (..., {given})")
         return Clue(f"the queue depth is a number: write 10 instead of {source.code(item.qos)}")
     return None
+
+
+@crash_rule()
+def _parameter_arguments(crash: Crash) -> Clue | None:
+    """The arguments of declare_parameter are swapped."""
+    call = _call_at_fault(crash, "declare_parameter")
+    if call is None or len(call.args) < 2 or text_of(call.args[0]) is not None or text_of(call.args[1]) is None:
+        return None
+    name, value = crash.source.code(call.args[1]), crash.source.code(call.args[0])
+    return Clue(f"the name comes first, then the value: declare_parameter({name}, {value})")
 
 
 @crash_rule(r"Invalid(Node|Topic)NameException", in_file=False)

@@ -9,7 +9,7 @@ from grader.core.trace import FaultKind
 from grader.judging.diagnosis.names import FIELDS, LOGGER, MESSAGE_FIELDS, NODE_METHODS, PUBLISHER, RCLPY, closest
 from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, rule
 from grader.judging.diagnosis.wiring import head_of, made, node_made, reached, spins, target_of, variable_of
-from grader.judging.source import Loop, Source, chain, covers, first_line, last_name, subtree
+from grader.judging.source import Loop, Source, chain, covers, first_line, last_name, parameters, subtree
 
 _EXITS = ("exit", "quit", "_exit")
 
@@ -113,6 +113,9 @@ def _own_attribute(crash: Crash, owner: str, name: str) -> Clue | None:
     source = crash.source
     if not any(c.name == owner for c in source.all(ast.ClassDef)):
         return None
+    outside = _outside_of_class(source, owner, name)
+    if outside is not None:
+        return outside
     items = made(source, "publisher", "subscription", "timer")
     local = next((m for m in items if target_of(source, m.call) == name), None)
     if local is not None:
@@ -126,6 +129,21 @@ def _own_attribute(crash: Crash, owner: str, name: str) -> Clue | None:
     methods = [f.name for f in source.functions() if source.is_method(f) and not f.name.startswith("__")]
     near = closest(name, [*stored, *methods], 0.8) or closest(name, NODE_METHODS, 0.85)
     return Clue(f"self.{name} should be self.{near}") if near else None
+
+
+def _outside_of_class(source: Source, owner: str, name: str) -> Clue | None:
+    """The method is there, but it is indented too little or too much."""
+    functions = source.functions(name)
+    if len(functions) != 1 or source.is_method(functions[0]):
+        return None
+    function, around = functions[0], source.function_of(functions[0])
+    if around is not None:
+        hint = f"{name} is indented into {around.name}: move its def to the left, as far as def {around.name}"
+        return Clue(hint, source.place(function)) if source.is_method(around) else None
+    if parameters(function)[:1] == ["self"]:
+        hint = f"{name} stands outside of the class {owner}: indent it as far as the other methods, inside the class"
+        return Clue(hint, source.place(function))
+    return Clue(f"{name} is a function of the file, not a method of {owner}: write {name}(...) without self")
 
 
 @crash_rule("does not support the context manager|__enter__")

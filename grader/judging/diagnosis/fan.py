@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from grader.core.exercise import ProblemKind
+from grader.core.exercise import Outcome, ProblemKind
 from grader.core.quantities import within
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.together import AnswersTogether
@@ -411,4 +411,16 @@ def _slow_timer(controller: _Controller) -> Clue | None:
         if worth is not None and worth.value > 1.25 and all(c in inside for c in calls):
             hint = f"{timer_code(source, item)} answers every {number(worth.value)} s only: answer each temperature"
             return Clue(hint, source.place(worth.origin), key="slow_timer")
+    return None
+
+
+@rule(ThresholdResponse, AnswersTogether, outcome=Outcome.NOT_MET)
+def _callback_sleeps(case: Case) -> Clue | None:
+    """The callback sleeps, and what comes meanwhile is answered late."""
+    for late in _subscribers(case):
+        for node in late.reached:
+            slept = number_at(late.source, node.args[0]) if isinstance(node, ast.Call) and node.args else None
+            if isinstance(node, ast.Call) and last_name(node.func) == "sleep" and (slept or 0) > _PROMPT_S:
+                hint = f"{late.source.code(node, 50)} holds up the callback: what comes meanwhile is answered late"
+                return Clue(f"{hint}; take it out", late.source.place(node), key="late_answer")
     return None

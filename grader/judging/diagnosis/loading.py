@@ -6,6 +6,8 @@ import ast
 import re
 from collections.abc import Sequence
 
+from grader.core.exercise import Location
+from grader.core.submission import EXPORT_NOTEBOOK
 from grader.core.trace import Fault, FaultKind
 from grader.judging.diagnosis.names import MODULES, PACKAGES, PLAIN_MODULES, ROS_1, ROS_1_CALLS, closest, import_of
 from grader.judging.diagnosis.rules import Clue, Crash, crash_rule
@@ -34,7 +36,21 @@ _SAYINGS: Sequence[tuple[str, str]] = (
     (r"Perhaps you forgot a comma", "a comma is probably missing in: {code}"),
     (r"'return' outside function", "return stands outside a function: indent it as the function's other lines"),
 )
+#: A key that every notebook has, and how many lines of a file are searched for it.
+_NOTEBOOK, _NOTEBOOK_LINES = re.compile(r'^\{\s*"(?:cells|metadata|nbformat)"\s*:|"cell_type"\s*:'), 200
+_MAGIC = re.compile(r"^\s*(?:%{1,2}\w|!\w)")
 _MESSAGE_ENDINGS = ("_msgs", "_msg", "_interfaces", "_interface", "_srvs", "_srv", "_actions")
+
+
+@crash_rule("", *FaultKind, in_file=False)
+def _notebook(crash: Crash) -> Clue | None:
+    """The text of a Jupyter notebook, or a command that only a notebook understands."""
+    source, row = crash.case.source, crash.case.source.line(crash.line)
+    if source.line(1)[:1] == "{" and _NOTEBOOK.search("\n".join(source.lines[:_NOTEBOOK_LINES])):
+        return Clue(f"this is a notebook, whatever its name: {EXPORT_NOTEBOOK}", Location(source.file, 1))
+    if (crash.fault.kind is FaultKind.SYNTAX_ERROR and _MAGIC.match(row[:200])) or crash.said("'get_ipython'"):
+        return Clue(f"{quote(row.strip(), 60)} is a command of a notebook, which Python does not know: take it out")
+    return None
 
 
 @crash_rule("", FaultKind.SYNTAX_ERROR, in_file=False)
@@ -108,13 +124,16 @@ def _hidden_module(crash: Crash) -> Clue | None:
 
 @crash_rule("^ImportError: attempted relative import with no known parent package", in_file=False)
 def _no_package(crash: Crash) -> Clue | None:
-    written = [n for n in crash.case.source.all(ast.ImportFrom) if n.level and n.lineno == crash.line]
-    advice = "a relative import works in a package only, and this file is in none"
-    if not written or written[0].level > 1:
+    source = crash.case.source
+    written = next((n for n in source.all(ast.ImportFrom) if n.level and n.lineno == crash.line), None)
+    if written is None or written.level > 1:
+        advice = "imports with dots work in a package only, and this file is in none"
         return Clue(f"{advice}: hand in the whole package, with its setup.py and __init__.py")
-    names = ", ".join(a.name + (f" as {a.asname}" if a.asname else "") for a in written[0].names)
-    plain = f"from {written[0].module} import {names}" if written[0].module else f"import {names}"
-    return Clue(f"{advice}: write {plain}, or hand in the whole package, with its setup.py and __init__.py")
+    names = ", ".join(a.name + (f" as {a.asname}" if a.asname else "") for a in written.names)
+    plain = f"from {written.module} import {names}" if written.module else f"import {names}"
+    helper = (written.module or written.names[0].name).partition(".")[0]
+    hint = f"the dot in '{source.code(written)}' works in a package only: write {quote(plain, 60)}"
+    return Clue(f"{hint}, with {helper}.py in the same folder")
 
 
 @crash_rule(r"No module named '([\w.]+)'", in_file=False)
@@ -179,6 +198,10 @@ def _undefined_name(crash: Crash) -> Clue | None:
     methods = [f for f in source.functions(name) if source.is_method(f)]
     if methods and inside and len(methods) == len(source.functions(name)):
         return Clue(f"{name} is a method: write self.{name}")
+    if methods and not inside and len(methods) == len(source.functions(name)):
+        owner = source.class_of(methods[0])
+        hint = f"{name} is indented into the class {owner.name if owner is not None else ''}: "
+        return Clue(f"{hint}begin its def, and what belongs to it, at the left edge", source.place(methods[0]))
     if import_of(name):
         return Clue(f"the import is missing: {import_of(name)}")
     if inside and source.stores(f"self.{name}"):

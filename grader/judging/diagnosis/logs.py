@@ -33,6 +33,8 @@ from grader.judging.wording import number
 
 _HANDLERS = ("FileHandler", "RotatingFileHandler", "TimedRotatingFileHandler", "WatchedFileHandler")
 _OPENS = ("open", "io.open", "codecs.open")
+#: Levels that hide records of level INFO.
+_HIGH_LEVELS = ("WARN", "WARNING", "ERROR", "FATAL")
 _COMMENTED_LOG = re.compile(r"^\s*#.*get_logger\(\)\.(info|warn|warning|error)\s*\(")
 #: Logging methods of Python's own loggers.
 _PYTHON_LOGS = ("debug", "info", "warning", "warn", "error", "critical", "exception")
@@ -125,11 +127,26 @@ def _nothing_logged(case: Case) -> bool:
     return not student_records(case.trace, case.process)
 
 
+@rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.NOT_MET)
+def _level_raised(case: Case) -> Clue | None:
+    """The program hides its own records."""
+    for call in case.source.calls("set_level", "set_logger_level"):
+        level = last_name(call.args[-1]) if call.args else ""
+        if _nothing_logged(case) and level.upper() in _HIGH_LEVELS:
+            hint = f"{case.source.code(call)} hides what is logged below the level {level.upper()}: take it out"
+            return Clue(hint, case.source.place(call), key="level_raised")
+    return None
+
+
 @rule(UsesLogger, LogsPosition)
 def _debug_only(case: Case) -> Clue | None:
-    if not _nothing_logged(case) or list(case.source.calls("set_level")):
+    if any(case.source.calls("set_level", "set_logger_level")):
         return None
     logs = [n for n in case.source.all(ast.Call) if is_log(case.source, n)]
+    if isinstance(case.check, LogsPosition) and case.evidence("right") == 0:
+        logs = [n for n in logs if any(name.rpartition(".")[2] in ("x", "y") for name in names_in(n))]
+    elif not _nothing_logged(case):
+        return None
     if not logs or any(last_name(c.func) != "debug" for c in logs):
         return None
     hint = f"{case.source.code(logs[0], 60)} is not shown: the level is INFO unless it is changed; use info"

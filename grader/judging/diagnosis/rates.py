@@ -115,6 +115,23 @@ def _callback_held_up(paced: _Paced) -> Clue | None:
             call = sleeps[0].origin
             hint = f"{paced.source.code(call)} holds up the callback: take it out, the timer sets the pace"
             return Clue(hint, paced.source.place(call))
+    return _held_up_now_and_then(paced)
+
+
+def _held_up_now_and_then(paced: _Paced) -> Clue | None:
+    """A callback sleeps on a condition, or another one does, as long as the longest pause between messages."""
+    source, longest = paced.source, paced.case.evidence("max_s")
+    items = made(source, "timer", "subscription")
+    if not paced.timers() or not isinstance(longest, float) or longest < 1.5 * paced.period_s:
+        return None
+    for item in items:
+        for sleep in _sleeps(source, runs(source, item)):
+            if not sleep.value - 0.1 * paced.period_s <= longest <= 2 * sleep.value + 2 * paced.period_s:
+                continue
+            test = next(source.around(sleep.origin, ast.If), None)
+            under = f" under 'if {source.code(test.test, 40)}'" if test is not None else ""
+            hint = f"{source.code(sleep.origin)}{under} holds up every callback of the node, one after the other"
+            return Clue(f"{hint}: take it out", source.place(sleep.origin))
     return None
 
 
@@ -130,7 +147,17 @@ def _sleeps(source: Source, nodes: Iterable[ast.AST]) -> list[Constant]:
 
 
 def _pause(source: Source, loop: ast.AST) -> list[Constant]:
-    return _sleeps(source, reached(source, [loop]))
+    """Return the sleeps in a loop, and the timeouts of spin_once, each with the call as origin."""
+    inside = list(reached(source, [loop]))
+    spun = [n for n in inside if isinstance(n, ast.Call) and last_name(n.func) == "spin_once"]
+    waits = [(c, constant(source, _timeout(c))) for c in spun]
+    timeouts = [Constant(worth.value, call) for call, worth in waits if worth is not None and worth.value > 0]
+    return sorted([*_sleeps(source, inside), *timeouts], key=lambda s: first_line(s.origin))
+
+
+def _timeout(call: ast.Call) -> ast.expr | None:
+    """Return the timeout of spin_once: a function of rclpy that takes the node first, or a method of an executor."""
+    return argument(call, 2 if chain(call.func) in ("rclpy.spin_once", "spin_once") else 0, "timeout_sec")
 
 
 @rule(TopicRate, problem=ProblemKind.BURSTS, given=_paced)
@@ -208,9 +235,16 @@ def _pace_of(paced: _Paced, loop: Loop) -> Clue | None:
     if not pauses:
         return _no_pause(paced, loop)
     call = pauses[0].origin
-    if len(pauses) == 1 and _same(1 / total, paced.found_hz) and not _same(total, paced.period_s):
-        hint = f"{source.code(call)} makes {number(1 / total)} Hz"
-        return Clue(f"{hint}; {number(paced.wanted_hz)} Hz is a pause of {wanted} s", source.place(call))
+    if _same(1 / total, paced.found_hz) and not _same(total, paced.period_s):
+        codes = " and ".join(dict.fromkeys(source.code(p.origin) for p in pauses))
+        hint = f"{codes} make{'s' if len(pauses) == 1 else ''} {number(1 / total)} Hz"
+        in_all = " in all" if len(pauses) > 1 else ""
+        longest = max(pauses, key=lambda p: p.value).origin
+        return Clue(f"{hint}; {number(paced.wanted_hz)} Hz is a pause of {wanted} s{in_all}", source.place(longest))
+    spun = next((p.origin for p in pauses if last_name(getattr(p.origin, "func", None)) == "spin_once"), None)
+    if spun is not None and paced.found_hz > 1.03 / total and (made(source, "timer", "subscription")):
+        hint = f"{source.code(spun)} returns as soon as a message comes, so it is no pause"
+        return Clue(f"{hint}: let a timer publish, create_timer({wanted}, ...), and call spin", source.place(spun))
     if _same(total, paced.period_s) and 0.7 * paced.wanted_hz < paced.found_hz < paced.wanted_hz:
         hint = f"{source.code(call)} comes on top of the time that the rest of the loop takes: a timer keeps the pace"
         return Clue(f"{hint}, create_timer({wanted}, ...)", source.place(call))

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from grader.core.exercise import Location, Outcome
 from grader.core.quantities import seconds
-from grader.judging.checks.clients import CallsOfClient, ReactsToResponses
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.graph import BidirectionalGraph
 from grader.judging.checks.logs import UsesLogger
@@ -23,6 +22,7 @@ from grader.judging.diagnosis.wiring import (
     Made,
     conditions,
     constant,
+    elsewhere_because,
     head_of,
     is_flag,
     is_log,
@@ -40,7 +40,7 @@ from grader.judging.diagnosis.wiring import (
     variable_of,
 )
 from grader.judging.output import student_records
-from grader.judging.source import Function, Source, argument, chain, covers, last_name
+from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, text_of
 from grader.judging.values import carries_number, student_endpoints
 from grader.judging.wording import quote
 
@@ -85,6 +85,31 @@ def _unseen_logs(case: Case) -> list[ast.Call]:
 
 
 @rule()
+def _other_domain(case: Case) -> Clue | None:
+    """The file chooses a ROS domain, and no other node sees what it makes."""
+    seen = {e.participant for e in student_endpoints(case.trace)}
+    if len(seen) >= len(case.sources) or case.trace.service_ends("service") or case.trace.service_ends("client"):
+        return None
+    for source in case.sources.values():
+        settings: list[ast.Assign | ast.keyword] = [*source.all(ast.Assign), *source.all(ast.keyword)]
+        setting = next((n for n in settings if _sets_domain(n)), None)
+        if setting is not None:
+            hint = f"{source.code(setting)} puts the node into another ROS domain, where no other node sees it"
+            key = f"domain:{source.file}:{first_line(setting)}"
+            return Clue(f"{hint}: take it out", source.place(setting), key=key)
+    return None
+
+
+def _sets_domain(node: ast.Assign | ast.keyword) -> bool:
+    if isinstance(node.value, ast.Constant) and node.value.value in (None, ""):
+        return False
+    if isinstance(node, ast.keyword):
+        return node.arg == "domain_id"
+    subscripts = (t for t in node.targets if isinstance(t, ast.Subscript) and last_name(t.value) == "environ")
+    return any(text_of(t.slice) == "ROS_DOMAIN_ID" for t in subscripts)
+
+
+@rule()
 def _wrong_topic(case: Case) -> Clue | None:
     for kind, topic in (("publisher", silent_topic(case)), ("subscription", unheard_topic(case))):
         ends = student_endpoints(case.trace, kind)
@@ -102,10 +127,7 @@ def _wrong_topic(case: Case) -> Clue | None:
 def _elsewhere(source: Source, item: Made, found: str, topic: str) -> Clue:
     does = "publishes on" if item.kind == "publisher" else "listens to"
     hint = f"{source.code(item.call)} {does} {quote(found, 60)}: the topic asked for is {topic}"
-    if item.topic is not None and item.topic.startswith("~"):
-        hint += "; ~ stands for the name of the node"
-    elif item.topic is not None and item.topic.strip("/") == topic.strip("/"):
-        hint += "; the node's namespace is put before the name"
+    hint += elsewhere_because(item.topic, topic)
     return Clue(hint, source.place(item.call), key=f"topic:{source.file}:{item.call.lineno}")
 
 
@@ -412,18 +434,3 @@ def _held_back(source: Source, call: ast.Call, item: Made) -> ast.If | None:
         if is_flag(test.test) and asked & brought and early:
             return test
     return None
-
-
-@rule(CallsOfClient, ReactsToResponses)
-def _shared_callback_group(case: Case) -> Clue | None:
-    """A callback awaits the response of a client in the same callback group, whose callbacks run one at a time."""
-    source = case.source
-    grouped = any(k.arg == "callback_group" for k in source.all(ast.keyword))
-    clients = list(source.calls("create_client"))
-    answers = source.calls("call_async")
-    waits = [source.parents[call] for call in answers if isinstance(source.parents.get(call), ast.Await)]
-    if grouped or not waits or len(clients) != 1:
-        return None
-    hint = f"{source.code(waits[0])} waits in a callback, and the client shares its callback group: "
-    hint += "no answer is taken meanwhile; create_client(..., callback_group=ReentrantCallbackGroup())"
-    return Clue(hint, source.place(clients[0]), key="shared_group")

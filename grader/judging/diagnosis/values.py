@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.core.exercise import ProblemKind
@@ -98,6 +98,63 @@ def _first_values(case: Case) -> list[object]:
 def draws(source: Source) -> list[ast.Call]:
     """Return the calls that draw a random number."""
     return list(source.calls(*_DRAWS))
+
+
+@rule(FieldValues, given=_wrong)
+def _set_elsewhere(wrong: _Wrong) -> Clue | None:
+    """The field gets the right number, in an object that is not published or is replaced before."""
+    source = wrong.source
+    sends = [c for c in source.calls("publish") if len(c.args) == 1]
+    for path, value in wrong.found.items():
+        want = wrong.wanted[path]
+        places = _given_values(source, path)
+        right = [g for g in places if g.worth is not None and _is(g.worth.value, want)]
+        if len(right) != 1 or len(sends) != 1 or not isinstance(right[0].node, ast.Assign):
+            continue
+        given, sent = right[0].node, chain(sends[0].args[0])
+        owner = next((n for t in given.targets if (n := chain(t).removesuffix(f".{path}")) != chain(t)), "")
+        clue = _overwritten(source, given, places, path, value) or _replaced(source, given, owner, sent, sends[0])
+        if clue is not None:
+            return clue
+    return None
+
+
+def _overwritten(source: Source, given: ast.Assign, places: Sequence[_Given], path: str, value: float) -> Clue | None:
+    """Return a clue if a later assignment in the same block gives the wrong number to the same field."""
+    block = source.parents.get(given)
+    later = [g for g in places if source.parents.get(g.node) is block and first_line(g.node) > first_line(given)]
+    same = [g for g in later if isinstance(g.node, ast.Assign) and _targets(g.node) == _targets(given)]
+    if len(same) != 1 or same[0].worth is None or not _is(same[0].worth.value, value):
+        return None
+    hint = f"{source.code(same[0].node)} overwrites {source.code(given)} in line {first_line(given)}: take it out"
+    return Clue(hint, source.place(same[0].node), key=f"overwritten:{path}")
+
+
+def _targets(statement: ast.Assign) -> list[str]:
+    return [chain(t) for t in statement.targets]
+
+
+def _replaced(source: Source, given: ast.Assign, owner: str, sent: str, send: ast.Call) -> Clue | None:
+    """Return a clue if what is published is made anew after the fields were set, or instead of it."""
+    function = source.function_of(send)
+    makers = [s for s in source.all(ast.Assign) if _targets(s) == [sent] and isinstance(s.value, ast.Call)]
+    here = [s for s in makers if source.function_of(s) is function and first_line(s) < first_line(send)]
+    if not owner or not sent or len(here) != 1 or here[0].value.args or here[0].value.keywords:  # type: ignore[attr-defined]
+        return None
+    code, line = source.code(here[0]), first_line(given)
+    if owner == sent and source.function_of(given) is function and line < first_line(here[0]):
+        hint = f"{code} throws away what was set before it, in line {line}: take it out, or set the fields after it"
+        return Clue(hint, source.place(here[0]), key=f"replaced:{first_line(here[0])}")
+    if owner != sent and not _used(source, owner, here[0], send):
+        hint = f"{source.code(send)} sends the new, empty {sent}; the fields are set in {owner}: publish {owner}"
+        return Clue(hint, source.place(send), key=f"replaced:{first_line(here[0])}")
+    return None
+
+
+def _used(source: Source, owner: str, begin: ast.AST, end: ast.AST) -> bool:
+    """Return whether a name is used between two statements."""
+    rows = range(first_line(begin), first_line(end) + 1)
+    return any(chain(n) == owner and first_line(n) in rows for n in source.names())
 
 
 @rule(FieldValues, given=_wrong)
@@ -227,6 +284,8 @@ def _number_clue(source: Source, got: _Given, path: str, value: float, want: flo
         code = source.code(around)
     if _is(value, -want):
         hint = f"{code} has the wrong sign: {path} is {number(want)}"
+    elif math.isclose(value * math.pi, want, rel_tol=1e-3):
+        hint = f"{code} lacks pi: from degrees to radians is math.radians(...), or * math.pi / 180"
     elif "degrees" in source.code(got.value, 200):
         hint = f"{code} gives degrees: {path} is in rad/s, write {number(want)}"
     else:
@@ -257,6 +316,19 @@ def _message_of(place: ast.AST) -> str:
 
 def _publishes(call: ast.Call, name: str) -> bool:
     return bool(name) and any(chain(argument) == name for argument in call.args)
+
+
+@rule(FieldFunction, problem=ProblemKind.WRONG_VALUE)
+def _needless_pi(case: Case) -> Clue | None:
+    """The value is computed with pi, which the formula does not have."""
+    formula = str(case.check.formula)
+    for place in given_leaf(case.source, case.check.field.rpartition(".")[2]):
+        value = getattr(place, "value", None)
+        named = [n for n in ast.walk(value) if last_name(n) in ("pi", "tau")] if isinstance(value, ast.expr) else []
+        if named and "pi" not in formula:
+            hint = f"{case.source.code(place)} uses {last_name(named[0])}, which {formula} does not: take it out"
+            return Clue(hint, case.source.place(place))
+    return None
 
 
 @rule(FieldFunction)

@@ -255,6 +255,15 @@ def goes_to(written: str | None, topic: str) -> bool:
     return topic == written or topic.endswith(f"/{bare}")
 
 
+def elsewhere_because(written: str | None, wanted: str) -> str:
+    """Return why a name as written became another one on the wire, as the end of a hint; empty if it did not."""
+    if written is not None and written.startswith("~"):
+        return "; ~ stands for the name of the node"
+    if written is not None and written.strip("/") == wanted.strip("/"):
+        return "; the node's namespace is put before the name"
+    return ""
+
+
 def made_for(source: Source, kind: str, topic: str, type_: str = "") -> Made | None:
     """Return the publisher or subscription of a topic; the only one of its type if no topic can be read."""
     everything = made(source, kind)

@@ -1,0 +1,326 @@
+"""Causes of service calls that go astray: wrong names and types, waits without end, answers read too early."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from grader.core.exercise import Outcome, ProblemKind
+from grader.core.trace import LogRecord
+from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
+from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse, ServiceSequence
+from grader.judging.diagnosis.names import SPINS
+from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, rule
+from grader.judging.diagnosis.wiring import (
+    elsewhere_because,
+    goes_to,
+    is_log,
+    made,
+    reached,
+    roots,
+    runs,
+    short,
+    target_of,
+    text,
+)
+from grader.judging.service_calls import CallKind, ResponseReader, episodes_of
+from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, parameters, text_of
+from grader.judging.wording import number, quote
+
+_CLIENTS = (CallsOfClient, ReactsToResponses, WaitsForService, NoGoWithoutAnswer)
+_SERVERS = (ServiceAvailable, ServiceAnswersAll, ServiceResponse, ServiceSequence)
+_THREADS = {"Thread", "start_new_thread", "ThreadPoolExecutor"}
+#: What waits for a future, or asks whether it is done.
+_WAITS = {*SPINS, "wait", "done", "add_done_callback", "wait_for_future"}
+
+
+def _ends(source: Source, kind: str) -> list[ast.Call]:
+    """Return the calls that create servers (`service`) or clients (`client`)."""
+    return list(source.calls(f"create_{kind}"))
+
+
+def _sides(case: Case) -> Iterator[tuple[Source, str]]:
+    """Yield the files of the case with the end of a service that its check is about."""
+    kind = "client" if isinstance(case.check, _CLIENTS) else "service"
+    yield from ((source, kind) for source in case.sources.values())
+
+
+@rule(*_CLIENTS, *_SERVERS)
+def _other_service(case: Case) -> Clue | None:
+    """A server or client has another name."""
+    found = case.evidence("service")
+    if not case.is_about(ProblemKind.OTHER_NAME) or not isinstance(found, str):
+        return None
+    for source, kind in _sides(case):
+        named = [(c, text(source, argument(c, 1, "srv_name"))) for c in _ends(source, kind)]
+        fitting = [(c, name) for c, name in named if goes_to(name, found)] or (named if len(named) == 1 else [])
+        if len(fitting) != 1:
+            continue
+        call, written = fitting[0]
+        does = "asks" if kind == "client" else "offers"
+        hint = f"{source.code(call)} {does} {quote(found, 60)}: the service asked for is {case.check.service}"
+        return Clue(hint + elsewhere_because(written, case.check.service), source.place(call))
+    return None
+
+
+@rule(*_CLIENTS, *_SERVERS)
+def _other_service_type(case: Case) -> Clue | None:
+    """A server or client has another type."""
+    offered = [c for c in (case.check, *case.siblings) if isinstance(c, ServiceAvailable)]
+    wanted = next((c.type for c in offered if c.service == case.check.service), "")
+    for source, kind in _sides(case):
+        types = {e.type for e in case.trace.service_ends(kind, case.check.service)}
+        calls = [
+            c for c in _ends(source, kind) if goes_to(text(source, argument(c, 1, "srv_name")), case.check.service)
+        ]
+        if not wanted or not types or wanted in types or len(calls) != 1:
+            continue
+        module, _, name = wanted.rpartition("/")
+        hint = f"{source.code(calls[0])} uses {short(next(iter(types)))}: the type asked for is {name}, "
+        return Clue(f"{hint}from {module.replace('/', '.')} import {name}", source.place(calls[0]))
+    return None
+
+
+def _callbacks(source: Source) -> list[ast.AST]:
+    """Return every node that may run in a callback of a timer, a subscription or a service."""
+    found = [n for m in made(source, "timer", "subscription") for n in runs(source, m)]
+    servers = [argument(c, 2, "callback") for c in _ends(source, "service")]
+    return found + [n for callback in servers for n in reached(source, roots(source, callback))]
+
+
+@rule(*_CLIENTS)
+def _synchronous_call(case: Case) -> Clue | None:
+    """`client.call()` waits for an answer that only a spinning node takes."""
+    source = case.source
+    clients = {target_of(source, c) for c in _ends(source, "client")} - {""}
+    calls = [c for c in source.calls("call") if isinstance(c.func, ast.Attribute) and chain(c.func.value) in clients]
+    names = {last_name(n) for n in source.names()}
+    grouped = any(k.arg == "callback_group" for k in source.all(ast.keyword))
+    for call in calls:
+        code = source.code(call)
+        if call in _callbacks(source) and not (grouped and "MultiThreadedExecutor" in names):
+            hint = f"{code} waits in a callback for an answer that can only be taken after the callback has returned"
+            return Clue(f"{hint}: use call_async and add_done_callback", source.place(call), key="waits_in_callback")
+        if not names & {*_THREADS, "MultiThreadedExecutor"}:
+            hint = f"{code} waits for ever: nothing spins the node meanwhile; use call_async, "
+            return Clue(f"{hint}then rclpy.spin_until_future_complete(node, future)", source.place(call), key="unspun")
+    return None
+
+
+@rule(*_CLIENTS)
+def _spins_in_callback(case: Case) -> Clue | None:
+    """A callback spins the node that is spinning already."""
+    source = case.source
+    inside = _callbacks(source)
+    call = next((c for c in source.calls("spin_until_future_complete", "spin_once") if c in inside), None)
+    if call is None or not any(last_name(n) == "spin" for n in source.names()):
+        return None
+    hint = f"{source.code(call)} runs in a callback, while the node is spinning already: take the answer in a function"
+    return Clue(f"{hint} given to future.add_done_callback", source.place(call), key="waits_in_callback")
+
+
+@rule(*_CLIENTS, fault=None)
+def _future_never_done(case: Case) -> Clue | None:
+    """A loop asks whether a future is done, and nothing spins the node meanwhile."""
+    source = case.source
+    if {last_name(n) for n in source.names()} & {*_THREADS, "MultiThreadedExecutor"}:
+        return None
+    for loop in source.all(ast.While):
+        asks = any(isinstance(n, ast.Call) and last_name(n.func) == "done" for n in ast.walk(loop.test))
+        inside = {last_name(n.func) for n in reached(source, [loop]) if isinstance(n, ast.Call)}
+        if asks and not inside & set(SPINS):
+            hint = f"'while {source.code(loop.test, 40)}' never ends: an answer is taken only while the node spins; "
+            return Clue(f"{hint}use rclpy.spin_until_future_complete(node, future)", source.place(loop))
+    return None
+
+
+@rule(CallsOfClient, ReactsToResponses)
+def _shared_callback_group(case: Case) -> Clue | None:
+    """A callback awaits the response of a client in the same callback group, whose callbacks run one at a time."""
+    source = case.source
+    grouped = any(k.arg == "callback_group" for k in source.all(ast.keyword))
+    clients = list(source.calls("create_client"))
+    answers = source.calls("call_async")
+    waits = [source.parents[call] for call in answers if isinstance(source.parents.get(call), ast.Await)]
+    if grouped or not waits or len(clients) != 1:
+        return None
+    hint = f"{source.code(waits[0])} waits in a callback, and the client shares its callback group: "
+    hint += "no answer is taken meanwhile; create_client(..., callback_group=ReentrantCallbackGroup())"
+    return Clue(hint, source.place(clients[0]), key="shared_group")
+
+
+def _unawaited(source: Source) -> ast.AST | None:
+    """Return where the result of a future is read in the function that made it, without any wait before."""
+    for read_ in [*source.calls("result")]:
+        function = source.function_of(read_)
+        future = chain(read_.func.value) if isinstance(read_.func, ast.Attribute) else ""
+        calls = [c for c in source.calls("call_async") if source.function_of(c) is function]
+        made_here = [c for c in calls if target_of(source, c) == future or future.endswith("call_async()")]
+        if len(made_here) != 1 or first_line(made_here[0]) > first_line(read_):
+            continue
+        scope: ast.AST | None = function if function is not None else source.tree
+        inside = reached(source, [scope]) if scope is not None else ()
+        waits = [n for n in inside if isinstance(n, (ast.Name, ast.Attribute)) and last_name(n) in _WAITS]
+        awaited = any(isinstance(n, ast.Await) for n in (ast.walk(scope) if scope is not None else ()))
+        if not awaited and not any(first_line(w) <= first_line(read_) for w in waits):
+            return read_
+    return None
+
+
+def _too_early(source: Source) -> Clue | None:
+    found = _unawaited(source)
+    if found is None:
+        return None
+    hint = f"{source.code(found)} is read before the answer has come, so it is None: "
+    hint += "first call rclpy.spin_until_future_complete(node, future)"
+    return Clue(hint, source.place(found), key="result_too_early")
+
+
+@rule(*_CLIENTS)
+def _result_too_early(case: Case) -> Clue | None:
+    """The result of a future is read at once."""
+    return _too_early(case.source)
+
+
+@crash_rule("'NoneType' object has no attribute|'NoneType' object is not subscriptable")
+def _no_result_yet(crash: Crash) -> Clue | None:
+    """The missing result of a future is used."""
+    return _too_early(crash.source)
+
+
+@crash_rule(r"'Future' object has no attribute '(\w+)'|'(?:function|method)' object has no attribute '(\w+)'")
+def _future_is_no_answer(crash: Crash) -> Clue | None:
+    """The future of a call, or the method `result`, is used like the response."""
+    source, name = crash.source, crash.found[1] or crash.found[2]
+    if not any(source.calls("call_async")):
+        return None
+    for node in source.on_line(crash.line, ast.Attribute):
+        if node.attr == name and last_name(node.value) == "result" and isinstance(node.value, ast.Attribute):
+            code = source.code(node.value, 40)
+            return Clue(f"result is a method: write {code}().{name}", source.place(node))
+    if crash.found[1] is None:
+        return None
+    hint = f"call_async returns a future, and {name} belongs to the response: call "
+    return Clue(f"{hint}rclpy.spin_until_future_complete(node, future), then future.result().{name}")
+
+
+@crash_rule(r"'(\w+)_Request' object has no attribute '(\w+)'|'(\w+)_Response' object has no attribute '(\w+)'")
+def _request_is_response(crash: Crash) -> Clue | None:
+    """The callback of a service names its parameters in the wrong order."""
+    source = crash.source
+    for call in _ends(source, "service"):
+        for function in roots(source, argument(call, 2, "callback")):
+            if isinstance(function, Function) and covers(function, crash.line):
+                names = parameters(function)
+                own = names[:1] if source.is_method(function) else []
+                pair = names[len(own) :]
+                if len(pair) == 2 and pair[0].lower().startswith("res") and pair[1].lower().startswith("req"):
+                    wanted = ", ".join([*own, pair[1], pair[0]])
+                    hint = f"a service hands over the request first: def {function.name}({wanted}):"
+                    return Clue(hint, source.place(function))
+    return None
+
+
+@crash_rule()
+def _future_before_node(crash: Crash) -> Clue | None:
+    """The arguments of spin_until_future_complete are swapped."""
+    source = crash.source
+    for call in source.calls("spin_until_future_complete"):
+        first = argument(call, 0, "node")
+        futures = {target_of(source, c) for c in source.calls("call_async")} - {""}
+        if covers(call, crash.line) and len(call.args) > 1 and chain(first) in futures:
+            given = ", ".join([source.code(call.args[1], 30), source.code(call.args[0], 30)])
+            return Clue(f"the node comes first, then the future: spin_until_future_complete({given})")
+    return None
+
+
+@crash_rule()
+def _service_arguments(crash: Crash) -> Clue | None:
+    """The arguments of create_client or create_service are swapped."""
+    source = crash.source
+    for kind in ("client", "service"):
+        call = next((c for c in _ends(source, kind) if covers(c, crash.line) and len(c.args) > 1), None)
+        if call is None:
+            continue
+        codes = [source.code(a, 40) for a in call.args]
+        if text_of(call.args[0]) is not None and text_of(call.args[1]) is None:
+            given = ", ".join([codes[1], codes[0], *codes[2:]])
+            return Clue(f"the service type comes first, then the name: create_{kind}({given})")
+        if kind == "service" and len(codes) > 2 and text_of(call.args[1]) is None and text_of(call.args[2]) is not None:
+            given = ", ".join([codes[0], codes[2], codes[1]])
+            return Clue(f"the name comes second, then the callback: create_service({given})")
+    return None
+
+
+@rule(ServiceResponse, ServiceSequence)
+def _another_response(case: Case) -> Clue | None:
+    """The callback fills in one response and returns another one."""
+    source = case.source
+    for call in _ends(source, "service"):
+        for function in roots(source, argument(call, 2, "callback")):
+            if not isinstance(function, Function) or len(parameters(function)) < 2:
+                continue
+            name = parameters(function)[-1]
+            returns = [r for r in source.all(ast.Return) if source.function_of(r) is function and r.value is not None]
+            filled = any(chain(n.value) == name and isinstance(n.ctx, ast.Store) for n in source.all(ast.Attribute))
+            new = [r for r in returns if isinstance(r.value, ast.Call) and chain(r.value.func).endswith(".Response")]
+            if filled and len(new) == len(returns) == 1 and not new[0].value.keywords:  # type: ignore[union-attr]
+                hint = f"{source.code(new[0])} sends a new, empty response: write return {name}, which is filled in"
+                return Clue(hint, source.place(new[0]))
+    return None
+
+
+@rule(ReactsToResponses, outcome=Outcome.NOT_MET)
+def _wrong_level(case: Case) -> Clue | None:
+    """One side logs at the level of the other, or at a level that is not shown."""
+    check: ReactsToResponses = case.check
+    good, low = _after(case, CallKind.GOOD), _after(case, CallKind.LOW)
+    if check.side == "above" and good and low and all(a.warned for a in good + low):
+        lines = set.intersection(*(a.lines("WARN") for a in good)) - set().union(*(a.lines("WARN") for a in low))
+        return _level_clue(case, lines, f"use info above {number(check.threshold)}")
+    if check.side == "at_or_below" and good and low and not any(a.warned for a in good + low):
+        lines = set.intersection(*(a.lines("INFO") for a in low)) - set().union(*(a.lines("INFO") for a in good))
+        return _level_clue(case, lines, "use warning") or _unseen_level(case, "warning")
+    return _unseen_level(case, "info") if check.side == "above" and not any(a.warned for a in good) else None
+
+
+def _level_clue(case: Case, lines: set[int], advice: str) -> Clue | None:
+    calls = [c for line in sorted(lines) for c in case.source.on_line(line, ast.Call) if is_log(case.source, c)]
+    if len(calls) != 1:
+        return None
+    hint = f"{case.source.code(calls[0], 60)} has the wrong level, {last_name(calls[0].func)}: {advice}"
+    return Clue(hint, case.source.place(calls[0]))
+
+
+def _unseen_level(case: Case, level: str) -> Clue | None:
+    """Return the only log of level DEBUG, which nobody sees."""
+    hidden = [c for c in case.source.calls("debug") if is_log(case.source, c)]
+    if len(hidden) != 1 or any(case.source.calls("set_level", "set_logger_level")):
+        return None
+    hint = f"{case.source.code(hidden[0], 60)} is not shown: the level is INFO unless it is changed; use {level}"
+    return Clue(hint, case.source.place(hidden[0]))
+
+
+@dataclass(frozen=True, slots=True)
+class _Reaction:
+    """What a client logged between a response and its next request."""
+
+    records: tuple[LogRecord, ...]
+
+    @property
+    def warned(self) -> bool:
+        return any(r.severity in ("WARN", "ERROR", "FATAL") for r in self.records)
+
+    def lines(self, severity: str) -> set[int]:
+        return {r.line for r in self.records if r.severity == severity}
+
+
+def _after(case: Case, kind: CallKind) -> list[_Reaction]:
+    """Return the reactions to the responses of a kind."""
+    check: ReactsToResponses = case.check
+    success = "" if check.success == "none" else check.success
+    reading = ResponseReader(check.field, success, check.pattern, check.threshold)
+    episodes = episodes_of(case.trace, check.process, check.service, reading)
+    mine = (e for e in episodes if e.kind is kind)
+    return [_Reaction(tuple(o for o in e.sure if isinstance(o, LogRecord))) for e in mine]

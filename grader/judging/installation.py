@@ -1,0 +1,52 @@
+"""Tells a ROS package that this installation lacks from a module that a submission should bring."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from grader.core.trace import Fault, FaultKind, Trace
+from grader.judging.findings import faults_before_stop
+from grader.judging.source import read, words
+
+#: Python packages that come with a desktop installation of ROS 2 and not with the wheels of rclpy.
+ROS_PACKAGES = frozenset(
+    words(
+        "action_tutorials_interfaces angles catkin_pkg composition_interfaces cv_bridge domain_coordinator "
+        "example_interfaces image_geometry interactive_markers joint_state_publisher laser_geometry launch launch_ros "
+        "launch_testing launch_testing_ros launch_xml launch_yaml logging_demo map_msgs message_filters "
+        "osrf_pycommon pcl_msgs pendulum_msgs PyKDL python_qt_binding qt_gui resource_retriever robot_state_publisher "
+        "ros2action ros2bag ros2cli ros2component ros2doctor ros2interface ros2launch ros2lifecycle ros2node ros2param "
+        "ros2pkg ros2run ros2service ros2topic rosbag2_interfaces rosbag2_py rosidl_runtime_py rqt_gui rqt_gui_py "
+        "sensor_msgs_py sros2 statistics_msgs tf2_geometry_msgs tf2_kdl tf2_msgs tf2_py tf2_ros tf2_sensor_msgs "
+        "tf2_tools topic_monitor turtlesim"
+    )
+)
+
+
+@dataclass(frozen=True, slots=True)
+class LackingPackage:
+    """A package of ROS that a program imports and this installation lacks."""
+
+    name: str
+    fault: Fault
+
+
+def lacking_package(trace: Trace, processes: Sequence[str], sources: Mapping[str, str]) -> LackingPackage | None:
+    """Return the package without which a program of a scenario ended, if its text imports it."""
+    for fault in faults_before_stop(trace):
+        found = fault.said(r"^ModuleNotFoundError: No module named '(\w+)") if fault.process in processes else None
+        if found is None or fault.kind is not FaultKind.EXCEPTION or found[1] not in ROS_PACKAGES:
+            continue
+        # the import stands in another file of the submission if the fault does
+        if fault.file.rpartition("/")[2] != fault.process or _imports(sources.get(fault.process, ""), found[1]):
+            return LackingPackage(found[1], fault)
+    return None
+
+
+def _imports(text: str, package: str) -> bool:
+    source = read("", text)
+    plain = (alias.name for node in source.all(ast.Import) for alias in node.names)
+    parts = (node.module or "" for node in source.all(ast.ImportFrom) if not node.level)
+    return any(name.partition(".")[0] == package for name in (*plain, *parts))

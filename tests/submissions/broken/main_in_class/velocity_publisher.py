@@ -1,0 +1,25 @@
+import rclpy
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+
+
+class VelocityPublisher(Node):
+    def __init__(self):
+        super().__init__('velocity_publisher')
+        self.pub = self.create_publisher(Twist, '/cmd_vel', 10)
+        self.create_timer(0.05, self.tick)
+        self.get_logger().info('hello')
+
+    def tick(self):
+        m = Twist()
+        m.linear.x = 0.5
+        m.angular.z = 0.1
+        self.pub.publish(m)
+
+    def main(args=None):
+        rclpy.init(args=args)
+        rclpy.spin(VelocityPublisher())
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,29 @@
+import rclpy
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+
+
+class VelocityPublisher(Node):
+    def __init__(self):
+        super().__init__('velocity_publisher')
+        self.publisher = self.create_publisher(Twist, '/cmd_vel', 10)
+        self.timer = self.create_timer(0.05, self.timer_callback)
+        self.get_logger().info('Velocity publisher started')
+
+
+def timer_callback(self):
+    msg = Twist()
+    msg.linear.x = 0.5
+    msg.angular.z = 0.1
+    self.publisher.publish(msg)
+
+
+def main(args=None):
+    rclpy.init(args=args)
+    node = VelocityPublisher()
+    rclpy.spin(node)
+    rclpy.shutdown()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,36 @@
+#!/usr/bin/env python
+# coding: utf-8
+
+# In[1]:
+
+
+get_ipython().system('pip install rclpy')
+
+
+# In[2]:
+
+
+import rclpy
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+
+
+class VelocityPublisher(Node):
+    def __init__(self):
+        super().__init__('velocity_publisher')
+        self.pub = self.create_publisher(Twist, '/cmd_vel', 10)
+        self.create_timer(0.05, self.tick)
+        self.get_logger().info('started')
+
+    def tick(self):
+        msg = Twist()
+        msg.linear.x = 0.5
+        msg.angular.z = 0.1
+        self.pub.publish(msg)
+
+
+# In[3]:
+
+
+rclpy.init()
+rclpy.spin(VelocityPublisher())

@@ -1,0 +1,2 @@
+def half(speed):
+    return speed / 2
