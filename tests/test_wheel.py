@@ -13,7 +13,10 @@ import venv
 import zipfile
 from pathlib import Path
 
+import click
 import pytest
+
+from grader.cli.main import app
 
 pytestmark = pytest.mark.slow
 
@@ -102,6 +105,26 @@ def test_the_libraries_of_the_report_travel_as_published_with_their_licences(whe
     found = [name for name in archive.namelist() if name.startswith(folder)]
     assert {name: hashlib.sha256(archive.read(name)).hexdigest() for name in found} == wanted
     assert sum("LICENSE" in name or "NOTICE" in name for name in wanted) == 4
+
+
+def test_each_command_has_a_man_page_that_can_be_shown(wheel: Path, tmp_path: Path) -> None:
+    """It travels where installers put man pages, and the formatter has no complaint."""
+
+    def pages(command: click.Command, name: str) -> set[str]:
+        below = command.commands if isinstance(command, click.Group) else {}
+        shown = {word: each for word, each in below.items() if not each.hidden}
+        return {f"{name}.1"}.union(*(pages(each, f"{name}-{word}") for word, each in shown.items()))
+
+    archive = zipfile.ZipFile(wheel)
+    found = [name for name in archive.namelist() if ".data/data/share/man/man1/" in name]
+    assert {Path(name).name for name in found} == pages(app, "grade")
+    if shutil.which("groff") is None:
+        pytest.skip("groff is not installed")
+    for name in found:
+        command = ["groff", "-man", "-ww", "-Tutf8", "-Kutf8", archive.extract(name, tmp_path)]
+        done = subprocess.run(command, check=True, capture_output=True, text=True, encoding="utf-8")
+        assert done.stderr == "", name
+        assert done.stdout.startswith(Path(name).stem.replace("-", " ").upper())
 
 
 @pytest.fixture

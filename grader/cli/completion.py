@@ -30,13 +30,13 @@ _ZSH = "(( $+functions[compdef] )) || { autoload -Uz compinit && compinit; }"
 @click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
 @click.pass_context
 def command(ctx: click.Context, shell: str) -> int:
-    r"""Print a script that makes a shell complete commands, options, exercises, formats and files.
+    """Print a script that makes a shell complete commands, options, exercises, formats and files.
 
     \b
     bash: grade completion bash >> ~/.bashrc
     zsh:  grade completion zsh >> ~/.zshrc
     fish: grade completion fish > ~/.config/fish/completions/grade.fish
-    """
+    """  # noqa: D301  click keeps the lines after a backspace
     root = ctx.find_root()
     made = get_completion_class(shell)
     assert made is not None
