@@ -19,7 +19,7 @@ import grader
 from grader.app.seeds import read_key
 from grader.core.errors import EnvironmentFault, GraderError, RubricError
 from grader.core.shipped import shipped
-from grader.rubrics.builtin import builtin_rubrics, require_exercises
+from grader.rubrics.builtin import builtin_rubrics, exercise_ids
 from grader.rubrics.loader import own_check_files, read_rubric
 from grader.rubrics.variants import First
 
@@ -230,4 +230,4 @@ def _check(chosen: Chosen) -> None:
         if found.variant is not None:
             text = f"{path}: expected a rubric that is the same for everybody, found one with variants"
             raise RubricError(text, "grade it with grade batch: no platform keeps the course key from students")
-    require_exercises(chosen.exercises, [exercise.id for exercise in exercises])
+    exercise_ids(chosen.exercises, exercises)

@@ -2,9 +2,14 @@
 
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+import time
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +21,7 @@ from click.testing import CliRunner, Result
 import grader
 from grader.app import start as session
 from grader.app.request import GradeRequest
-from grader.cli import main
+from grader.cli import interactive, main
 from grader.core import errors
 from grader.core.exercise import Outcome
 from grader.core.report import Report
@@ -38,6 +43,7 @@ class Session:
         on_partial_report: object = None,
         *,
         pictures: bool = True,
+        session: object = None,
     ) -> Report:
         self.requests.append(request)
         self.pictures = pictures
@@ -147,7 +153,8 @@ def test_a_dash_prints_that_format_instead(run_session: Session, tmp_path: Path)
 @pytest.mark.parametrize(
     ("arguments", "message", "hint"),
     [
-        ((), "Missing argument 'SUBMISSION'", "grade --help"),
+        (("ada", "--watch", "--json"), "--watch prints a report after each save", "grade --help"),
+        (("ada", "--watch", "-o", "evidence=x"), "--watch prints a report after each save", "grade --help"),
         (("ada", "bert"), "unexpected extra argument (bert)", "grade --help"),
         (("ada", "--sed", "5"), "--seed", "grade --help"),
         (("ada", "--seed", "-1"), "x>=0", "grade --help"),
@@ -315,6 +322,147 @@ def test_a_folder_named_like_a_subcommand_is_graded(
     assert Path(run_session.requests[0].submission) == Path("batch")
 
 
+@pytest.mark.parametrize(
+    "files",
+    [
+        {"odom_subscriber.py": ""},
+        {"src/pkg/pkg/fan_controller.py": ""},
+        {"package.xml": "", "pkg/fan_controller.py": ""},
+        {"my_node.py": "import rclpy"},
+    ],
+)
+def test_the_current_folder_is_graded_if_it_holds_an_exercise(
+    run_session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files: dict[str, str]
+) -> None:
+    """A folder of files, a workspace, a package, or a node under another name."""
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    assert grade().exit_code == 0
+    assert [request.submission for request in run_session.requests] == ["."]
+
+
+def test_elsewhere_the_command_alone_shows_examples(
+    run_session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A home folder is not graded because a homework lies somewhere in it."""
+    (tmp_path / "homework").mkdir()
+    (tmp_path / "homework" / "odom_subscriber.py").touch()
+    (tmp_path / "notes.py").write_text("print(1)")
+    monkeypatch.chdir(tmp_path)
+    result = grade()
+    assert (result.exit_code, result.stdout, run_session.requests) == (2, "", [])
+    assert result.stderr.startswith("error: expected a submission: this folder holds no exercise file, such as ")
+    assert "grade homework --exercise 1" in result.stderr
+
+
+@pytest.mark.parametrize(("display", "asked"), [(":0", True), ("", False)])
+@pytest.mark.parametrize("named", [False, True])
+def test_open_shows_the_page_in_a_browser(
+    run_session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, display: str, asked: bool, named: bool
+) -> None:
+    """In the current folder unless named; without a display it says where the page is, and what to do."""
+    opened: list[str] = []
+
+    def open_(url: str) -> bool:
+        opened.append(url)
+        return True
+
+    monkeypatch.setattr(webbrowser, "open", open_)
+    for name in ("BROWSER", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.chdir(tmp_path)
+    result = grade("ada", "--open", *(["-o", "html=page.html"] if named else []))
+    page = tmp_path / ("page.html" if named else "grade-report.html")
+    assert result.exit_code == 0
+    assert list(tmp_path.iterdir()) == [page]
+    assert run_session.pictures is True
+    assert opened == ([page.as_uri()] if asked else [])
+    note = [] if asked else ["note: no browser could be opened here; open the page in one, on any computer"]
+    assert result.stderr.splitlines() == [f"page: {page}", *note]
+
+
+def test_watch_grades_after_each_save_until_it_is_interrupted(
+    run_session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One session for all; an error is said and waited out; the exit code is that of the last report."""
+
+    def three(path: Path) -> Iterator[bool]:
+        yield False
+        run_session.result = errors.SubmissionError("no file", "save one")
+        yield True
+        run_session.result = a_report(Outcome.NOT_MET)
+        yield True
+        raise KeyboardInterrupt
+
+    sessions: list[GradeRequest] = []
+
+    def opened(request: GradeRequest, progress: object) -> AbstractContextManager[None]:
+        sessions.append(request)
+        return nullcontext()
+
+    monkeypatch.setattr(session, "opened", opened)
+    monkeypatch.setattr(interactive, "saves", three)
+    result = grade(str(tmp_path), "--watch")
+    assert (result.exit_code, len(sessions), len(run_session.requests)) == (1, 1, 3)
+    assert result.stdout.count("points\n") == 2
+    assert result.stderr.splitlines().count("error: no file") == 1
+    assert result.stderr.count("watching for the next save") == 3
+
+
+def test_the_time_shown_is_the_time_since_the_start_of_the_process(run_session: Session) -> None:
+    """Imports and the end of the session count, because the user waited for them."""
+    result = grade("ada", obj=time.monotonic() - 3600)
+    assert re.search(r"graded \./ada in 36\d\d\.\d s", result.stdout)
+
+
+def replaced(folder: Path) -> None:
+    shutil.move(folder, folder.with_name("old"))
+    folder.mkdir()
+
+
+@pytest.mark.parametrize(
+    ("change", "watched"),
+    [
+        (lambda folder: (folder / "a.py").write_text("x = 2"), "."),
+        (lambda folder: (folder / "tmp").write_text("x = 2") and (folder / "tmp").replace(folder / "a.py"), "."),
+        (lambda folder: (folder / "tmp").write_text("x = 2") and (folder / "tmp").replace(folder / "a.py"), "a.py"),
+        (lambda folder: (folder / "a.py").unlink(), "a.py"),
+        (lambda folder: (folder / "pkg" / "b.py").touch(), "."),
+        (replaced, "."),
+    ],
+)
+def test_a_save_is_noticed_however_it_is_made(tmp_path: Path, change: Callable[[Path], object], watched: str) -> None:
+    """Written in place, renamed to it, removed, new, in a folder that is replaced; once each, and again later."""
+    folder = tmp_path / "in"
+    (folder / "pkg").mkdir(parents=True)
+    (folder / "a.py").write_text("x = 1")
+    saved = interactive.saves(folder / watched)
+    assert next(saved) is False
+    change(folder)
+    assert next(saved) is True
+    (folder / "a.py").write_text("x = 3")
+    assert next(saved) is True
+    saved.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "only", "counts"),
+    [
+        ("a.py", None, True),
+        ("grade-report.html", None, False),
+        ("4913", None, False),
+        ("b.py", "a.py", False),
+        ("hw.zip", "hw.zip", True),
+    ],
+)
+def test_only_programs_are_a_reason_to_grade_again(name: str, only: str | None, counts: bool) -> None:
+    """Not the page that grading itself writes, nor what editors leave behind."""
+    assert interactive.is_program(name, only) is counts
+
+
 # --- whole processes -------------------------------------------------------------------------------------------------
 
 CHILD = """
@@ -323,7 +471,7 @@ sys.path.insert(0, {folder!r})
 from cli_samples import a_report
 from grader.app import start as session
 from grader.cli import main
-def grade(request, progress, on_recorded=None, on_partial_report=None, *, pictures=True):
+def grade(request, progress, on_recorded=None, on_partial_report=None, *, pictures=True, session=None):
     progress("exercise 1: \\x1b[31malone")
     sys.stdin.readline()
     return a_report()

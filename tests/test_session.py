@@ -7,7 +7,7 @@ import pytest
 from grader.app.grade import read_exercises, read_recording
 from grader.app.request import GradeRequest
 from grader.core.errors import RecordingError, RubricError
-from grader.rubrics.builtin import builtin_rubrics
+from grader.rubrics.builtin import builtin_rubrics, exercise_ids
 
 
 def test_all_exercises_are_graded_unless_some_are_named() -> None:
@@ -23,8 +23,27 @@ def test_an_unknown_exercise_names_the_nearest() -> None:
         read_exercises(GradeRequest("x", exercises=("velocity_publishr",)))
     assert error.value.hint == "did you mean velocity_publisher"
     with pytest.raises(RubricError) as error:
-        read_exercises(GradeRequest("x", exercises=("3",)))
-    assert error.value.hint == f"known are {', '.join(builtin_rubrics())}"
+        read_exercises(GradeRequest("x", exercises=("9",)))
+    assert error.value.hint == "grade --exercise 1 grades the first exercise"
+    assert all(id_ in error.value.message for id_ in builtin_rubrics())
+
+
+@pytest.mark.parametrize(
+    ("name", "id_"),
+    [
+        ("1", "velocity_publisher"),
+        ("Exercise 2", "odom_subscriber"),
+        ("velocity_publisher.py", "velocity_publisher"),
+        ("src/fan_controller.py", "two_node_communication"),
+        ("project 2", "joint_subscriber"),
+        ("project_3", "battery_service"),
+    ],
+)
+def test_an_exercise_may_be_named_as_its_task_sheet_or_its_file(name: str, id_: str) -> None:
+    """A number, a project or a file; reports name the id."""
+    exercises = read_exercises(GradeRequest("x", exercises=(name, id_)))
+    assert [e.id for e in exercises] == [id_]
+    assert exercise_ids((name, id_), exercises) == (id_,)
 
 
 def test_the_recording_is_read_only_where_it_is_played(tmp_path: Path) -> None:

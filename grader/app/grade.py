@@ -30,7 +30,7 @@ from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
 from grader.reporting.json_report import dumps
-from grader.rubrics.builtin import builtin_exercises, builtin_odometry, compiled, require_exercises
+from grader.rubrics.builtin import builtin_exercises, builtin_odometry, compiled, exercise_ids
 from grader.rubrics.loader import read_rubric
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import read_reaches, read_sources
@@ -38,7 +38,7 @@ from grader.submissions.submission import stage_collected, stage_submission
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
-#: Called at the start of each step with a short phrase such as `exercise 1: alone`.
+#: Called at the start of each step with a short phrase such as `Exercise 1: velocity_publisher.py (alone)`.
 Progress = Callable[[str], None]
 
 
@@ -95,8 +95,10 @@ class EvidenceWriter:
         if self._recorded is None:
             return
         run, exercises = self._recorded
+        run = replace(run, duration_s=report.duration_s)
         for folder in self._folders:
-            asked = request_to_json(self._request, exercises)
+            ids = exercise_ids(self._request.exercises, exercises)
+            asked = request_to_json(replace(self._request, exercises=ids), exercises)
             keep(folder, run, exercises, request=asked, report=dumps(report).encode())
 
 
@@ -122,6 +124,7 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
     with TemporaryDirectory(prefix="submission-", dir=session.folder, ignore_cleanup_errors=True) as folder:
         progress("reading the submission")
         exercises = read_exercises(request)
+        request = replace(request, exercises=exercise_ids(request.exercises, exercises))
         root = Path(folder)
         root.chmod(0o755)  # as the folder of the session
         submission = _staged(request, exercises, root)
@@ -194,9 +197,9 @@ def read_exercises(request: GradeRequest, submissions: Sequence[Path] = ()) -> l
         exercises = [read_rubric(path, submissions=theirs, draw=request.draw) for path in request.rubrics]
     else:
         exercises = list(builtin_exercises())
-    require_exercises(request.exercises, [exercise.id for exercise in exercises])
+    chosen = exercise_ids(request.exercises, exercises)
     if request.exercises:
-        return [exercise for exercise in exercises if exercise.id in request.exercises]
+        return [exercise for exercise in exercises if exercise.id in chosen]
     return [e for e in exercises if request.rubrics or request.every or not e.by_request]
 
 
@@ -222,7 +225,7 @@ def plan_jobs(
     clock = planned_clock(request.clock)
     return {
         (exercise.id, scenario.id): Job(
-            f"{exercise_name(exercise.number).lower()}: {scenario.id.replace('_', ' ')}",
+            f"{exercise_name(exercise.number)}: {', '.join(scenario.processes)} ({scenario.id.replace('_', ' ')})",
             plan_scenario(exercise.id, scenario, submission, seed=seed, odometry=odometry, clock=clock),
         )
         for exercise in exercises

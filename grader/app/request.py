@@ -25,8 +25,8 @@ class GradeRequest:
     """What to grade, and how."""
 
     submission: str  # path as the user typed it
-    # Exercise ids to grade; empty for all exercises of the rubrics, except built-in ones that are only graded by
-    # request.
+    # Exercises to grade, by id, number or file; empty for all exercises of the rubrics, except built-in ones that are
+    # only graded by request.
     exercises: tuple[str, ...] = ()
     every: bool = False  # whether to grade exactly the exercises that the submission has a file for
     rubrics: tuple[Path, ...] = ()  # rubric files; empty for the built-in ones

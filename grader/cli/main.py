@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+import sys
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +52,9 @@ if TYPE_CHECKING:
 
     from grader.app.grade import EvidenceWriter
     from grader.app.request import GradeRequest
+    from grader.core.report import Report
+    from grader.execution.recording_session import RecordingSession
+    from grader.reporting.audience import Readers
     from grader.reporting.delivery import Output
 
 _EPILOG = (
@@ -85,7 +92,7 @@ class CommandLine(click.Group):
 
     def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Describe the default command, then the others."""
-        formatter.write_usage(ctx.command_path, "[OPTIONS] SUBMISSION")
+        formatter.write_usage(ctx.command_path, "[OPTIONS] [SUBMISSION]")
         self.default.format_help_text(ctx, formatter)
         self.default.format_options(ctx, formatter)
         self.format_commands(ctx, formatter)
@@ -98,14 +105,14 @@ class _Default(click.Command):
 
 
 @click.command(cls=_Default, epilog=_EPILOG, hidden=True)
-@click.argument("submission", shell_complete=complete_file)
+@click.argument("submission", required=False, shell_complete=complete_file)
 @click.option(
     "--exercise",
     "exercises",
     metavar="ID",
     multiple=True,
     shell_complete=complete_exercise,
-    help="Grade only this exercise; repeatable.",
+    help="Grade only this exercise, named by its id, number or file; repeatable.",
 )
 @click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which there is a file.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, as a report names it.")
@@ -155,11 +162,13 @@ class _Default(click.Command):
 @click.option("--variant-key", type=PATH, metavar="FILE", help="The course key that rubrics draw variants from.")
 @audience_options
 @click.option("-v", "--verbose", is_flag=True, help="Print every reason, hint and call, the graph, and versions.")
+@click.option("--watch", is_flag=True, help="Grade again whenever a .py file is saved, until Ctrl-C.")
+@click.option("--open", "opens", is_flag=True, help="Write the HTML page and open it in a browser.")
 @click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
 @click.version_option(grader.__version__, prog_name="grade", message="%(prog)s %(version)s")
 def _grade(  # noqa: PLR0913  one parameter an option
     *,
-    submission: str,
+    submission: str | None,
     exercises: tuple[str, ...],
     seed: int | None,
     seed_key: Path | None,
@@ -171,26 +180,36 @@ def _grade(  # noqa: PLR0913  one parameter an option
     audience: str | None,
     as_of: str,
     verbose: bool,
+    watch: bool,
+    opens: bool,
     no_progress: bool,
     **as_given: Any,  # options that are fields of a request
 ) -> int:
     """Grade a SUBMISSION (a folder, an archive or a .py file) and explain the score.
 
-    A folder with the name of a command is graded as ./NAME.
+    Without one, the current folder is graded if it holds exercise files. A folder with the name of a command is graded
+    as ./NAME.
     """
-    from grader.reporting.delivery import Output, deliver, early_delivery, prepared
+    started = click.get_current_context().find_object(float) or time.monotonic()
+    from grader.cli import interactive
+    from grader.reporting.delivery import Output, prepared
 
     rendered = tuple(output for output in outputs if output.format != EVIDENCE)
+    if watch and (as_json or rendered != outputs):
+        raise click.BadParameter("--watch prints a report after each save: it excludes --json and evidence")
+    pages = [output.path for output in rendered if output.format == "html" and output.path is not None]
+    if opens and not pages:
+        pages = [interactive.PAGE]
+        rendered = (*rendered, Output("html", interactive.PAGE))
     wanted = prepared((*rendered, Output("json")) if as_json else rendered, verbose=verbose)
     for_whom = readers(audience, as_of)
-    from grader.app import start
     from grader.app.request import GradeRequest
     from grader.app.seeds import PRACTICE
-    from grader.core.checkup import missing
-    from grader.core.releases import TRIED
-    from grader.reporting.audience import told
 
     key = drawn_with(seed, seed_key)
+    submission = interactive.folder_at_hand(as_given["rubrics"]) if submission is None else submission
+    if submission is None:
+        return UNUSABLE
     request = GradeRequest(
         submission=submission,
         exercises=tuple(dict.fromkeys(exercises)),
@@ -204,21 +223,80 @@ def _grade(  # noqa: PLR0913  one parameter an option
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
     wanted = tuple(replace(output, evidence=next(iter(folders), None)) for output in wanted)
     writer = _evidence_writer(folders, request) if folders else None
-    remember = writer.remember if writer is not None else None
-    pictures = any(FORMATS[output.format].illustrated for output in wanted)
-    with shown_progress(wanted=not no_progress) as progress:
-        report = start.grade(request, progress, remember, early_delivery(wanted, for_whom), pictures=pictures)
-    for found in () if for_whom.only_students else missing(report.environment.containment):
-        complain(f"sandbox {report.environment.isolation}: {found}")
-    if report.environment.ros_distro not in TRIED:
-        complain(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
-    deliver(report, wanted, for_whom)
-    seen = told(report, for_whom)
-    if writer is not None and seen is not report:
-        complain("the evidence is not kept: it holds what the rubric withholds from students")
-    elif writer is not None:
-        writer.write(report)
-    return exit_code(seen, min_score)
+    grading = _Grading(request, wanted, for_whom, writer, min_score, not no_progress, pages[0] if opens else None)
+    # What does not exist is no folder to watch; grading it says so.
+    return grading.each_save(started) if watch and Path(request.submission).exists() else grading.once(started)
+
+
+@dataclass(slots=True)
+class _Grading:
+    """Grades a submission, once or again and again, and delivers its reports."""
+
+    request: GradeRequest
+    outputs: Sequence[Output]
+    readers: Readers
+    writer: EvidenceWriter | None
+    min_score: Fraction | None
+    shows_progress: bool
+    page: Path | None  # the page to open after the first report; None to open none
+
+    def once(self, started: float, session: RecordingSession | None = None) -> int:
+        """Grade, in a session if one is given, and return the exit code; the user waits since `started`."""
+        from grader.app import start
+        from grader.reporting.audience import told
+        from grader.reporting.delivery import deliver, early_delivery
+
+        remember = self.writer.remember if self.writer is not None else None
+        early = early_delivery(self.outputs, self.readers)
+        pictures = any(FORMATS[output.format].illustrated for output in self.outputs)
+        with shown_progress(wanted=self.shows_progress) as progress:
+            report = start.grade(self.request, progress, remember, early, pictures=pictures, session=session)
+        report = replace(report, duration_s=time.monotonic() - started)
+        self._warn(report)
+        deliver(report, self.outputs, self.readers)
+        seen = told(report, self.readers)
+        if self.writer is not None and seen is not report:
+            complain("the evidence is not kept: it holds what the rubric withholds from students")
+        elif self.writer is not None:
+            self.writer.write(report)
+        if self.page is not None:
+            from grader.cli.interactive import open_page
+
+            open_page(self.page)
+            self.page = None
+        return exit_code(seen, self.min_score)
+
+    def each_save(self, started: float) -> int:
+        """Grade now and after each save, in one session; return the exit code of the last time at Ctrl-C."""
+        from grader.app import start
+        from grader.cli.interactive import saves
+
+        saved, code = saves(Path(self.request.submission)), ALL_MET
+        next(saved)
+        with ExitStack() as stack:
+            with shown_progress(wanted=self.shows_progress) as progress:
+                session = stack.enter_context(start.opened(self.request, progress))
+            while True:
+                code = _guarded(partial(self.once, started, session))
+                if code == INTERRUPTED:
+                    return code
+                click.echo("watching for the next save; Ctrl-C ends this", err=True)
+                try:
+                    next(saved)
+                except KeyboardInterrupt:
+                    return code
+                started = time.monotonic()
+                if sys.stdout is not None and sys.stdout.isatty():
+                    click.clear()
+
+    def _warn(self, report: Report) -> None:
+        from grader.core.checkup import missing
+        from grader.core.releases import TRIED
+
+        for found in () if self.readers.only_students else missing(report.environment.containment):
+            complain(f"sandbox {report.environment.isolation}: {found}")
+        if report.environment.ros_distro not in TRIED:
+            complain(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
 
 
 def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> EvidenceWriter:
@@ -308,7 +386,9 @@ app.add_command(rubric.selftest_command)
 
 def main() -> None:
     """Run the command line of this process, and exit."""
-    app(prog_name="grade")
+    from grader.cli.interactive import process_start
+
+    app(prog_name="grade", obj=process_start())
 
 
 def _guarded(run: Callable[[], object]) -> int:

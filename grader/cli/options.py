@@ -211,14 +211,17 @@ def write_file(path: Path, content: bytes, *, parents: bool = False) -> None:
 
 @contextmanager
 def shown_progress(*, wanted: bool) -> Iterator[Progress]:
-    """Show the current step on a terminal, and erase it at the end."""
+    """Show the current step and how long it all has taken on a terminal, and erase it at the end."""
     if not (wanted and sys.stderr is not None and sys.stderr.isatty()):
         yield lambda _: None
         return
     from rich.console import Console
-    from rich.text import Text
+    from rich.progress import Progress as Bar
+    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     from grader.reporting.escape import shown
 
-    with Console(stderr=True).status("starting") as status:
-        yield lambda step: status.update(Text(shown(step)))
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting")
+        yield lambda step: bar.update(task, description=shown(step))

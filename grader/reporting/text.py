@@ -8,7 +8,7 @@ from fractions import Fraction
 from rich.cells import cell_len
 from rich.text import Text
 
-from grader.core.exercise import Location, Outcome
+from grader.core.exercise import Location, Outcome, exercise_name
 from grader.core.report import ExerciseReport, Report, ReportedFault, Verdict
 from grader.core.trace import ClockKind
 from grader.reporting import wording
@@ -42,18 +42,34 @@ def render_text(report: Report, *, width: int, colour: bool, verbose: bool = Fal
     _head(page, report, verbose=verbose)
     if first is not None:
         _fix_first(page, *first)
-    for exercise in report.exercises:
-        page.blank()
-        if verbose:
-            _exercise(page, exercise)
-        else:
-            _outline(page, exercise, first[1] if first is not None else None)
-    page.blank()
     if verbose:
+        for exercise in report.exercises:
+            page.blank()
+            _exercise(page, exercise)
+        page.blank()
         _foot(page, report)
     else:
+        _outlines(page, report.exercises, first[1] if first is not None else None)
+        page.blank()
         _last_line(page, report)
     return page.text()
+
+
+def _outlines(page: Page, exercises: Sequence[ExerciseReport], first: Verdict | None) -> None:
+    """Write each exercise in short; of those that nothing was handed in for, only what is missing."""
+    follows = False
+    for exercise in exercises:
+        missing = [str(v.missing_file or v.evidence.get("missing", "")) for v in exercise.verdicts]
+        absent = bool(missing) and all(missing)
+        if not (absent and follows):
+            page.blank()
+        if absent:
+            name = exercise_name(shown(exercise.number, limit=wording.NAME_LIMIT))
+            files = " or ".join(map(shown, dict.fromkeys(missing)))
+            page.put(f"{name}: no {files} yet (0 of {points(exercise.max_score)} points)", style="bold")
+        else:
+            _outline(page, exercise, first)
+        follows = absent
 
 
 def _head(page: Page, report: Report, *, verbose: bool) -> None:
@@ -108,11 +124,7 @@ def _cause(verdict: Verdict) -> str:
 
 
 def _outline(page: Page, exercise: ExerciseReport, first: Verdict | None) -> None:
-    """Write one line for each criterion, and one for all that are blocked; one alone if nothing was handed in."""
-    missing = dict.fromkeys(str(v.missing_file or v.evidence.get("missing", "")) for v in exercise.verdicts)
-    if exercise.verdicts and all(missing):
-        page.put(f"{wording.exercise_line(exercise)}: no {' and no '.join(map(shown, missing))} yet", style="bold")
-        return
+    """Write one line for each criterion, and one for all that are blocked."""
     full = exercise.score == exercise.max_score
     page.put(wording.exercise_line(exercise), style="bold green" if full else "bold")
     blocked = [verdict for verdict in exercise.verdicts if verdict.outcome is Outcome.BLOCKED]

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, TypeVar
 
 from grader.core.errors import RubricError
@@ -112,10 +112,25 @@ def _number_order(number: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (1 << 62, part) for part in re.findall(r"[0-9]+|[^0-9]+", number)]
 
 
-def require_exercises(wanted: Sequence[str], known: Sequence[str]) -> None:
-    """Raise RubricError for the first unknown exercise, with the most similar known name."""
-    for exercise in wanted:
-        if exercise not in known:
-            nearest = difflib.get_close_matches(exercise, known, n=1, cutoff=0.3)
-            hint = f"did you mean {nearest[0]}" if nearest else f"known are {', '.join(known)}"
-            raise RubricError(f"--exercise {exercise}: expected one of {', '.join(known)}, found {exercise}", hint)
+def exercise_ids(names: Sequence[str], exercises: Sequence[Exercise]) -> tuple[str, ...]:
+    """Return the ids of the exercises that names stand for, without repetitions.
+
+    A name is an id, a number as `1` or `project 2`, or the name of a file that an exercise requires. Raises RubricError
+    for the first one that is unknown, with the most similar id.
+    """
+    known = [exercise.id for exercise in exercises]
+    found: list[str] = []
+    for name in names:
+        named = [name] if name in known else [exercise.id for exercise in exercises if _is_called(exercise, name)]
+        if not named:
+            nearest = difflib.get_close_matches(name, known, n=1, cutoff=0.3)
+            expected = f"one of {', '.join(known)}; its number, or the name of a file"
+            hint = f"did you mean {nearest[0]}" if nearest else "grade --exercise 1 grades the first exercise"
+            raise RubricError(f"--exercise {name}: expected {expected}, found {name}", hint)
+        found += named
+    return tuple(dict.fromkeys(found))
+
+
+def _is_called(exercise: Exercise, name: str) -> bool:
+    plain = re.sub(r"[\s_-]+", " ", name.strip().casefold()).removeprefix("exercise ")
+    return plain == exercise.number.casefold() or PurePath(name).name in exercise.files

@@ -47,7 +47,9 @@ MAX_NAME_BYTES = 255
 _BY_SYSTEMS = frozenset({"__pycache__", "__MACOSX"})
 _SKIPPED_FOLDERS = _BY_SYSTEMS | {"venv", "node_modules"}
 # Files that file managers create in every folder; macOS puts `._x` beside every file x of an archive.
-_SKIPPED_FILES = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
+#: The page that `grade --open` writes into the current folder, which may be that of the submission.
+PAGE_NAME = "grade-report.html"
+_SKIPPED_FILES = frozenset({".DS_Store", "Thumbs.db", "desktop.ini", PAGE_NAME})
 _DRIVE = re.compile(r"[A-Za-z]:")
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])\s*(\..*)?")
 # Windows drops these at the end of a name, so that two names become one; other systems keep them.
@@ -72,7 +74,7 @@ def is_skipped_folder(name: str) -> bool:
 
 
 def is_skipped_file(name: str) -> bool:
-    """Return whether an operating system created a file of this name."""
+    """Return whether an operating system or the grader created a file of this name."""
     return name in _SKIPPED_FILES or name.startswith("._")
 
 

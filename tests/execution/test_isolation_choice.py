@@ -159,7 +159,7 @@ def test_without_bubblewrap_auto_names_the_command_that_installs_it(
     monkeypatch.setattr("grader.execution.sandbox.bubblewrap.SYSTEM_PROGRAMS", str(tmp_path))
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(selftest, "inspect", lambda *_: report("landlock", without("net_egress"), usable=False))
-    with pytest.raises(EnvironmentFault, match="expected the program bwrap, found none") as refused:
+    with pytest.raises(EnvironmentFault, match="lacks bubblewrap, which keeps your program from harming it") as refused:
         choose_isolation("auto", ros)
     assert refused.value.hint.endswith("install -y bubblewrap")
     with pytest.raises(EnvironmentFault, match="bwrap"):

@@ -180,7 +180,7 @@ def test_a_file_that_is_not_there_comes_after_one_that_is() -> None:
     absent = exercise("f", "2", "F", *missing("b.py"))
     text = render(report(absent, located()))
     assert "Fix first: /t: 10.0 Hz" in text
-    assert "Exercise 2: F (0 of 9 points): no b.py yet\n\n" in text
+    assert "Exercise 2: no b.py yet (0 of 9 points)\n\n" in text
     assert render(report(absent)).splitlines()[1] == "Fix first: b.py: not in the submission"
     renamed = exercise("f", "2", "F", *missing("b.py", likely="c.py"))
     assert render(report(renamed, located())).splitlines()[1] == "Fix first: b.py: not in the submission"

@@ -248,8 +248,17 @@ def _kernel() -> tuple[int, ...]:
     return tuple(int(number) for number in re.findall(r"\d+", platform.release())[:2])
 
 
+def is_installed() -> bool:
+    """Return whether this machine has the program bubblewrap."""
+    return _found("bwrap") is not None
+
+
+def _found(name: str) -> str | None:
+    return shutil.which(name, path=SYSTEM_PROGRAMS) or shutil.which(name)
+
+
 def _program(name: str, hint: str) -> Path:
-    found = shutil.which(name, path=SYSTEM_PROGRAMS) or shutil.which(name)
+    found = _found(name)
     if found is None:
         raise EnvironmentFault(f"sandbox: expected the program {name}, found none", hint)
     return Path(found).absolute()

@@ -9,6 +9,7 @@ from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Fact, P
 from grader.core.errors import EnvironmentFault
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox import selftest, tiers
+from grader.execution.sandbox.bubblewrap import is_installed
 from grader.execution.sandbox.memory import Memory
 from grader.execution.sandbox.properties import NOTHING, remedy_for
 from grader.execution.sandbox.protocol import Isolation
@@ -118,8 +119,9 @@ def _refusal(tried: Sequence[TierReport]) -> EnvironmentFault:
     # The remedy of a tier for another user comes last, because it requires the most.
     remedies = [report.remedy for report in (*mine, *tried) if report.remedy]
     hint = remedies[0] if remedies else "grade doctor says what each tier lacks"
-    wanted = ", ".join(REQUIRED)
-    return EnvironmentFault(f"isolation: expected a sandbox that contains {wanted}, found none ({found})", hint)
+    lacks, details = ("a sandbox that works", f" ({found})") if is_installed() else ("bubblewrap", "")
+    text = f"isolation: this computer lacks {lacks}, which keeps your program from harming it; nothing was run{details}"
+    return EnvironmentFault(text, hint)
 
 
 def _shortly(report: TierReport) -> str:
