@@ -493,6 +493,19 @@ def test_a_page_on_a_web_server_opens_its_recordings_in_foxglove(browser: Browse
     assert f"https://app.foxglove.dev/~/view?ds=remote-file&ds.url={quote(address, safe='')}" in links
 
 
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
+def test_axe_finds_nothing(visit: Open, scheme: str, width: int) -> None:
+    """As the page opens, and with everything unfolded; axe-core knows the WCAG and good practice."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install -e '.[dev]'")
+    html = render_html(graded.wrong(), recordings="evidence")
+    page, said, _ = visit(html, color_scheme=scheme, viewport={"width": width, "height": 900})
+    found = axe.Axe().run(page).response["violations"]
+    unfold(page)
+    found += axe.Axe().run(page).response["violations"]
+    assert [(one["id"], node["html"]) for one in found for node in one["nodes"]] == []
+    assert said == []
+
+
 def test_headings_landmarks_and_names_are_there(visit: Open) -> None:
     """For whoever listens to the page: one h1, no level left out, every control and picture named."""
     page, _, _ = visit(render_html(graded.wrong()))

@@ -5,7 +5,7 @@ const Charts = (() => {
   const DATA = ["main", "second", "third", "fourth", "fifth", "sixth"];
   const SYMBOLS = { bad: "diamond", warning: "triangle", second: "rect", third: "triangle", fifth: "rect", sixth: "triangle" };
   const [SIDE, PANEL, LONE_PANEL, LANE, HEADER, AXIS, SLIDER, LABEL, GLYPH] = [52, 150, 190, 50, 34, 40, 26, 15, 6.4];
-  const BANDS = { good: 0.3, warning: 0.14 };
+  const BANDS = { good: 0.38, warning: 0.18 };
   const FONT = { color: "var(--soft)", fontSize: 12, fontFamily: "inherit" };
   const TOOLTIP = {
     confine: true,
