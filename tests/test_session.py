@@ -1,12 +1,17 @@
 """The stages of grading that need no ROS: which exercises, which recording, which seed."""
 
+import os
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from grader.app.grade import read_exercises, read_recording
 from grader.app.request import GradeRequest
+from grader.app.start import grade, may_run
 from grader.core.errors import RecordingError, RubricError
+from grader.core.exercise import Outcome
+from grader.execution.ros_installation import find_ros
 from grader.rubrics.builtin import builtin_rubrics, exercise_ids
 
 
@@ -44,6 +49,35 @@ def test_an_exercise_may_be_named_as_its_task_sheet_or_its_file(name: str, id_: 
     exercises = read_exercises(GradeRequest("x", exercises=(name, id_)))
     assert [e.id for e in exercises] == [id_]
     assert exercise_ids((name, id_), exercises) == (id_,)
+
+
+def test_what_holds_no_file_to_run_is_graded_without_a_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The names show it before anything is started."""
+
+    def refuse(*_: object, **__: object) -> None:
+        pytest.fail("a process was started")
+
+    find_ros()  # once for each process, perhaps by asking another one
+    monkeypatch.setattr(subprocess.Popen, "__init__", refuse)
+    monkeypatch.setattr(os, "posix_spawn", refuse)
+    (tmp_path / "velocity_pub.py").write_text("import rclpy")
+    for place in (tmp_path, tmp_path / "velocity_pub.py"):
+        report = grade(GradeRequest(str(place), isolation="none"), lambda _: None)
+        assert {v.outcome for e in report.exercises for v in e.verdicts} == {Outcome.NOT_MET, Outcome.BLOCKED}
+
+
+@pytest.mark.parametrize("id_", builtin_rubrics())
+def test_a_worker_is_started_for_every_file_of_an_exercise(id_: str, tmp_path: Path) -> None:
+    """As a file, in a folder, and whatever an archive or a rubric of one's own asks for."""
+    for name in read_exercises(GradeRequest("x", exercises=(id_,)))[0].files:
+        (tmp_path / "in").mkdir(exist_ok=True)
+        (tmp_path / "in" / name).touch()
+        assert may_run(GradeRequest(str(tmp_path / "in" / name)))
+        assert may_run(GradeRequest(str(tmp_path)))
+        (tmp_path / "in" / name).unlink()
+    assert not may_run(GradeRequest(str(tmp_path)))
+    assert may_run(GradeRequest(str(tmp_path / "in.zip")))
+    assert may_run(GradeRequest(str(tmp_path), rubrics=(Path("own.yaml"),)))
 
 
 def test_the_recording_is_read_only_where_it_is_played(tmp_path: Path) -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import re
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from grader.core.shipped import shipped
 from grader.execution.recording_session import RecordingSession, open_session
 
 if TYPE_CHECKING:
@@ -15,6 +19,12 @@ if TYPE_CHECKING:
     from grader.core.exercise import Exercise
     from grader.core.report import Report
     from grader.core.submission import Run
+
+
+#: The files that a shipped rubric requires, in its text.
+_FILES = re.compile(r"^files: \[(.+)\]$", re.MULTILINE)
+#: In a larger submission, no names are compared.
+_MOST_FOLDERS = 200
 
 
 def grade(  # noqa: PLR0913  what to grade, and who is told
@@ -28,7 +38,8 @@ def grade(  # noqa: PLR0913  what to grade, and who is told
 ) -> Report:
     """Grade one submission, in a session of its own unless one is given; see `grade_in`."""
     started = time.perf_counter()
-    with opened(request, progress) if session is None else nullcontext(session) as used:
+    own = open_session(request.isolation, request.workers, progress, warm=may_run(request))
+    with own if session is None else nullcontext(session) as used:
         from grader.app.grade import grade_in  # noqa: PLC0415 - takes as long as the worker takes to start
 
         return grade_in(used, request, progress, on_recorded, on_partial_report, pictures=pictures, started=started)
@@ -37,3 +48,21 @@ def grade(  # noqa: PLR0913  what to grade, and who is told
 def opened(request: GradeRequest, progress: Progress) -> AbstractContextManager[RecordingSession]:
     """Return a session for a request, which may be graded in it many times."""
     return open_session(request.isolation, request.workers, progress)
+
+
+def may_run(request: GradeRequest) -> bool:
+    """Return whether a submission may hold a file to run, judged by names alone; True in doubt.
+
+    If not, no worker is started in advance. Reading the rubrics instead would take as long as the start of a worker.
+    """
+    place = Path(request.submission)
+    if request.rubrics or request.collected is not None or not (place.is_dir() or place.suffix == ".py"):
+        return True
+    texts = (path.read_text(encoding="utf-8") for path in shipped("rubrics").glob("*.yaml"))
+    wanted = {name.strip() for text in texts for found in _FILES.findall(text) for name in found.split(",")}
+    if not place.is_dir():
+        return place.name in wanted
+    for number, (_, _, names) in enumerate(os.walk(place)):
+        if number >= _MOST_FOLDERS or not wanted.isdisjoint(names):
+            return True
+    return False

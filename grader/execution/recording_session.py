@@ -97,7 +97,7 @@ def _unfit(trace: Trace, clock: str) -> bool:
 
 @contextmanager
 def open_session(
-    isolation: str, workers: int | None = None, progress: Callable[[str], None] = lambda _: None
+    isolation: str, workers: int | None = None, progress: Callable[[str], None] = lambda _: None, *, warm: bool = True
 ) -> Iterator[RecordingSession]:
     """Open a recording session, and close it at the end of the block.
 
@@ -105,6 +105,7 @@ def open_session(
         isolation: `auto`, `none` or the name of a tier.
         workers: How many scenarios to record in parallel; None to choose by the number of processors.
         progress: Called with a message when a sandbox has to be tested.
+        warm: Whether to start a worker at once, not when something is recorded.
 
     Raises:
         EnvironmentFault: This machine lacks ROS or the requested tier.
@@ -119,7 +120,8 @@ def open_session(
     with scratch_folder() as folder:
         folder.chmod(0o755)  # students' processes may run as another user and have to read the staged copy
         with Recorder(tier, ros.runtime, domains, scratch=folder, workers=workers) as recorder:
-            recorder.warm_up(1)
+            if warm:
+                recorder.warm_up(1)
             yield RecordingSession(ros, tier, choice.containment, recorder, folder)
 
 
