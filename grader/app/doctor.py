@@ -18,7 +18,7 @@ from grader.execution.machine import software, system
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.choose import inspect_tiers, sandbox_memory
 from grader.execution.sandbox.tiers import is_for_others
-from grader.submissions.foreign_archives import INSTALL, is_installed
+from grader.submissions.foreign_archives import install_command, is_installed
 
 #: Messages that the trial node sends, one every 0.1 s starting at 0.1 s, and how long it is observed.
 TRIAL_MESSAGES = 10
@@ -65,7 +65,7 @@ def _archives() -> Fact:
     """Report which archives students may hand in."""
     if is_installed():
         return Fact("archives", "zip and tar, .rar and .7z by libarchive")
-    return Fact("archives", "zip and tar; .rar and .7z need libarchive", remedy=INSTALL)
+    return Fact("archives", "zip and tar; .rar and .7z need libarchive", remedy=install_command())
 
 
 def _remedy(tiers: Sequence[TierReport]) -> str:

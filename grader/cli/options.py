@@ -90,24 +90,10 @@ def drawn_with(seed: int | None, path: Path | None) -> SeedKey | None:
 def require(what: str, library: str, extra: str) -> None:
     """Raise EnvironmentFault, with the command to install it, if the library of an optional extra is missing."""
     if importlib.util.find_spec(library) is None:
+        from grader.core.extras import install_command
+
         message = f"{what}: expected the package {library} of the extra {extra!r}, found none"
-        raise EnvironmentFault(message, _installing(library))
-
-
-def _installing(library: str) -> str:
-    """Return the command that adds a library here, whether the grader came from a clone, a wheel, uv or pipx."""
-    import shlex
-    from importlib import metadata
-
-    try:
-        requirements = metadata.requires("rclpy-grader") or []
-    except metadata.PackageNotFoundError:
-        requirements = []
-    wanted = next((line.partition(";")[0].strip() for line in requirements if line.startswith(library)), library)
-    # Environments that uv makes have no pip.
-    pip = [sys.executable, "-m", "pip", "install"]
-    uv = ["uv", "pip", "install", "--python", sys.executable]
-    return shlex.join([*(pip if importlib.util.find_spec("pip") else uv), wanted])
+        raise EnvironmentFault(message, install_command(library))
 
 
 def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) -> str:

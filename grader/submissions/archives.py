@@ -31,7 +31,7 @@ from grader.submissions.collected import (
     name_problem,
     shown,
 )
-from grader.submissions.foreign_archives import INSTALL, KINDS, foreign_members, is_installed
+from grader.submissions.foreign_archives import KINDS, foreign_members, is_installed
 from grader.submissions.members import FEWER, FILE, FOLDER, LINK, REPACK, Member, UnusableArchiveError
 
 HAND_IN_ZIP = "pack the folder with your .py files as a zip"
@@ -317,7 +317,11 @@ def _members(data: bytes) -> list[Member]:
     if kind in KINDS and is_installed():
         return foreign_members(data, kind, most=MAX_ENTRIES, file=MAX_FILE_BYTES, total=total, limit=limit)
     if kind not in _READABLE:
-        hint = f"{HAND_IN_ZIP}; who grades can read {kind} after {INSTALL}" if kind in KINDS else HAND_IN_ZIP
+        hint = (
+            f"{HAND_IN_ZIP}; who grades can read {kind} with the extra rclpy-grader[archives] and libarchive"
+            if kind in KINDS
+            else HAND_IN_ZIP
+        )
         raise UnusableArchiveError(f"expected a zip or tar archive, found {kind}, which cannot be read", hint)
     if kind == "zip":
         return zip_members(data, most=MAX_ENTRIES)

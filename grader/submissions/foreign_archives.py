@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
+from grader.core import extras
 from grader.core.errors import HarnessError
 from grader.submissions.members import FEWER, FILE, FOLDER, LINK, Member, UnusableArchiveError
 
@@ -22,7 +23,6 @@ from grader.submissions.members import FEWER, FILE, FOLDER, LINK, Member, Unusab
 _FORMATS = {"7z": ("7zip", b""), "rar": ("rar5", b"Rar!\x1a\x07\x01"), "old rar": ("rar", b"Rar!\x1a\x07\x00")}
 #: The kinds, as `archive_kind` names them.
 KINDS = ("7z", "rar")
-INSTALL = "pip install 'rclpy-grader[archives]' and sudo apt-get install -y libarchive13"
 
 #: Limits of the process that unpacks: memory in bytes, processor time and real time in seconds.
 MEMORY_BYTES = 768 << 20
@@ -31,6 +31,11 @@ _KINDS = {"file": FILE, "folder": FOLDER, "link": LINK, "other": "a device, pipe
 # The exit codes of grader.submissions.unpacker, which is not imported, because only its process needs the sandbox.
 _ENCRYPTED, _TOO_MANY, _TOO_MUCH, _NO_LIBRARY = 11, 12, 13, 14
 _HEAD_BYTES = 1 << 20
+
+
+def install_command() -> str:
+    """Return the commands that install libarchive here."""
+    return f"{extras.install_command('libarchive-c')} && sudo apt-get install -y libarchive13"
 
 
 def is_installed() -> bool:
@@ -163,7 +168,7 @@ def _check(code: int, kind: str, most: int, limit: str) -> None:
     if code == _TOO_MUCH:
         raise UnusableArchiveError(f"expected at most {limit}, found more", FEWER)
     if code == _NO_LIBRARY:
-        raise HarnessError(f"a {kind} archive cannot be unpacked: libarchive cannot be loaded", INSTALL)
+        raise HarnessError(f"a {kind} archive cannot be unpacked: libarchive cannot be loaded", install_command())
     if code:  # damaged, or killed at a limit of memory or time
         raise _unreadable(kind)
 
