@@ -17,7 +17,6 @@ from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S
 from grader.core.scenario import OdometryStream, longest_course_ns, shortest
 from grader.judging.checks import CHECKS
-from grader.rubrics import builtin
 from grader.rubrics.builtin import builtin_headers, builtin_rubrics
 from grader.rubrics.loader import NOTES, read_rubric
 from grader.rubrics.schema import rubric_schema, schema_text
@@ -193,7 +192,7 @@ def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path: Path, monk
     for number, name in (("10", "a"), ("2", "c"), ("P1", "b")):
         changed = text.replace('number: "1"', f'number: "{number}"').replace("id: velocity_publisher", f"id: {name}")
         (rubrics / f"{name}.yaml").write_text(changed, encoding="utf-8")
-    monkeypatch.setattr(builtin, "PACKAGE", tmp_path / "grader")
+    monkeypatch.setattr("grader.core.shipped.PACKAGE", tmp_path / "grader")
     assert builtin_rubrics() == {"c": rubrics / "c.yaml", "a": rubrics / "a.yaml", "b": rubrics / "b.yaml"}
     assert list(builtin_rubrics()) == ["c", "a", "b"]
 
