@@ -9,6 +9,7 @@ from typing import Any
 
 import generated
 from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.exceptions import PluginError
 from mkdocs.plugins import get_plugin_logger
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
@@ -17,6 +18,16 @@ ROOT = Path(__file__).resolve().parent.parent
 _LINK = re.compile(r"(\]\()(\.\./[^)\s]*)(\))")
 _GENERATED = re.compile(r"<!-- generated: (\w+) -->")
 _log = get_plugin_logger("rclpy-grader")
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Take the address of the repository from pyproject.toml; with `repo_url`, pages would ask GitHub for its stars."""
+    found = re.search(r'^repository = "(.+)"$', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.MULTILINE)
+    if found is None:
+        raise PluginError("pyproject.toml: expected the address of the repository, found none")
+    config.extra["repository"] = found[1]
+    config.extra["social"] = [{"icon": "fontawesome/brands/git-alt", "link": found[1], "name": "Source"}]
+    return config
 
 
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
@@ -40,6 +51,7 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, **_: An
         if not target.exists():
             _log.warning("%s: expected a file of the repository, found none at %s", page.file.src_uri, path)
         kind = "tree" if target.is_dir() else "blob"
-        return f"{found[1]}{config.repo_url}/{kind}/main/{target.relative_to(ROOT).as_posix()}{hash_}{place}{found[3]}"
+        inside = target.relative_to(ROOT).as_posix()
+        return f"{found[1]}{config.extra['repository']}/{kind}/main/{inside}{hash_}{place}{found[3]}"
 
     return _LINK.sub(outside, markdown)
