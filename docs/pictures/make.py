@@ -28,8 +28,8 @@ CLASS = {
     "finn": "broken/syntax_error",
 }
 COMMAND = "grade maria -o html=report.html"
-#: Types the command as a person does, runs it, and leaves its output to be read. The recorder shortens a still picture, so
-#: nothing is shown while the nodes run.
+#: Types the command as a person does, runs it, and leaves its output to be read. Without a display of progress, the
+#: recorder shortens the time in which the nodes run.
 SCRIPT = f"""printf '$ '
 typed='{COMMAND}'
 for ((i = 0; i < ${{#typed}}; i++)); do printf '%s' "${{typed:i:1}}"; sleep 0.05; done
