@@ -160,8 +160,13 @@ def fault_sentence(fault: Fault) -> str:
     """Return a fault as `file:line: text`, or as `file exited after 5.0 s with code 0`."""
     if fault.kind is FaultKind.EXITED:
         return f"{fault.process} {_own_words(fault)}"
-    place = f"{fault.file}:{fault.line}" if fault.file and fault.line > 0 else fault.process
+    place = fault_place(fault)
     return f"{place}: {_own_words(fault)}"
+
+
+def fault_place(fault: Fault) -> str:
+    """Return where a fault arose, as `file:line`, or the process alone."""
+    return f"{fault.file}:{fault.line}" if fault.file and fault.line > 0 else fault.process
 
 
 def _own_words(fault: Fault) -> str:

@@ -16,7 +16,7 @@ from grader.core.submission import EXPORT_NOTEBOOK, Run, Submission, is_notebook
 from grader.core.trace import ClockKind, Fault, GraphSnapshot, Message, Offer, StartWay, Trace
 from grader.judging.charts import excerpts_for, illustrated
 from grader.judging.diagnosis import diagnose, placed
-from grader.judging.findings import FAULT_KEY
+from grader.judging.findings import FAULT_KEY, fault_evidence
 from grader.judging.run_check import Answer, check_name, run_check
 from grader.judging.values import leaves, on_student_topic
 from grader.judging.wording import listed, quote
@@ -161,7 +161,8 @@ class VerdictBuilder:
         if needed is not None and (known or self._outcome(needed) is not Outcome.UNDECIDED):
             return self._blocked(criterion, needed, self._outcome(needed))
         if answer.finding is None:
-            evidence = {"error": answer.error} if answer.error else {}
+            evidence: dict[str, object] = {"error": answer.error} if answer.error else {}
+            evidence |= {FAULT_KEY: fault_evidence(answer.fault)} if answer.fault is not None else {}
             problem, hint = answer.problem, answer.hint
             return _without_points(criterion, Outcome.UNDECIDED, problem, hint=hint, evidence=evidence)
         return self._found(criterion, answer.finding)

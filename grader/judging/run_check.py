@@ -13,7 +13,7 @@ from grader.core.scenario import Scenario
 from grader.core.submission import Submission
 from grader.core.trace import Fault, FaultKind, Request, Response, Trace
 from grader.judging.checks import CHECKS
-from grader.judging.findings import AT_ONCE_NS, fault_sentence, faulted, first_fault
+from grader.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
 from grader.judging.installation import lacking_package
 from grader.judging.values import student_endpoints
 from grader.judging.wording import quote, span
@@ -34,6 +34,7 @@ class Answer:
         problem: Why there is no finding: a failure of the grader or the machine.
         error: Class and text of an exception in a check, for its author; set together with `problem`.
         hint: One thing to do about the problem; empty if nothing is very likely right.
+        fault: The fault that shows the problem; None if none does.
     """
 
     finding: Finding | None = None
@@ -41,6 +42,7 @@ class Answer:
     problem: str = ""
     error: str = ""
     hint: str = ""
+    fault: Fault | None = None
 
 
 def check_name(criterion: Criterion) -> str:
@@ -88,9 +90,9 @@ def _for_lack_of_package(answer: Answer, scenario: Scenario, trace: Trace, sourc
     lack = lacking_package(trace, scenario.processes, sources) if lost else None
     if lack is None:
         return answer
-    text = f"{fault_sentence(lack.fault)}: ROS 2 brings this package, but the installation that graded lacks it"
+    text = f"{fault_place(lack.fault)}: {lack.name} is a package of ROS 2 that is not installed where this was graded"
     hint = f"grade again where {lack.name} is installed, or leave the import out if the program does not need it"
-    return Answer(problem=text, hint=hint)
+    return Answer(problem=f"{text}, which is no fault of the program", hint=hint, fault=lack.fault)
 
 
 def _without_waiting(trace: Trace) -> Iterator[Trace]:

@@ -131,9 +131,16 @@ def _outline(page: Page, exercise: ExerciseReport, first: Verdict | None) -> Non
     left = f"0/{points(sum((verdict.max_score for verdict in blocked), Fraction(0)))}"
     shares = [_share(verdict) for verdict in exercise.verdicts if verdict not in blocked]
     column = max(map(len, [*shares, *([left] if blocked else [])]), default=0)
+    undecided: set[str] = set()
     for verdict in exercise.verdicts:
-        if verdict not in blocked:
-            page.put(_in_a_line(verdict, first), prefix=_prefix(verdict.outcome, _share(verdict).rjust(column)))
+        if verdict in blocked:
+            continue
+        again = verdict.reason in undecided
+        line = f"{shown(verdict.title)}: for the same reason" if again else _in_a_line(verdict, first)
+        page.put(line, prefix=_prefix(verdict.outcome, _share(verdict).rjust(column)))
+        if verdict.outcome is Outcome.UNDECIDED and verdict.hint and not again:
+            undecided.add(verdict.reason)
+            page.put(shown(verdict.hint), prefix=Text.assemble(_DETAIL, ("hint: ", "cyan")), style="cyan")
     if blocked:
         what = "what it needs is" if len(blocked) == 1 else "what they need is"
         page.put(

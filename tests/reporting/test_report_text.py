@@ -10,6 +10,7 @@ import re
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -155,6 +156,15 @@ def located(**changes: object) -> ExerciseReport:
     follows = criterion("turn", "Turn", 5, Outcome.NOT_MET, hint="this has the same cause", same_cause_as="rate")
     rest = criterion("log", "Log", 4, Outcome.PARTLY, reason="printed", hint="log", location=Location("a.py", 9))
     return exercise("e", "1", "E", rate, follows, rest, excerpts=(Excerpt("a.py", 8, 7, ("import x", "  RATE = 10")),))
+
+
+def test_what_to_do_about_something_undecided_is_said_once() -> None:
+    """However many criteria wait for it."""
+    known: dict[str, Any] = {"outcome": Outcome.UNDECIDED, "reason": "tf2_ros is not installed", "hint": "install it"}
+    waiting = [criterion(str(n), f"Criterion {n}", 5, **known) for n in range(3)]
+    text = render(report(exercise("one", "1", "Odometry", *waiting)))
+    assert text.count("tf2_ros is not installed") == text.count("hint: install it") == 1
+    assert text.count("for the same reason") == 2
 
 
 def test_the_first_thing_to_fix_stands_on_top() -> None:
