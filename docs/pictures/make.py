@@ -65,8 +65,9 @@ def main() -> None:
 
 def shoot(browser: Browser, page: Path, name: str, height: int, at: str = "") -> None:
     """Write a picture of the first window of a page, or of the one that begins at the first element of a kind."""
-    scheme = "dark" if "dark" in name else "light"
-    context = browser.new_context(viewport={"width": 1000, "height": height}, color_scheme=scheme)
+    context = browser.new_context(
+        viewport={"width": 1000, "height": height}, color_scheme="dark" if "dark" in name else "light"
+    )
     tab = context.new_page()
     tab.goto(page.as_uri())
     tab.wait_for_timeout(1500)
