@@ -1,10 +1,10 @@
-"""Reads an instructor's adjustments from a YAML file: late days, changed scores, ignored submissions."""
+"""Reads an instructor's adjustments from a YAML file: late days, changed scores, comments, ignored submissions."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated
@@ -14,9 +14,11 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, Validation
 from grader.core.errors import ClassError
 from grader.rubrics.mistakes import mistakes_of, nearest
 from grader.rubrics.yaml_tree import Mistake, YamlSyntaxError, YamlTree, read_yaml
+from grader.submissions.collected import listed, shown
 
 MAX_BYTES = 1 << 20
 _AMOUNT = re.compile(r"(\d{1,6}(?:\.\d{1,6})?)\s*(%|points?)")
+_Comment = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=1_000)]
 _Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=500)]
 
 
@@ -33,6 +35,16 @@ class Amount:
 
 
 @dataclass(frozen=True, slots=True)
+class CriterionDecision:
+    """The instructor's decision about one criterion of one submission."""
+
+    score: Fraction | None = None  # replaces the grader's points; None to keep them
+    reason: str = ""  # why the points were changed; empty if they were not
+    comment: str = ""  # for the student; may be empty
+    where: str = ""  # position in the file, for messages
+
+
+@dataclass(frozen=True, slots=True)
 class Decision:
     """The instructor's decision about one submission."""
 
@@ -41,6 +53,9 @@ class Decision:
     reason: str = ""
     ignore: str = ""  # why the submission does not count at all; empty if it counts
     where: str = ""  # position in the file, for messages
+    comment: str = ""  # on the whole submission, for the student; may be empty
+    # Id of a criterion, or `exercise/criterion` -> the decision about it
+    criteria: Mapping[str, CriterionDecision] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,21 +79,36 @@ class Adjusted:
     override: Fraction | None = None  # the score set by the instructor; None if not set
     reason: str = ""  # the reason for the change, or for ignoring the submission
     ignored: bool = False  # whether the submission does not count
+    comment: str = ""  # on the whole submission, for the student
+    # `exercise/criterion` -> the decision about it, for criteria of the report
+    criteria: Mapping[str, CriterionDecision] = field(default_factory=dict)
+    marked: Fraction | None = None  # points after decisions about criteria, before late days; None if there are none
 
     @property
     def changed(self) -> bool:
         """Whether a decision changes the score."""
-        return self.ignored or self.override is not None or self.penalty > 0
+        return self.ignored or self.override is not None or self.penalty > 0 or self.marked != self.raw
 
 
-def adjust(raw: Fraction | None, decision: Decision, rules: Adjustments) -> Adjusted:
-    """Apply a decision to a score. A started day counts in full, and the penalty never exceeds the points earned."""
+def adjust(
+    raw: Fraction | None,
+    decision: Decision,
+    rules: Adjustments,
+    *,
+    marked: Fraction | None = None,
+    criteria: Mapping[str, CriterionDecision] | None = None,
+) -> Adjusted:
+    """Apply a decision to a score. A started day counts in full, and the penalty never exceeds the points earned.
+
+    With decisions about criteria, `marked` are the points that follow from them, which replace the raw ones.
+    """
     penalty = Fraction(0)
-    if raw is not None and rules.per_day is not None:
+    earned = marked if criteria else raw
+    if earned is not None and rules.per_day is not None:
         days = -(-decision.days_late.numerator // decision.days_late.denominator)
-        most = raw if rules.at_most is None else min(raw, rules.at_most.of(raw))
-        penalty = min(most, days * rules.per_day.of(raw))
-    score = decision.score if decision.score is not None else (None if raw is None else raw - penalty)
+        most = earned if rules.at_most is None else min(earned, rules.at_most.of(earned))
+        penalty = min(most, days * rules.per_day.of(earned))
+    score = decision.score if decision.score is not None else (None if earned is None else earned - penalty)
     return Adjusted(
         raw=raw,
         score=None if decision.ignore else score,
@@ -87,6 +117,9 @@ def adjust(raw: Fraction | None, decision: Decision, rules: Adjustments) -> Adju
         override=decision.score,
         reason=decision.ignore or decision.reason,
         ignored=bool(decision.ignore),
+        comment=decision.comment,
+        criteria=criteria or {},
+        marked=earned,
     )
 
 
@@ -99,11 +132,19 @@ class _Late(_Strict):
     at_most: str | None = None
 
 
+class _Criterion(_Strict):
+    score: Annotated[float, Field(ge=0, le=1_000_000, allow_inf_nan=False, strict=False)] | None = None
+    reason: _Reason | None = None
+    comment: _Comment | None = None
+
+
 class _Student(_Strict):
     days_late: Annotated[float, Field(ge=0, le=3650, allow_inf_nan=False, strict=False)] = 0.0
     score: Annotated[float, Field(ge=0, le=1_000_000, allow_inf_nan=False, strict=False)] | None = None
     reason: _Reason | None = None
     ignore: _Reason | None = None
+    comment: _Comment | None = None
+    criteria: dict[str, _Criterion] = {}
 
 
 class _File(_Strict):
@@ -148,10 +189,16 @@ def _refusal(path: Path, mistakes: list[Mistake]) -> ClassError:
 
 def _without_reason(read: _File, tree: YamlTree) -> list[Mistake]:
     """Return a mistake for each score that was set without a reason."""
-    return [
+    whole = [
         tree.keys["students", name].mistake("expected a `reason` for the `score`, found none")
         for name, student in read.students.items()
         if student.score is not None and not student.reason
+    ]
+    return whole + [
+        tree.keys["students", name, "criteria", id_].mistake("expected a `reason` for the `score`, found none")
+        for name, student in read.students.items()
+        for id_, criterion in student.criteria.items()
+        if criterion.score is not None and not criterion.reason
     ]
 
 
@@ -168,12 +215,52 @@ def _amount(key: str, read: _File, tree: YamlTree, mistakes: list[Mistake]) -> A
 
 def _decision(name: str, student: _Student, path: Path, tree: YamlTree) -> Decision:
     place = tree.keys["students", name]
+    criteria = {}
+    for id_, found in student.criteria.items():
+        key = tree.keys["students", name, "criteria", id_]
+        score = None if found.score is None else Fraction(str(found.score))
+        where = f"{path}:{key.line}:{key.column}"
+        criteria[id_] = CriterionDecision(score, found.reason or "", found.comment or "", where)
     return Decision(
         days_late=Fraction(str(student.days_late)),
         score=None if student.score is None else Fraction(str(student.score)),
         reason=student.reason or "",
         ignore=student.ignore or "",
         where=f"{path}:{place.line}:{place.column}",
+        comment=student.comment or "",
+        criteria=criteria,
+    )
+
+
+def with_criteria(adjustments: Adjustments, points: Mapping[str, Fraction]) -> Adjustments:
+    """Name criteria in full; raises ClassError for an unknown one, an unclear one, or too many points.
+
+    The points to be had are given by `exercise/criterion`.
+    """
+    students = {}
+    for name, decision in adjustments.students.items():
+        criteria: dict[str, CriterionDecision] = {}
+        for id_, found in decision.criteria.items():
+            full = _full_id(id_, found, points)
+            if full in criteria:
+                raise ClassError(f"{found.where}: expected each criterion once, found `{full}` twice")
+            if found.score is not None and found.score > points[full]:
+                most = f"{float(points[full]):g}"
+                raise ClassError(f"{found.where}: expected at most {most} points, found {float(found.score):g}")
+            criteria[full] = found
+        students[name] = replace(decision, criteria=criteria)
+    return replace(adjustments, students=students)
+
+
+def _full_id(id_: str, found: CriterionDecision, points: Mapping[str, Fraction]) -> str:
+    meant = [full for full in points if id_ in (full, full.split("/")[1])]
+    if len(meant) == 1:
+        return meant[0]
+    if meant:
+        raise ClassError(f"{found.where}: expected one criterion, found {len(meant)}: {listed(meant, 'and')}")
+    known = [*points, *(full.split("/")[1] for full in points)]
+    raise ClassError(
+        f"{found.where}: expected a criterion of the rubrics, found `{shown(id_, 60)}`", nearest(id_, known)
     )
 
 

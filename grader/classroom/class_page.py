@@ -160,7 +160,7 @@ def _student(row: Row, run: RunOfClass) -> StudentRow:
         folder=row.name,
         name=_name(row),
         also=tuple(dict.fromkeys(text for text in _also(row) if text and text != _name(row))),
-        status=row.status.value,
+        status=row.standing,
         tone=_TONES[row.status],
         raw=None if row.report is None else exactly(row.report["score"]),
         max_score=row.max_score,
@@ -215,7 +215,7 @@ def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator
         "Not graded",
         "There is no report. What was refused is for the student to fix; --rerun failed tries again what failed here.",
         tuple(
-            PageEntry(f"{row.status.value}{_problem(row, run)}", k)
+            PageEntry(f"{row.standing}{_problem(row, run)}", k)
             for k, row in enumerate(rows)
             if row.status in _NOT_GRADED
         ),

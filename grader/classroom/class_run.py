@@ -18,9 +18,9 @@ import grader
 from grader.app.grade import read_exercises, read_recording
 from grader.app.request import GradeRequest, recording_digest
 from grader.app.seeds import kept_key
-from grader.classroom.adjustments import Adjustments, read_adjustments
-from grader.classroom.class_page import RunOfClass, folders_of, links_between, title_of
-from grader.classroom.gradebook import Gradebook, Row, decisions_for, make_gradebook
+from grader.classroom.adjustments import Adjustments, read_adjustments, with_criteria
+from grader.classroom.class_page import RunOfClass, folders_of, links_between, title_of, without_folders
+from grader.classroom.gradebook import Gradebook, Row, Status, decisions_for, make_gradebook
 from grader.classroom.grading import (
     ClassRequest,
     ClassRun,
@@ -33,15 +33,17 @@ from grader.classroom.grading import (
 from grader.classroom.intake import HandedInEntry, Intake, take_in
 from grader.classroom.local import LocalScheduler, MakeScheduler
 from grader.classroom.outputs import CHANGES, CLASS, Graded, class_files, exports, summary_json
+from grader.classroom.platforms import final_mark
 from grader.classroom.roster import RosterMatch, match, read_roster
 from grader.classroom.store import BEFORE, REPORT, SEED_KEY, Conditions, Store, open_store
 from grader.classroom.watching import Watcher
-from grader.classroom.worker import GRADESCOPE, HANDED_BACK, PAGE
+from grader.classroom.worker import GRADESCOPE, HANDED_BACK, HANDED_BACK_PAGE, PAGE
 from grader.core.errors import GraderError, HarnessError, SubmissionError
 from grader.core.exercise import Exercise
 from grader.execution.temp_dirs import scratch_folder
 from grader.reporting.class_page.contents import PageLink
 from grader.reporting.html.class_links import with_class_links
+from grader.reporting.html.final_mark import render_refusal, with_final_mark
 from grader.reporting.json_report import ReportData
 from grader.reporting.rejudged import ReportChange, change, render_changes_table
 from grader.rubrics.variants import First
@@ -50,6 +52,8 @@ from grader.similarity.library import ComparedProgram, Handed, Similar
 from grader.similarity.pages import MOST_PAGES, OVERVIEW, page_name, render_overview, render_pair, render_table
 
 SIMILARITY_FOLDER, SIMILARITY_TABLE = "similarity", "similarity.csv"
+#: Adjustments in the results folder, which count where no others are named.
+ADJUSTMENTS = "adjust.yaml"
 _SIMILARITY_TITLE = "Similar submissions"
 
 
@@ -68,7 +72,7 @@ def grade_class(
     refuse_without_key(course, exercises)
     conditions = conditions_of(course.grading, exercises)
     roster = None if course.roster is None else read_roster(course.roster)
-    adjustments = Adjustments() if course.adjustments is None else read_adjustments(course.adjustments)
+    adjustments = _adjustments(course, exercises)
     with open_store(course.results) as store:
         intake = take_in(course.sources, course.results, layout=course.layout, pattern=course.pattern)
         matching = match(intake.entries, roster)
@@ -96,8 +100,19 @@ def grade_class(
                 stopped = book()
                 _write(class_files(stopped, {}, _run(course, conditions, began), standalone=course.standalone), store)
                 _link_students(stopped, store)
+                _hand_back(stopped, _run(course, conditions, began), store)
             raise
         return _written(graded, _run(course, conditions, began, graded), store, course)
+
+
+def _adjustments(course: ClassRequest, exercises: Sequence[Exercise]) -> Adjustments:
+    """Read the adjustments that were named, or else those kept in the results folder, if any."""
+    kept = course.results / ADJUSTMENTS
+    path = course.adjustments or (kept if kept.is_file() else None)
+    if path is None:
+        return Adjustments()
+    points = {f"{e.id}/{criterion.id}": criterion.points for e in exercises for criterion in e.criteria}
+    return with_criteria(read_adjustments(path), points)
 
 
 def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Conditions:
@@ -182,6 +197,7 @@ def _written(graded: Graded, run: RunOfClass, store: Store, course: ClassRequest
         files = {CHANGES: render_changes_table(graded.changes).encode(), **files}
     written = _write({CLASS: summary_json(graded).encode(), **files}, store)
     _link_students(graded.book, store)
+    _hand_back(graded.book, run, store)
     store.forget_before()
     return replace(graded, files=(*graded.files, *written))
 
@@ -208,6 +224,20 @@ def _link_students(book: Gradebook, store: Store) -> None:
         linked = with_class_links(page, links)
         if linked != page:
             store.write(f"students/{name}/{PAGE}", linked.encode())
+
+
+def _hand_back(book: Gradebook, run: RunOfClass, store: Store) -> None:
+    """Put name, final mark and decisions into everybody's page; who was refused gets a page that says why."""
+    for row in book.rows:
+        mark = final_mark(row)
+        if row.status is Status.REFUSED:
+            problem, hint = (without_folders(text, run.folders) for text in (row.refusal, row.hint))
+            store.write(f"students/{row.name}/{HANDED_BACK_PAGE}", render_refusal(mark, problem, hint).encode())
+        for name in (PAGE, HANDED_BACK_PAGE) if row.report is not None else ():
+            page = _text(store.place(row.name) / name)
+            marked = with_final_mark(page, mark)
+            if marked != page:
+                store.write(f"students/{row.name}/{name}", marked.encode())
 
 
 def _report(path: Path) -> ReportData | None:

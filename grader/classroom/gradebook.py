@@ -10,7 +10,14 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from fractions import Fraction
 
-from grader.classroom.adjustments import Adjusted, Adjustments, Decision, adjust, unknown_student
+from grader.classroom.adjustments import (
+    Adjusted,
+    Adjustments,
+    CriterionDecision,
+    Decision,
+    adjust,
+    unknown_student,
+)
 from grader.classroom.intake import HandedInEntry, Intake
 from grader.classroom.roster import Person, RosterMatch, fold_handle
 from grader.classroom.store import Kept, ResultStatus, State
@@ -52,6 +59,22 @@ class Row:
         return self.person.name if self.person is not None else self.label
 
     @property
+    def standing(self) -> str:
+        """The status for people, which tells if an instructor set a score that the grader has not."""
+        decided = self.adjusted.score is not None and self.status is not Status.GRADED
+        return f"{self.status.value}, score set" if decided else self.status.value
+
+    @property
+    def refusal(self) -> str:
+        """Why a submission cannot be used, for its student: without the folder where the class is graded."""
+        return self.problem[max(0, self.problem.find(self.label)) :]
+
+    @property
+    def hint(self) -> str:
+        """What the student can do about a submission that cannot be used; empty if there is nothing."""
+        return self.result.hint if self.result is not None and self.status is Status.REFUSED else ""
+
+    @property
     def max_score(self) -> Fraction | None:
         """Maximum points; None without a report."""
         return None if self.result is None or self.report is None else exactly(self.result.max_score)
@@ -71,6 +94,12 @@ class Gradebook:
     def count(self, status: Status) -> int:
         """Count the rows with a status."""
         return sum(row.status is status for row in self.rows)
+
+    @property
+    def refused(self) -> tuple[Row, ...]:
+        """Rows of people whose submission cannot be used, and who have no score otherwise."""
+        without = [row for row in self.rows if row.status is Status.REFUSED and row.adjusted.score is None]
+        return tuple(row for row in without if row.person is not None and not row.adjusted.ignored)
 
     @property
     def to_export(self) -> tuple[Row, ...]:
@@ -110,7 +139,9 @@ def make_gradebook(  # noqa: PLR0913  each comes from a different source
         report = report_of(entry.name) if _has_report(found.result) else None
         rows.append(_row(entry, matching, found, report, keys.get(entry.name, "")))
         raw = exactly(report["score"]) if report is not None and report["final"] else None
-        adjusted = adjust(raw, decisions.get(entry.name, Decision()), adjustments)
+        decision = decisions.get(entry.name, Decision())
+        marked, criteria = _decided(report, decision)
+        adjusted = adjust(raw, decision, adjustments, marked=marked, criteria=criteria)
         handed_back = handed_back_of(entry.name) if report is not None else None
         rows[-1] = replace(rows[-1], handed_back=handed_back, adjusted=adjusted, twin_of=twins.get(entry.name, ()))
     rows += [_missing(person, adjustments) for person in matching.missing]
@@ -119,6 +150,23 @@ def make_gradebook(  # noqa: PLR0913  each comes from a different source
     odd = [entry.name for entry in intake.entries if not entry.recognised]
     remarks += [f"named otherwise than the layout names submissions: {', '.join(odd)}"] if odd else []
     return Gradebook(tuple(rows), matching, intake.strays, tuple(foreign), intake.layouts, tuple(remarks))
+
+
+def _decided(report: ReportData | None, decision: Decision) -> tuple[Fraction | None, Mapping[str, CriterionDecision]]:
+    """Return the points after decisions about criteria, None while some are undecided, and the decisions that apply."""
+    points, final, found = Fraction(0), report is not None, {}
+    for exercise in exercises_of(report):
+        for criterion in exercise["criteria"]:
+            id_ = f"{exercise['id']}/{criterion['id']}"
+            decided = decision.criteria.get(id_)
+            if decided is not None:
+                found[id_] = decided
+            if decided is not None and decided.score is not None:
+                points += decided.score
+            else:
+                points += exactly(criterion["score"])
+                final = final and criterion["outcome"] != "undecided"
+    return points if final else None, found
 
 
 def decisions_for(
@@ -196,7 +244,8 @@ def render_gradebook(book: Gradebook) -> str:
     """Render the gradebook as CSV: the columns of `COLUMNS`, then the points by exercise and criterion."""
     exercises, criteria = _exercises_and_criteria(book.rows)
     header = [*COLUMNS, *exercises, *(f"{e}/{c}" for e, c in criteria)]
-    return table(header, (_cells(row, exercises, criteria) for row in book.rows))
+    rows = sorted(book.rows, key=lambda row: ((row.person or Person(row.label)).sort_key, row.name))
+    return table(header, (_cells(row, exercises, criteria) for row in rows))
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -224,6 +273,9 @@ def text_cell(text: str) -> str:
 def remarks(row: Row) -> list[str]:
     """Return the remarks about a row."""
     found = [shown(row.problem, limit=500)] if row.problem else []
+    found += [f"hint: {shown(row.hint, limit=500)}"] if row.hint else []
+    found += [f"{id_}: {_decision(decided)}" for id_, decided in row.adjusted.criteria.items()]
+    found += [f"comment: {row.adjusted.comment}"] if row.adjusted.comment else []
     if row.outdated:
         found.append("the result is of other files or of another rubric than now")
     if row.twin_of:
@@ -239,13 +291,18 @@ def remarks(row: Row) -> list[str]:
     return found
 
 
+def _decision(decided: CriterionDecision) -> str:
+    points = "" if decided.score is None else f"set to {number(decided.score)}, {decided.reason}"
+    return "; ".join(text for text in (points, decided.comment) if text)
+
+
 def _cells(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
     person, adjusted = row.person, row.adjusted
     texts = [row.name, row.shown_name, *((person.user, person.email, person.id) if person else ("", "", ""))]
     raw = None if row.report is None else row.report["score"]
     return [
         *map(text_cell, texts),
-        row.status.value,
+        row.standing,
         number(adjusted.score),
         number(row.max_score),
         number(raw),
@@ -255,7 +312,7 @@ def _cells(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, str
         text_cell(adjusted.reason),
         text_cell("; ".join(remarks(row))),
         text_cell(f"students/{row.name}/report.html") if row.report is not None else "",
-        *_points(row.report, exercises, criteria),
+        *_points(row, exercises, criteria),
     ]
 
 
@@ -270,13 +327,15 @@ def _exercises_and_criteria(rows: Iterable[Row]) -> tuple[list[str], list[tuple[
     return list(exercises), sorted(criteria, key=lambda pair: list(exercises).index(pair[0]))
 
 
-def _points(report: ReportData | None, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
-    by_exercise = {e["id"]: e for e in exercises_of(report)}
+def _points(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
+    """Return the grader's points by exercise, and those that count by criterion."""
+    by_exercise = {e["id"]: e for e in exercises_of(row.report)}
+    set_ = {id_: decided.score for id_, decided in row.adjusted.criteria.items() if decided.score is not None}
     found = {(id_, c["id"]): c for id_, e in by_exercise.items() for c in e["criteria"]}
     decided = {pair: criterion for pair, criterion in found.items() if criterion["outcome"] != "undecided"}
     return [
         *(number(by_exercise[id_]["score"]) if id_ in by_exercise else "" for id_ in exercises),
-        *(number(decided[pair]["score"]) if pair in decided else "" for pair in criteria),
+        *(number(set_.get("/".join(pair), decided[pair]["score"] if pair in decided else None)) for pair in criteria),
     ]
 
 

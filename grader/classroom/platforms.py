@@ -5,13 +5,14 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from grader.classroom.gradebook import Gradebook, Row, exercises_of, number, table, text_cell
 from grader.classroom.roster import Person, Table, columns_of, fold_handle, person_of
 from grader.core.errors import ClassError
 from grader.reporting.escape import shown as safe
+from grader.reporting.html.final_mark import FinalMark
 from grader.reporting.json_report import CriterionData, json_text
 from grader.submissions.collected import listed, shown
 
@@ -62,6 +63,8 @@ def export_canvas(book: Gradebook, assignment: str, gradebook: Table | None) -> 
 def export_moodle(book: Gradebook, users: Table) -> Export:
     """Export grades and feedback for Moodle's grade import; importing one without the other deletes grades.
 
+    Who handed in something that cannot be used has no grade, and the reason and the hint as feedback.
+
     People who are not in the table of users are left out, because Moodle rejects a file with an unknown user. Raises
     ClassError if the table has no column that Moodle can identify people by.
     """
@@ -72,7 +75,9 @@ def export_moodle(book: Gradebook, users: Table) -> Export:
         raise ClassError(f"{users.path}:1: expected a column {listed(MOODLE_COLUMNS)}, found {found}")
     rows: list[list[str]] = []
     left_out: list[str] = []
-    for row in _counted(book, left_out):
+    refused = [row for row in book.refused if not row.twin_of]
+    names = {row.name for row in refused}
+    for row in (*_counted(book, left_out, but=names), *refused):
         found_row = _user(row, users)
         value = "" if found_row is None else found_row[by_name[column.casefold()]].strip()
         if not value:
@@ -103,22 +108,63 @@ def feedback(row: Row) -> str:
 
     The score is the final mark, which the platform shows too. Only reasons that students may see are included.
     """
-    parts = [f"{number(row.adjusted.score)} of {number(row.max_score)} points." if row.report else ""]
-    parts.append(_decision(row))
+    if row.report is None:
+        said = [f"Not graded: {row.refusal}." if row.refusal else "", f"Hint: {row.hint}." if row.hint else ""]
+        return safe(" ".join(part for part in (*said, *decisions(row)) if part), limit=_FEEDBACK)
+    parts = [f"{number(row.adjusted.score)} of {number(row.max_score)} points.", *decisions(row)]
+    parts += _first_hint(row)
     parts += [_lost(criterion) for exercise in exercises_of(row.handed_back) for criterion in exercise["criteria"]]
     return safe(" ".join(part for part in parts if part), limit=_FEEDBACK)
 
 
-def _decision(row: Row) -> str:
-    """Explain how the final score differs from the raw one; empty if it does not."""
+def final_mark(row: Row) -> FinalMark:
+    """Return what a student's page says of the mark; without the total where the student may not see everything."""
+    everything = row.handed_back == row.report
+    score = "" if row.adjusted.score is None or not everything else f"final mark {number(row.adjusted.score)}"
+    score += f" of {number(row.max_score)} points" if score and row.max_score is not None else ""
+    ignored = [f"This submission does not count: {row.adjusted.reason}"] if row.adjusted.ignored else []
+    return FinalMark(row.shown_name, score, (*ignored, *decisions(row, totals=everything)))
+
+
+def _first_hint(row: Row) -> list[str]:
+    """Return the first thing to do, as far as the student may see it."""
+    criteria = [criterion for exercise in exercises_of(row.handed_back) for criterion in exercise["criteria"]]
+    lost = [c["hint"] for c in criteria if c["outcome"] in ("not_met", "partly") and c.get("hint")]
+    return [f"First hint: {lost[0]}."] if lost else []
+
+
+def decisions(row: Row, *, totals: bool = True) -> list[str]:
+    """Explain to the student what was decided, beside what the grader had found, in a sentence each.
+
+    Without totals nothing is said of the whole score, from which hidden criteria could be reckoned.
+    """
     adjusted = row.adjusted
-    if adjusted.override is not None:
+    found = [f"{id_}: {text}" for id_, text in _criteria(row)]
+    if not totals:
+        pass
+    elif adjusted.override is not None:
         raw = f" instead of {number(adjusted.raw)}" if adjusted.raw is not None else ""
-        return f"The score was set to {number(adjusted.override)}{raw}: {adjusted.reason}."
-    if adjusted.penalty:
+        found.append(f"The score was set to {number(adjusted.override)}{raw}: {adjusted.reason}.")
+    elif adjusted.penalty:
         days = number(adjusted.days_late)
-        return f"{number(adjusted.raw)} points, less {number(adjusted.penalty)} for {days} days late."
-    return ""
+        late = f"{days} {'day' if days == '1' else 'days'} late"
+        found.append(f"{number(adjusted.marked)} points, less {number(adjusted.penalty)} for {late}.")
+    return [*found, f"Comment: {adjusted.comment}"] if adjusted.comment else found
+
+
+def _criteria(row: Row) -> Iterator[tuple[str, str]]:
+    """Yield title and decision of each criterion that a student may see."""
+    for exercise in exercises_of(row.handed_back):
+        for criterion in exercise["criteria"]:
+            decided = row.adjusted.criteria.get(f"{exercise['id']}/{criterion['id']}")
+            if decided is None:
+                continue
+            points, of = number(criterion["score"]), number(criterion["max_score"])
+            parts = [f"{points} of {of} points"]
+            if decided.score is not None:
+                parts = [f"{number(decided.score)} of {of} points instead of {points}: {decided.reason}"]
+            parts += [f"Comment: {decided.comment}"] if decided.comment else []
+            yield criterion["title"], ". ".join(parts) + "."
 
 
 def _lost(criterion: CriterionData) -> str:
@@ -128,12 +174,12 @@ def _lost(criterion: CriterionData) -> str:
     return f"[{points}] {criterion['title']}: {criterion['reason']}"
 
 
-def _counted(book: Gradebook, left_out: list[str]) -> Sequence[Row]:
-    """Return the rows to export; list everybody else who handed something in."""
+def _counted(book: Gradebook, left_out: list[str], but: Collection[str] = ()) -> Sequence[Row]:
+    """Return the rows to export; list everybody else who handed something in, but for some names."""
     to_export = book.to_export
     chosen = {id(row) for row in to_export}
     for row in book.rows:
-        if id(row) in chosen or row.adjusted.ignored or not row.name:
+        if id(row) in chosen or row.adjusted.ignored or not row.name or row.name in but:
             continue
         if row.person is None:
             why = "nobody on the roster goes with it for sure"
@@ -195,7 +241,8 @@ def _decided(results: str, row: Row) -> str:
     if row.adjusted.changed:
         data["extra_data"]["raw_score"] = data["score"]
         data["score"] = float(row.adjusted.score or 0)
-        data["output"] = f"{safe(_decision(row), limit=600)}\n{data['output']}"
+    if said := decisions(row):
+        data["output"] = "\n".join([*(safe(text, limit=1_200) for text in said), data["output"]])
     return json_text(data)
 
 

@@ -35,7 +35,13 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @click.option("--layout", type=click.Choice(_LAYOUTS), default="auto", help="How submissions are named.")
 @click.option("--pattern", default="", metavar="REGEX", help="Names, with groups name, user, email, id, late, file.")
 @click.option("--roster", type=PATH, metavar="CSV", help="The people of the class, as any platform exports them.")
-@click.option("--adjust", "adjustments", type=PATH, metavar="YAML", help="Late days, other scores, what to ignore.")
+@click.option(
+    "--adjust",
+    "adjustments",
+    type=PATH,
+    metavar="YAML",
+    help="Late days, scores, comments; else RESULTS/adjust.yaml.",
+)
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Submissions at a time; by default one a core.")
 @click.option("--scheduler", metavar="ADDRESS", help="Grade on the Dask cluster of this scheduler, or scheduler file.")
 @click.option("--rerun", type=click.Choice(_RERUNS), default="changed", help="What is graded again besides the new.")

@@ -58,11 +58,15 @@ def _schema(*, rubric: Path | None) -> int:
 
 @command.command(name="variant")
 @click.argument("rubric", metavar="FILE", type=PATH)
-@click.option("--key-file", "key", type=PATH, metavar="KEY", required=True, help="The course key.")
+@click.option("--variant-key", "key", type=PATH, metavar="FILE", help="The course key.")
+@click.option("--key-file", "old_key", type=PATH, hidden=True)  # its name in earlier versions
 @click.option("--student", metavar="ID", required=True, help="Whose values; the same id as on the roster.")
 @click.option("--format", "format_", type=click.Choice(["markdown", "json"]), default="markdown", help="How to print.")
-def _variant(*, rubric: Path, key: Path, student: str, format_: str) -> int:
+def _variant(*, rubric: Path, key: Path | None, old_key: Path | None, student: str, format_: str) -> int:
     """Print the values that a rubric has for one student, for the task sheet."""
+    key = key or old_key
+    if key is None:
+        raise click.UsageError("Missing option '--variant-key'.")
     from grader.app.seeds import by_key
     from grader.reporting.explained import render_sheet, sheet_to_json
     from grader.rubrics.loader import read_rubric
