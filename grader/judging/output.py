@@ -109,6 +109,11 @@ def numbers_in(text: str) -> tuple[Printed, ...]:
     return printed_numbers(body) + (printed_numbers(other) if other else ())
 
 
+def after(text: str, printed: Printed) -> str:
+    """Return what follows a number of a text, without white space between them."""
+    return clean(text)[printed.stop :].lstrip()
+
+
 @lru_cache(maxsize=4096)
 def shape_of(text: str) -> str:
     """Return a text with masked numbers and without white space; equal for texts of the same wording."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
@@ -12,6 +12,7 @@ from grader.core.quantities import NS_PER_MS
 from grader.core.trace import ClockKind, LogRecord, Request, Response, Trace
 from grader.judging.output import Output, number_in, shape_of, written
 from grader.judging.values import JITTER_NS, number_at, text_at, value_at
+from grader.judging.wording import number
 
 #: Accepted delay on clocks where the machine's load shows.
 LATENESS_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}
@@ -236,10 +237,151 @@ def _read(response: Response | None, reading: ResponseReader) -> tuple[CallKind,
     return (CallKind.GOOD if number > reading.threshold else CallKind.LOW), number, text or ""
 
 
-def shapes_before(trace: Trace, process: str, service: str, *, cautious: bool) -> frozenset[str]:
+def _shapes_before(trace: Trace, process: str, service: str, *, cautious: bool) -> frozenset[str]:
     """Return the shapes of the texts before the first response; `cautious` adds its instant if it came at once."""
     first = next((c for c in calls_of(trace, service, "student") if c.response is not None), None)
     if first is None or first.response is None:
         return frozenset()
     until_ns = first.response.t_ns + (cautious and first.response.t_ns == first.request.t_ns)
     return frozenset(shape_of(o.text) for o in written(trace, process) if o.t_ns < until_ns)
+
+
+#: Whether an output complains, and its shape.
+Text = tuple[bool, str]
+
+
+def text_of(output: Output) -> Text:
+    """Return what outputs of the same wording share; a record that complains differs from one that does not."""
+    return bool(complaints((output,))), shape_of(output.text)
+
+
+def _texts(outputs: Iterable[Output]) -> frozenset[Text]:
+    return frozenset(map(text_of, outputs))
+
+
+def _loose(episode: Episode) -> tuple[Output, ...]:
+    return episode.outputs
+
+
+def _sure(episode: Episode) -> tuple[Output, ...]:
+    return episode.sure
+
+
+_View = Callable[[Episode], tuple[Output, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Going:
+    """What a client writes only when it continues.
+
+    Attributes:
+        texts: The texts; none of them complains.
+        view: The outputs of an episode among which they are sought.
+        clear: Whether each output belongs to one response, and there is another kind of response to compare with.
+        compared: Whether that kind is a low number; otherwise text that shows a response does not signal continuing.
+    """
+
+    texts: frozenset[Text]
+    view: _View
+    clear: bool
+    compared: bool
+
+    def outputs(self, episode: Episode) -> list[Output]:
+        """Return the outputs of an episode that show that the client continues."""
+        found = [o for o in self.view(episode) if text_of(o) in self.texts]
+        return found if self.compared else [o for o in found if not _quotes(o, episode)]
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """What a client writes after responses of each kind.
+
+    Attributes:
+        before: Shapes of the texts before the first response.
+        clear: Whether no response came at the instant of its request, where output of two responses looks alike.
+    """
+
+    clock: ClockKind
+    episodes: tuple[Episode, ...]
+    before: frozenset[str]
+    clear: bool
+
+    @classmethod
+    def of(cls, trace: Trace, process: str, service: str, episodes: tuple[Episode, ...]) -> Words:
+        """Return the words of a process in a trace."""
+        lows = any(e.kind is CallKind.LOW for e in episodes)
+        before = _shapes_before(trace, process, service, cautious=not lows)
+        clear = all(e.start_ns > e.asked_ns for e in episodes if e.kind is not CallKind.UNANSWERED)
+        return cls(trace.clock, episodes, before, clear)
+
+    def _of(self, *kinds: CallKind) -> list[Episode]:
+        return [e for e in self.episodes if e.kind in kinds]
+
+    def _new(self, texts: Iterable[Text]) -> frozenset[Text]:
+        """Return the texts that do not complain and do not come before the first response."""
+        return frozenset(t for t in texts if not t[0] and t[1] not in self.before)
+
+    def telling(self, episode: Episode) -> list[Output] | None:
+        """Return the new output after a good response that does not follow every low number; None if unclear."""
+        low = self._of(CallKind.LOW)
+        if not low or not self.clear:
+            return None
+        texts = self._new(_texts(episode.outputs)) - frozenset.intersection(*(_texts(e.sure) for e in low))
+        return [o for o in episode.outputs if text_of(o) in texts]
+
+    @property
+    def only_good(self) -> frozenset[Text] | None:
+        """The texts that follow good responses and no low number; None if this is not clear."""
+        good, low = self._of(CallKind.GOOD), self._of(CallKind.LOW)
+        if not good or not low or not self.clear:
+            return None
+        return self._contrast(good, low, _loose)
+
+    @property
+    def shared(self) -> tuple[Output, float] | None:
+        """The last output after a low number whose text follows a good response too, with the number; or None."""
+        good = self._new(t for e in self._of(CallKind.GOOD) for t in _texts(e.outputs))
+        found = [(o, e.number) for e in self._of(CallKind.LOW) for o in e.sure if text_of(o) in good]
+        return next(((o, n) for o, n in reversed(found) if n is not None), None)
+
+    def _contrast(self, good: Sequence[Episode], others: Sequence[Episode], view: _View) -> frozenset[Text]:
+        """Return the new texts of good responses, less those of others."""
+        found = self._new(t for e in good for t in _texts(view(e)))
+        less = found.difference(*(_texts(e.outputs) for e in others))
+        # on the wall clock, output at the edge of an episode may belong to its neighbour
+        return less or (found.difference(*(_texts(e.sure) for e in others)) if self.clock is ClockKind.WALL else less)
+
+    def start_after_abort(self, episode: Episode) -> Output | None:
+        """Return output after a low number that follows every good response, but not the first low number."""
+        good, low = self._of(CallKind.GOOD), self._of(CallKind.LOW)
+        if not good or not self.clear or episode is low[0]:
+            return None
+        going = self._new(frozenset.intersection(*(_texts(e.sure) for e in good))) - _texts(low[0].outputs)
+        return next((o for o in episode.sure if text_of(o) in going), None)
+
+    def going(self, kind: CallKind) -> Going:
+        """Return what the client writes only when it continues: not after low numbers, or else not after other answers.
+
+        Args:
+            kind: The kind of useless response that the texts are sought after.
+        """
+        good, low = self._of(CallKind.GOOD), self._of(CallKind.LOW)
+        answered = [e for e in self._of(CallKind.FAILED, CallKind.UNREADABLE) if e.kind is not kind]
+        others = low or answered
+        if not others:
+            # without another answer to compare with, text that shows the response itself does not signal continuing
+            shown = {text_of(o) for e in good for o in e.outputs if _quotes(o, e)}
+            each = frozenset.intersection(*(_texts(e.outputs) for e in good))
+            alone = all(e.kind in (CallKind.GOOD, kind) for e in self.episodes)
+            return Going(self._new(each) - shown if alone else frozenset(), _sure, clear=False, compared=False)
+        views: tuple[_View, ...] = (_sure, _loose)
+        some = {view: self._contrast(good, others, view) for view in views}
+        common = {view: some[view].intersection(*(_texts(view(e)) for e in good)) for view in views}
+        found = [(choice[view], view) for choice in (common, some) for view in views if choice[view]]
+        texts, view = found[0] if found else (frozenset[Text](), _sure)
+        return Going(texts, view, self.clear, bool(low))
+
+
+def _quotes(output: Output, episode: Episode) -> bool:
+    shown = "" if episode.number is None else number(episode.number)
+    return bool(episode.text and episode.text in output.text) or bool(shown and shown in output.text)

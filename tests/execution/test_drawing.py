@@ -2,9 +2,11 @@
 
 import hashlib
 import json
+import math
+import re
 import statistics
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -105,20 +107,50 @@ def test_the_sensor_hears_every_kind_of_speed(seed: int) -> None:
     assert {100.0, 0.0} <= set(values)
     assert any(51 <= v <= 99 for v in values)
     assert any(1 <= v <= 49 for v in values)
+    assert len(values) >= 4  # each differs from the one before, so that a sensor one message behind shows
     assert numbers.start_ns + numbers.period_ns * len(numbers.numbers) <= plan_.duration_ns
+
+
+def angles(seed: int) -> list[float]:
+    (messages,) = planned("joint_subscriber", "late_publisher", seed).messages
+    return [fields["data"] for fields in messages.values]
 
 
 @given(SEEDS)
 def test_every_angle_comes_whatever_the_order(seed: int) -> None:
-    """One to three times each, all before the observation ends."""
+    """Once each, all before the observation ends."""
     plan_ = planned("joint_subscriber", "late_publisher", seed)
     (messages,) = plan_.messages
-    found = [fields["data"] for fields in messages.values]
-    kinds = ((0.2, 1.0), (-1.0, -0.2), (0.5, 0.5), (1.2, 3.1), (-1.5707963267948966,) * 2, (-3.1, -1.2))
-    assert all(any(low <= value <= high for value in found) for low, high in kinds)
-    assert 6 <= len(found) <= 18
+    found = angles(seed)
+    kinds = ((0.2, 0.4), (-1.0, -0.2), (0.5, 0.5), (1.8, 3.1), (-1.5707963267948966,) * 2)
+    assert all(any(low <= value <= high for value in found[:-1]) for low, high in kinds)
+    assert -3.1 <= found[-1] <= -1.8
+    assert 6 <= len(found) <= 12
     assert messages.start_ns >= 5 * S
-    assert messages.start_ns + len(messages.values) * messages.period_ns <= plan_.duration_ns
+    assert messages.start_ns + len(messages.values) * messages.period_ns + S <= plan_.duration_ns
+
+
+#: What programs log at each angle that they receive.
+ANGLE_MISTAKES: dict[str, Callable[[list[float]], list[float]]] = {
+    "one behind": lambda v: [0.0, *v[:-1]],
+    "two behind": lambda v: [0.0, 0.0, *v[:-2]],
+    "mean of two": lambda v: averages(v, 2),
+    "mean of five": lambda v: averages(v, 5),
+    "first only": lambda v: [v[0]] * len(v),
+    "within a quarter turn": lambda v: [max(-math.pi / 2, min(math.pi / 2, a)) for a in v],
+    "without sign": lambda v: [abs(a) for a in v],
+    "whole numbers": lambda v: [float(int(a)) for a in v],
+    "a full turn": lambda v: [a % math.tau for a in v],
+}
+
+
+@pytest.mark.parametrize("logged", ANGLE_MISTAKES.values(), ids=ANGLE_MISTAKES)
+@given(seed=SEEDS)
+def test_every_mistake_with_angles_shows(logged: Callable[[list[float]], list[float]], seed: int) -> None:
+    """To one decimal in radians: some angle is logged neither at once nor with the next, as from a queue."""
+    right = angles(seed)
+    wrong = logged(right)
+    assert any(all(abs(late - angle) > 0.1 for late in wrong[k : k + 2]) for k, angle in enumerate(right))
 
 
 def charges(seed: int, scenario: str) -> list[tuple[bool, str]]:
@@ -126,26 +158,125 @@ def charges(seed: int, scenario: str) -> list[tuple[bool, str]]:
     return [(r["success"], r["message"]) for r in server.responses]
 
 
+def charge_of(answer: tuple[bool, str]) -> float:
+    """Return the charge that a message tells; nan if it tells none."""
+    found = re.search(r"[0-9.]+", answer[1])
+    return float(found[0]) if found else math.nan
+
+
 @given(SEEDS)
 def test_a_client_hears_of_the_limit_within_five_questions(seed: int) -> None:
-    """High charges come first, for a client may ask no more after a low one; the first low one is the limit itself."""
-    found = [float(message.split()[1].rstrip("%")) for _, message in charges(seed, "client_limit")]
+    """High charges come first, for a client may ask no more after a low one; then the limit, then one digit."""
+    found = [charge_of(answer) for answer in charges(seed, "client_limit")]
     place = found.index(20.0)
-    assert 2 <= place <= 4
+    assert 2 <= place <= 3
     assert all(charge > 20 for charge in found[:place])
-    assert 20.5 in found[:place]
-    assert all(charge < 20 for charge in found[place + 1 :])
+    assert 20.1 in found[:place]
+    assert len(found) == place + 2
+    assert found[-1] < 10
 
 
 @pytest.mark.parametrize("scenario", ["client_refused", "client_puzzled"])
 @given(seed=SEEDS)
-def test_a_useless_answer_comes_between_good_ones_and_a_low_one(scenario: str, seed: int) -> None:
+def test_a_useless_answer_comes_between_good_ones_and_two_low_ones(scenario: str, seed: int) -> None:
     """After a good one, for without it nothing is known of how the client goes on."""
     found = charges(seed, scenario)
-    useless = [k for k, (success, message) in enumerate(found) if not success or message == "no reading"]
-    assert len(useless) == 1
-    assert 1 <= useless[0] < len(found) - 1 <= 4
-    assert float(found[-1][1].split()[1].rstrip("%")) < 20
+    useless = [k for k, answer in enumerate(found) if not answer[0] or math.isnan(charge_of(answer))]
+    assert charge_of(found[0]) > 20
+    assert useless
+    assert set(useless) <= {1, 2}
+    assert len(found) == 4  # the last one is repeated
+    assert charge_of(found[-1]) < 10
+    refused = [charge_of(found[k]) > 20 for k in useless if not found[k][0]]
+    assert refused == [scenario == "client_refused"]
+    assert scenario == "client_refused" or len(useless) == 2
+
+
+@given(SEEDS)
+def test_a_server_goes_away_after_two_good_answers_and_a_refusal(seed: int) -> None:
+    """So that what is written after any answer is told from a start."""
+    (server,) = planned("battery_service", "client_deserted", seed).servers
+    told = [r["success"] and charge_of((True, r["message"])) > 20 for r in server.responses[: server.answers]]
+    assert told.count(False) == 1
+    assert 1 <= told.index(False) <= 2
+    assert 3 <= server.answers <= 4
+
+
+Decide = Callable[[list[tuple[bool, str]]], str]
+
+
+def by(charge: Callable[[list[tuple[bool, str]]], float], limit: float = 20.0) -> Decide:
+    """Return how a client decides that takes a charge from all answers so far; nan is no charge."""
+
+    def decide(heard: list[tuple[bool, str]]) -> str:
+        value = charge(heard)
+        return "unknown" if math.isnan(value) else "go" if value > limit else "abort"
+
+    return decide
+
+
+def last_charge(heard: list[tuple[bool, str]]) -> float:
+    return charge_of(heard[-1]) if heard[-1][0] else math.nan
+
+
+def known(heard: list[tuple[bool, str]]) -> list[float]:
+    """Return the charges that were told so far."""
+    return [c for k in range(1, len(heard) + 1) if not math.isnan(c := last_charge(heard[:k]))]
+
+
+def if_known(value: Callable[[list[tuple[bool, str]]], float]) -> Decide:
+    return by(lambda heard: math.nan if math.isnan(last_charge(heard)) else value(heard))
+
+
+def as_text(heard: list[tuple[bool, str]]) -> str:
+    charge = last_charge(heard)
+    return "unknown" if math.isnan(charge) else "go" if str(charge) > "20.0" else "abort"
+
+
+CLIENT_MISTAKES: dict[str, Decide] = {
+    "limit of 10": by(last_charge, 10.0),
+    "limit of 19": by(last_charge, 19.0),
+    "the limit itself starts": by(last_charge, math.nextafter(20.0, 0.0)),
+    "limit of 21": by(last_charge, 21.0),
+    "limit of 50": by(last_charge, 50.0),
+    "whole numbers": if_known(lambda heard: float(int(last_charge(heard)))),
+    "rounded": if_known(lambda heard: float(round(last_charge(heard)))),
+    "compares texts": as_text,
+    "first two digits": if_known(lambda heard: float(str(last_charge(heard)).replace(".", "")[:2])),
+    "one behind": if_known(lambda heard: [0.0, *known(heard)][-2]),
+    "one behind, the first is right": if_known(lambda heard: known(heard)[-2:][0]),
+    "first answer": if_known(lambda heard: known(heard)[0]),
+    "mean of two": if_known(lambda heard: statistics.fmean(known(heard)[-2:])),
+    "mean of all": if_known(lambda heard: statistics.fmean(known(heard))),
+    "highest so far": if_known(lambda heard: max(known(heard))),
+    "always": lambda heard: "go",
+    "never": lambda heard: "abort",
+    "old charge": by(lambda heard: known(heard)[-1]),
+    "success ignored": by(lambda heard: charge_of(heard[-1])),
+    "a refusal is a low charge only": by(lambda heard: charge_of(heard[-1]) if charge_of(heard[-1]) > 50 else math.nan),
+    "a refusal without a number is half": by(
+        lambda heard: 50.0 if not heard[-1][0] and math.isnan(charge_of(heard[-1])) else last_charge(heard)
+    ),
+    "no number is full": by(lambda heard: 100.0 if math.isnan(charge_of(heard[-1])) else last_charge(heard)),
+}
+
+
+def missions(decide: Decide, seed: int, scenario: str, *, ends: bool) -> list[str]:
+    """Return what a client decides at five questions, or up to the first low charge."""
+    answers = charges(seed, scenario)
+    heard = [answers[min(k, len(answers) - 1)] for k in range(5)]
+    found = [decide(heard[: k + 1]) for k in range(5)]
+    return found[: found.index("abort") + 1] if ends and "abort" in found else found
+
+
+@pytest.mark.parametrize("ends", [False, True], ids=["goes on asking", "ends at the first low charge"])
+@pytest.mark.parametrize("mistaken", CLIENT_MISTAKES.values(), ids=CLIENT_MISTAKES)
+@given(seed=SEEDS)
+def test_every_mistake_with_charges_shows(mistaken: Decide, ends: bool, seed: int) -> None:
+    """In one of the scenarios, whatever the seed."""
+    scenarios = ("client_limit", "client_refused", "client_puzzled")
+    right = [missions(by(last_charge), seed, scenario, ends=ends) for scenario in scenarios]
+    assert [missions(mistaken, seed, scenario, ends=ends) for scenario in scenarios] != right
 
 
 @given(SEEDS)

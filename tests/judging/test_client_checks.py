@@ -8,7 +8,20 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from nodes import BATTERY, CLIENT, FAILED, UNREADABLE, Answer, Said, asking, battery, chapter, deciding, level_of
+from nodes import (
+    ANSWERS,
+    BATTERY,
+    CLIENT,
+    FAILED,
+    UNREADABLE,
+    Answer,
+    Said,
+    asking,
+    battery,
+    chapter,
+    deciding,
+    level_of,
+)
 from tracing import TRIGGER, Recording
 
 from grader.core.errors import HarnessError
@@ -62,7 +75,6 @@ RIGHT = {
     "looks at the answer when it asks again": asking(looks_later),
     "looks later, answers at once": asking(looks_later, delay_s=0.0),
     "tells its pause": asking(pausing),
-    "goes on without a word": asking(silent_go),
     "a low charge is an error": asking(as_error),
     "wall clock": asking(chapter, clock=ClockKind.WALL),
     "low first": asking(chapter, (battery(15.0), FAILED, battery(84.5))),
@@ -97,9 +109,38 @@ def goes_on(kinds: Sequence[Answer]) -> Callable[[Answer], Said]:
     return write
 
 
+def warns_and_goes(answer: Answer) -> Said:
+    level = level_of(answer)
+    warned = [] if level is None or level > 20 else [("WARN", "charge is low, it stays")]
+    return [*chapter(answer)[:1], *warned, *([] if level is None else [("INFO", "charge is fine, off it goes")])]
+
+
+def goes_at_the_second_low(answer: Answer) -> Said:
+    return [*chapter(answer), ("INFO", "charge is fine, off it goes")] if answer == battery(15.0) else chapter(answer)
+
+
+def same_for_all(answer: Answer) -> Said:
+    return [("INFO", "charge is asked for, off it goes")]
+
+
+def looks_later_at_a_refusal(answer: Answer) -> Said:
+    go = answer is not None and (answer == FAILED or (level_of(answer) or 0.0) > 20)
+    return [("at_end INFO", "off it goes") if go else ("at_end WARN", "it stays")]
+
+
 @pytest.mark.parametrize(
     ("write", "check", "said"),
     [
+        (silent_go, ABOVE, "nothing is written but what follows low numbers too after 84.5"),
+        (silent_go, BELOW, "so it does not show that it aborts"),
+        (silent_go, STILL, "('the answer: Battery: 15.0% remaining' follows 15)"),
+        (warns_and_goes, ABOVE, "nothing is written but what follows low numbers too"),
+        (warns_and_goes, BELOW, "('charge is fine, off it goes' follows 15)"),
+        (goes_at_the_second_low, BELOW, "'charge is fine, off it goes' at t = "),
+        (same_for_all, ABOVE, "nothing is written but what follows low numbers too"),
+        (same_for_all, STILL, "so it does not show that it keeps still after a response without success"),
+        (deciding(lambda v: f"{v}" > "20.0"), BELOW, "no record of severity WARN after 7.5"),
+        (looks_later_at_a_refusal, STILL, "'off it goes' after a response without success (request 4)"),
         (deciding(lambda v: v >= 20), BELOW, "no record of severity WARN after 20, expected that it warns"),
         (deciding(lambda v: v > 10), BELOW, "no record of severity WARN after 20"),
         (deciding(lambda v: v > 30), ABOVE, "WARN at t = 4.450 s: low, it stays after 20.1, expected that it goes on"),
@@ -117,7 +158,8 @@ def goes_on(kinds: Sequence[Answer]) -> Callable[[Answer], Said]:
 def test_wrong_decisions_are_named(write: Callable[[Answer], Said], check: Check, said: str) -> None:
     """With the moment, the text and the number."""
     header = "" if write is says_nothing else "== run {} =="
-    finding = check.judge(asking(write, header=header).trace())
+    answers = [battery(7.5) if "7.5" in said and a == battery(15.0) else a for a in ANSWERS]
+    finding = check.judge(asking(write, answers, header=header).trace())
     assert finding.credit == 0
     assert said in finding.reason
 
@@ -132,7 +174,7 @@ def test_the_threshold_itself_is_not_above() -> None:
 def test_a_client_without_a_pause_between_the_words_is_compared_leniently() -> None:
     """Where no number was low, what tells the answer or stands before the first one is no going on."""
     answers = (battery(84.5), battery(63.0), FAILED, UNREADABLE)
-    for write in (chapter, with_numbers, silent_go):
+    for write in (chapter, with_numbers):
         for delay_s in (0.0, 0.1):
             assert STILL.judge(asking(write, answers, delay_s=delay_s).trace()).credit == 1
     assert STILL.judge(asking(goes_on([UNREADABLE]), answers).trace()).credit == 0
@@ -152,6 +194,49 @@ def test_printing_is_half() -> None:
     assert ABOVE.judge(warned.trace()).credit == 1
     wrong = asking(lambda a: [("print", text) for _, text in goes_on([FAILED])(a)])
     assert STILL.judge(wrong.trace()).credit == 0
+
+
+def test_a_start_that_is_printed_is_half() -> None:
+    """As any other output, however many records stand beside it."""
+    printed = asking(lambda a: [("print" if "off it goes" in text else level, text) for level, text in chapter(a)])
+    assert ABOVE.judge(printed.trace()).credit == Fraction(1, 2)
+    assert BELOW.judge(printed.trace()).credit == 1
+
+
+def test_what_shows_nothing_is_blocked_by_the_start() -> None:
+    """A client that never says that it goes on cannot show that it does not."""
+    for write in (silent_go, warns_and_goes, same_for_all):
+        assert STILL.judge(asking(write).trace()).blocked_by == "reacts_to_responses"
+    for write in (silent_go, warns_and_goes):
+        assert BELOW.judge(asking(write).trace()).blocked_by == "reacts_to_responses"
+
+
+def test_refusals_tell_a_start_from_other_words_where_no_number_is_low() -> None:
+    """What is written after a refusal too is no start; an old number is one."""
+    answers = (battery(84.5), FAILED, battery(63.0), None)
+    paused = asking(lambda a: [*with_numbers(a), ("INFO", "next question in a second")], answers)
+    assert STILL.judge(paused.trace()).credit == 1
+    old = asking(lambda a: [("INFO", "go (63.0)")] if a is None else with_numbers(a), answers)
+    finding = STILL.judge(old.trace())
+    assert finding.credit == 0
+    assert "'go (63.0)' after a request that got no response (request 4)" in finding.reason
+
+
+def named(answer: Answer) -> Said:
+    level = level_of(answer)
+    if level is None:
+        return [("ERROR", "cannot go")]
+    place = {84.5: "to the field", 63.0: "to the river"}.get(level, "anywhere")
+    return [("INFO", f"off {place}")] if level > 20 else [("WARN", f"not {place}")]
+
+
+def test_each_start_may_have_its_own_words() -> None:
+    """And a wait that every answer is followed by is none."""
+    answers = (battery(84.5), UNREADABLE, battery(63.0), battery(15.0), battery(14.0))
+    rec = asking(lambda a: [*named(a), ("INFO", "the next question in a second")], answers)
+    for check in (ABOVE, BELOW, STILL):
+        finding = check.judge(rec.trace())
+        assert finding.credit == 1, finding.reason
 
 
 def test_a_crash_at_an_unreadable_answer_is_told_and_free() -> None:

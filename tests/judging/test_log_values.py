@@ -107,6 +107,40 @@ def test_wrong_conversions_are_named(write: Callable[[float], str], said: str) -
     assert "expected" in finding.reason
 
 
+def test_one_message_behind_is_named() -> None:
+    """In both units or in one; the last number is missing, and every log has the one before."""
+    angles = [*ANGLES[2:], -2.5]
+    before = dict(zip(angles, [0.0, *angles], strict=False))
+    both = CHECK.judge(hearing(lambda a: chapter(before[a]), angles=angles).trace())
+    assert both.credit == 0
+    assert "each log has the number of the message before" in both.reason
+    assert "store the number before you log it" in both.hint
+    mixed = hearing(lambda a: f"{a:.3f} rad ({math.degrees(before[a]):.1f} deg)", angles=angles)
+    assert CHECK.judge(mixed.trace()).credit == 0
+
+
+@pytest.mark.parametrize(
+    ("write", "credit"),
+    [
+        (lambda a: f"{math.degrees(a):.2f} rad ({a:.3f} deg)", 0),
+        (lambda a: f"{math.degrees(a):.2f} Radians|{a:.3f}°", 0),
+        (lambda a: f"{math.degrees(a):.3f} rad = {a:.1f} deg", 0),
+        (lambda a: f"{a:.3f} rad ({math.degrees(a):.2f} deg)", 1),
+        (lambda a: f"rad {a:.3f} deg {math.degrees(a):.2f}", 1),
+        (lambda a: f"deg {math.degrees(a):.2f} rad {a:.3f}", 1),
+        (lambda a: f"{a:.3f} {math.degrees(a):.2f}", 1),
+        (lambda a: f"{math.degrees(a):.2f} deg = {a:.3f} rad; {math.degrees(a):.0f} rad is wrong", 1),
+    ],
+)
+def test_units_that_are_swapped_are_no_conversion(write: Callable[[float], str], credit: int) -> None:
+    """Only where each number is followed by the other's unit; no unit is asked for."""
+    units = {"rad": 1.0, "deg": DEGREES, "\u00b0": DEGREES}
+    check = LogsValues("simple_subscriber.py", "/joint_commands", unit_factors=(DEGREES,), units=units)
+    finding = check.judge(hearing(write, angles=ANGLES[2:]).trace())
+    assert finding.credit == credit, finding.reason
+    assert credit == 1 or "have each other's units" in finding.reason
+
+
 def test_messages_that_are_left_out_are_counted() -> None:
     """Every tenth is not each; a share is enough if the rubric allows it."""
     rec = hearing(chapter, when=lambda k: k % 2 == 0)

@@ -11,6 +11,7 @@ from nodes import SPEEDS, drawn, hearing, sensed
 from tracing import Recording, held_at, scripted
 
 from grader.core.errors import HarnessError
+from grader.core.exercise import Problem, ProblemKind
 from grader.judging.checks.fields import RandomInRange
 from grader.judging.checks.received import LogsReceived
 
@@ -127,6 +128,21 @@ def test_a_log_up_to_a_second_late_counts() -> None:
     for t, value in zip([3.6, 5.6, 7.6, 9.6, 11.0], SPEEDS, strict=True):
         rec.log(t, f"fan {value}")
     assert LOGS.judge(rec.trace()).credit == 0
+
+
+def test_one_message_behind_is_no_log_of_what_came() -> None:
+    """A log at every message that has the speed before; a timer that publishes at that instant may be behind."""
+    times = [0.5 + 0.2 * k for k in range(50)]
+    rec = hearing(str, [])
+    for t in times:
+        rec.log(t, f"fan {held_at(t - 0.2, SPEEDS) or 0.0}")
+    finding = LOGS.judge(rec.trace())
+    assert finding.credit == 0
+    assert "the number of the message before: 100 at t = 2.500 s, when 0 came" in finding.reason
+    assert finding.problem == Problem(ProblemKind.BEHIND)
+    for t in times:
+        rec.number(t, "/temperature", 24.0)
+    assert LOGS.judge(rec.trace()).credit == 1
 
 
 def test_something_of_its_own_is_seen_through() -> None:

@@ -30,11 +30,13 @@ from grader.judging.service_calls import (
     Call,
     CallKind,
     Episode,
+    Going,
     ResponseReader,
+    Words,
     calls_of,
     complaints,
     episodes_of,
-    shapes_before,
+    text_of,
 )
 from grader.judging.wording import counted, moment, number, quote, span
 
@@ -217,9 +219,11 @@ _SAID = {
 class ReactsToResponses:
     """A client continues after a response with a number above a threshold, and warns if the number is at or below it.
 
-    A warning is a record of severity WARN or higher between the response and the next request. Continuing means any
-    output in that time without such a record. The wording is free. Responses without success or without a number are
-    ignored. Printing instead of logging gives half the points.
+    A warning is a record of severity WARN or higher between the response and the next request. Continuing means output
+    in that time without such a record, in words that do not follow every number at or below the threshold as well. A
+    warning shows nothing if no words are kept for the numbers above, or if words that follow each of these come after
+    a later low number. The wording is free. Responses without success or without a number are ignored. Printing instead
+    of logging gives half the points.
 
     Attributes:
         process: File name of the client.
@@ -256,19 +260,23 @@ class ReactsToResponses:
         if len({e.kind for e in mine}) < sum(sides.values()):
             return _not_reached(trace, self.process, self.service, episodes)
         evidence = self._evidence(episodes)
-        wrong = [(e, flaw) for e in mine if (flaw := self._wrong(e, episodes))]
+        words = Words.of(trace, self.process, self.service, episodes)
+        wrong = [(e, flaw) for e in mine if (flaw := self._wrong(e, episodes, words))]
         if not wrong:
-            return self._right(trace, mine, evidence)
+            return self._unshown(mine, words, evidence) or self._right(trace, mine, words, evidence)
         if not student_records(trace, self.process) or all(e.kind is CallKind.LOW for e, _ in wrong):
             printed = self._by_printing(mine, episodes)
             if printed:
                 return only_printed(f"{self.process}: {printed}", evidence, LOGGER_HINT)
         return self._explain(trace, wrong, evidence)
 
-    def _wrong(self, episode: Episode, episodes: Sequence[Episode]) -> str:
+    def _wrong(self, episode: Episode, episodes: Sequence[Episode], words: Words) -> str:
         """Describe what is wrong with the reaction to a response; empty if nothing is."""
         if episode.kind is CallKind.LOW:
-            return "" if complaints(episode.outputs) else "no record of severity WARN"
+            if not complaints(episode.outputs):
+                return "no record of severity WARN"
+            started = words.start_after_abort(episode)
+            return f"{quote(started.text, 80)!r} at {moment(started.t_ns)}" if started is not None else ""
         before = episodes[episode.place - 2] if episode.place > 1 else None
         late = before is not None and before.kind is not CallKind.GOOD
         # a client that reads a response only when it calls again warns then about the previous one
@@ -276,12 +284,26 @@ class ReactsToResponses:
         warned = [r for r in complaints((*early, *episode.sure)) if not (late and r.t_ns <= episode.asked_ns)]
         if warned:
             return f"{warned[0].severity} at {moment(warned[0].t_ns)}: {quote(warned[0].text, 80)}"
-        return "" if episode.outputs else "nothing is written"
+        if not episode.outputs:
+            return "nothing is written"
+        return "nothing is written but what follows low numbers too" if words.telling(episode) == [] else ""
 
-    def _right(self, trace: Trace, mine: Sequence[Episode], evidence: dict[str, object]) -> Finding:
+    def _unshown(self, mine: Sequence[Episode], words: Words, evidence: dict[str, object]) -> Finding | None:
+        """Return a finding if warnings do not show that a mission is aborted, because none is ever seen to start."""
+        low = next((e for e in mine if e.kind is CallKind.LOW), None)
+        if low is None or words.only_good is None or words.only_good:
+            return None
+        reason = f"{self.process}: it warns after {number(low.number or 0.0)}, but {_nothing_of_its_own(self, words)}, "
+        reason += "so it does not show that it aborts"
+        hint = "say that it goes on in the branch for numbers above the limit, and only there"
+        return not_met(reason, evidence, hint=hint, blocked_by="reacts_to_responses", problem=ProblemKind.WRONG_ANSWER)
+
+    def _right(self, trace: Trace, mine: Sequence[Episode], words: Words, evidence: dict[str, object]) -> Finding:
         reason = f"{self.process}: right after each of {counted(len(mine), 'response')} "
         reason += f"({', '.join(number(e.number) for e in mine[:8] if e.number is not None)})"
-        if not student_records(trace, self.process):
+        telling = [words.telling(e) for e in mine if e.kind is CallKind.GOOD]
+        printed = any(told and all(isinstance(o, OutputLine) for o in told) for told in telling)
+        if printed or not student_records(trace, self.process):
             return only_printed(f"{reason}, printed and not logged", evidence, LOGGER_HINT)
         return met(reason, evidence)
 
@@ -304,6 +326,8 @@ class ReactsToResponses:
     def _explain(self, trace: Trace, wrong: Sequence[tuple[Episode, str]], evidence: dict[str, object]) -> Finding:
         episode, flaw = wrong[0]
         rule = "goes on" if episode.kind is CallKind.GOOD else "warns"
+        if episode.kind is CallKind.LOW and complaints(episode.outputs):
+            rule = "starts nothing"
         side = "above" if episode.kind is CallKind.GOOD else "at or below"
         reason = (
             f"{moment(episode.start_ns)}, {self.process}: {flaw} after {number(episode.number or 0.0)}, expected that "
@@ -329,11 +353,12 @@ class ReactsToResponses:
 class NoGoWithoutAnswer:
     """A client does not continue after a response without success or without a number, or without any response.
 
-    What the client writes when it continues is learned from the responses above the threshold: texts of a shape that
-    follows every one of them, and occurs neither before the first response nor after a number at or below the
-    threshold. None of these may come between a useless response and the next request. A crash at such a response is
-    reported and costs nothing. The server should respond with a delay, to separate output before and after a response,
-    and one of its numbers should be at or below the threshold; without these, unclear cases are accepted.
+    What the client writes when it continues is learned from the responses above the threshold: words that follow each
+    of them, or else some of them, and come neither before the first response, nor after a number at or below the
+    threshold, nor after a useless response of another kind. None of these may come between a useless response and the
+    next request. If there are no such words, nothing shows whether the client continues. A crash at a useless response
+    is reported and costs nothing. The server should respond with a delay, to separate output before and after a
+    response, and one of its responses should be of another kind; without these, unclear cases are accepted.
 
     Attributes:
         process: File name of the client.
@@ -363,12 +388,16 @@ class NoGoWithoutAnswer:
         useless = [e for e in episodes if e.kind in _SAID]
         if not useless or not any(e.kind is CallKind.GOOD for e in episodes):
             return _not_reached(trace, self.process, self.service, episodes)
-        going = self._going(trace, episodes)
+        words = Words.of(trace, self.process, self.service, episodes)
         kinds = [e.kind.value for e in useless]
-        evidence: dict[str, object] = {"useless": kinds, "goes_on_with": sorted(going)[:5]}
+        evidence: dict[str, object] = {"useless": kinds}
         for episode in useless:
-            found = [o for o in episode.sure if shape_of(o.text) in going]
-            if found and not self._due(episode, episodes, found[0], going):
+            going = words.going(episode.kind)
+            evidence["goes_on_with"] = sorted(shape for _, shape in going.texts)[:5]
+            if not going.texts and going.clear:
+                return self._unshown(episode, words, evidence)
+            found = [o for o in going.outputs(episode) if not self._due(o, episode, episodes, going)]
+            if found:
                 return self._went_on(episode, found[0], evidence)
         reason = f"{self.process}: keeps still after {counted(len(useless), 'useless answer')}"
         reason += f" ({', '.join(dict.fromkeys(_SAID[e.kind] for e in useless))})"
@@ -377,23 +406,18 @@ class NoGoWithoutAnswer:
             reason += f"; it ended there: {fault_sentence(fault)}, which costs nothing here"
         return met(reason, evidence)
 
-    def _going(self, trace: Trace, episodes: Sequence[Episode]) -> frozenset[str]:
-        """Return the shapes of texts that are written only when the client continues."""
-        good = [e for e in episodes if e.kind is CallKind.GOOD]
-        low = [e for e in episodes if e.kind is CallKind.LOW]
-        shapes = frozenset.intersection(*(e.shapes for e in good))
-        shapes -= shapes_before(trace, self.process, self.service, cautious=not low)
-        if low:
-            return shapes.difference(*(e.shapes for e in low))
-        # without another case to compare with, text that shows the response itself does not signal continuing
-        return shapes - {shape_of(o.text) for e in good for o in e.outputs if _quotes(o, e)}
-
-    def _due(self, episode: Episode, episodes: Sequence[Episode], found: Output, going: frozenset[str]) -> bool:
+    def _due(self, found: Output, episode: Episode, episodes: Sequence[Episode], going: Going) -> bool:
         """Return whether output at the instant of a request still belongs to the previous good response."""
         before = episodes[episode.place - 2] if episode.place > 1 else None
         if before is None or before.kind is not CallKind.GOOD or found.t_ns > episode.asked_ns:
             return False
-        return not any(shape_of(o.text) in going for o in before.sure)
+        return not any(text_of(o) in going.texts for o in before.sure)
+
+    def _unshown(self, episode: Episode, words: Words, evidence: dict[str, object]) -> Finding:
+        reason = f"{self.process}: {_nothing_of_its_own(self, words)}, so it does not show that it keeps still after "
+        reason += _SAID[episode.kind]
+        hint = "say that it goes on in the branch for numbers above the limit, and only there"
+        return not_met(reason, evidence, hint=hint, blocked_by="reacts_to_responses", problem=ProblemKind.WRONG_ANSWER)
 
     def _went_on(self, episode: Episode, found: Output, evidence: dict[str, object]) -> Finding:
         what = _SAID[episode.kind]
@@ -409,13 +433,17 @@ def _episodes(check: ReactsToResponses | NoGoWithoutAnswer, trace: Trace) -> tup
     return episodes_of(trace, check.process, check.service, reading)
 
 
+def _nothing_of_its_own(check: ReactsToResponses | NoGoWithoutAnswer, words: Words) -> str:
+    """Return a clause: a client writes nothing that only follows numbers above the threshold."""
+    text = f"it writes nothing after numbers above {number(check.threshold)} that it does not write after others too"
+    if words.shared is None:
+        return text
+    output, value = words.shared
+    return f"{text} ({quote(output.text, 80)!r} follows {number(value)})"
+
+
 def _lines(outputs: Sequence[Output], known: set[str]) -> list[OutputLine]:
     return [o for o in outputs if isinstance(o, OutputLine) and shape_of(o.text) not in known]
-
-
-def _quotes(output: Output, episode: Episode) -> bool:
-    shown = "" if episode.number is None else number(episode.number)
-    return bool(episode.text and episode.text in output.text) or bool(shown and shown in output.text)
 
 
 def _not_asked(trace: Trace, process: str, service: str) -> Finding:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from functools import partial
+from itertools import pairwise
 
 from grader.core.chart import Chart, Look, Panel, Tone
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
-from grader.core.trace import Endpoint, Trace
+from grader.core.trace import ClockKind, Endpoint, Message, Trace
 from grader.judging.charts import plain_topic, points_of, series, time_chart, written_in_lane
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.findings import (
@@ -26,6 +29,7 @@ from grader.judging.output import (
     LoggedNumbers,
     Output,
     Sought,
+    after,
     followed,
     in_window,
     numbers_in,
@@ -81,6 +85,8 @@ class LogsValues:
         field: Path of the number.
         unit_factors: Factors by which the number is multiplied; all of the products must be logged.
         share: Share of the messages that must be logged.
+        units: Factors of units by the beginnings of the words that name them after a number, such as `{rad: 1}`; two
+            products that name each other's units for every message do not count. No unit needs to be named.
     """
 
     process: str
@@ -88,6 +94,7 @@ class LogsValues:
     field: str = "data"
     unit_factors: tuple[float, ...] = (1.0,)
     share: float = 1.0
+    units: Mapping[str, float] = dataclass_field(default_factory=dict)
 
     @property
     def expected(self) -> str:
@@ -109,6 +116,10 @@ class LogsValues:
         records = student_records(trace, self.process)
         unlogged = self._unlogged(received, records)
         evidence = self._evidence(received, unlogged)
+        if swapped := self._swapped_units(received, records):
+            return not_met(
+                swapped, evidence, hint="name the unit that each number has", problem=ProblemKind.WRONG_VALUE
+            )
         if self._enough(received, unlogged):
             return met(f"{self._said(received, unlogged)} logged{self._example(received, records)}", evidence)
         lines = printed_lines(trace, self.process)
@@ -126,6 +137,28 @@ class LogsValues:
             return _hidden(self, share, (first.value, first.t_ns), among, evidence)
         outputs = records if any(numbers_in(r.text) for r in records) else lines
         return self._explain(received, absent, outputs, self._evidence(received, absent))
+
+    def _swapped_units(self, received: Sequence[_Received], outputs: Sequence[Output]) -> str:
+        """Return that two products of every message are followed by each other's units; empty if they are not."""
+        others = [f for f in dict.fromkeys(self.units.values()) if f not in self.unit_factors]
+        for mine, other in ((f, o) for f in self.unit_factors for o in others):
+            if all(
+                self._named(one, outputs, mine, other) and self._named(one, outputs, other, mine) for one in received
+            ):
+                first = received[0]
+                found = quote(" / ".join(o.text for o in in_window(outputs, first.t_ns, first.stop_ns)), 80)
+                numbers_ = f"{number(mine * first.value)} and {number(other * first.value)}"
+                return f"{self.process}: {numbers_} have each other's units, as in {found!r}; so at every message"
+        return ""
+
+    def _named(self, one: _Received, outputs: Sequence[Output], factor: float, unit: float) -> bool:
+        """Return whether a product of a message is followed by the name of a unit, wherever it is logged."""
+        words = tuple(word for word, f in self.units.items() if f == unit)
+        return any(
+            shows_about(n, factor * one.value, coarsest=math.inf) and after(o.text, n).lower().startswith(words)
+            for o in in_window(outputs, one.t_ns, one.stop_ns)
+            for n in numbers_in(o.text)
+        )
 
     def _received(self, trace: Trace) -> list[_Received]:
         jitter_ns = JITTER_NS[trace.clock]
@@ -213,6 +246,8 @@ class LogsValues:
         if len(silent) > len(received) / 2:
             return f"nothing is logged at {len(silent)} of the messages", rule
         logged = [LoggedNumbers(r.value, self._numbers(r, outputs)) for r in received]
+        if any(self._behind(logged, f) for f in self.unit_factors):
+            return "each log has the number of the message before", "store the number before you log it, not after"
         largest = max(abs(r.value) for r in received)
         right = [f for f in self.unit_factors if self._mostly(logged, f, _FINE * abs(f) * largest)]
         for factor in (f for f in self.unit_factors if f not in right):
@@ -226,6 +261,15 @@ class LogsValues:
     def _numbers(self, one: _Received, outputs: Sequence[Output]) -> tuple[Printed, ...]:
         return tuple(n for o in in_window(outputs, one.t_ns, one.stop_ns) for n in numbers_in(o.text))
 
+    def _behind(self, logged: Sequence[LoggedNumbers], factor: float) -> bool:
+        """Return whether each product but the first is logged one message too late."""
+
+        def shows(here: LoggedNumbers, value: float) -> bool:
+            return any(shows_about(n, factor * value, coarsest=_FINE * abs(factor * value)) for n in here.numbers)
+
+        pairs = [(a, b) for a, b in pairwise(logged) if a.value != b.value]
+        return bool(pairs) and all(shows(b, a.value) and not shows(b, b.value) for a, b in pairs)
+
     def _mostly(self, logged: Sequence[LoggedNumbers], factor: float, coarsest: float) -> bool:
         hits = sum(any(shows_about(n, factor * h.value, coarsest=coarsest) for n in h.numbers) for h in logged)
         return hits > 0.8 * len(logged)
@@ -237,6 +281,10 @@ def _shows(value: float, largest: float, printed: Printed) -> bool:
 
 #: A value that lasted less than this need not be logged.
 _SHORTEST_NS = 1_200 * NS_PER_MS
+#: Fewest numbers whose changes show that a process is always one message behind.
+_CHANGES = 3
+#: Largest share of the messages at whose instants a process that logs from its callback may publish, or not log.
+_IN_STEP = 0.1
 _PRINT_HINT = "write the received values through the node's logger: self.get_logger().info(...)"
 
 
@@ -276,6 +324,10 @@ class LogsReceived:
         unlogged = _missing(values, followed(records, sought), trace)
         evidence: dict[str, object] = {"values": [v.value for v in values], "missing": [v.value for v in unlogged]}
         if not unlogged:
+            if behind := self._behind(trace, values, records):
+                return not_met(
+                    behind, evidence, hint="store the number before you log it, not after", problem=ProblemKind.BEHIND
+                )
             reason = f"{self.process}: all {len(values)} values of {self.topic} are logged"
             return met(f"{reason} ({numbers(v.value for v in values)})", evidence)
         if not _missing(values, followed([*records, *printed_lines(trace, self.process)], sought), trace):
@@ -291,6 +343,34 @@ class LogsReceived:
         among = surroundings(records, sought[values.index(unlogged[0])])
         share = f"{len(unlogged)} of {len(values)} values"
         return _hidden(self, share, (unlogged[0].value, unlogged[0].start_ns), among, evidence)
+
+    def _behind(self, trace: Trace, values: Sequence[Held], records: Sequence[Output]) -> str:
+        """Return that a process logs at each message, but the number of the message before; empty if it does not.
+
+        Only virtual time tells a log in the callback of the subscription from one in a timer's.
+        """
+        sent = {r.t_ns for r in delivered_numbers(trace, self.topic) if r.t_ns >= values[0].start_ns}
+        ticks = {m.t_ns for m in trace.of(Message)}
+        if trace.clock is not ClockKind.VIRTUAL or len(values) < _CHANGES or len(sent & ticks) > _IN_STEP * len(sent):
+            return ""
+        found: dict[int, list[Printed]] = {}
+        for record in records:
+            if record.t_ns in sent:
+                found.setdefault(record.t_ns, []).extend(numbers_in(record.text))
+
+        def shows(t_ns: int, value: float) -> bool:
+            return any(n.shows(value) for n in found.get(t_ns, ()))
+
+        changes = [(new.start_ns, old.value, new.value) for old, new in pairwise(values)]
+        if len(found) <= (1 - _IN_STEP) * len(sent) or not all(
+            shows(t, old) and not shows(t, new) for t, old, new in changes
+        ):
+            return ""
+        t_ns, old, new = changes[0]
+        return (
+            f"{self.process}: it logs at each message on {self.topic}, but the number of the message before: "
+            f"{number(old)} at {moment(t_ns)}, when {number(new)} came"
+        )
 
     def _no_values(self, trace: Trace, subscriptions: Sequence[Endpoint]) -> Finding:
         types = [e.type for e in subscriptions]
