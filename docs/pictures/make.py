@@ -62,7 +62,7 @@ def main() -> None:
         subprocess.run(batch, cwd=folder, env=env, check=False)
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium") or shutil.which("google-chrome"))
         shoot(browser, folder / "report.html", "report_light.png", 1230)
-        shoot(browser, folder / "report.html", "report_dark.png", 1230, at="figure")
+        shoot(browser, folder / "report.html", "report_dark.png", 900, at="#odom_subscriber .recording")
         shoot(browser, folder / "results" / "index.html", "class_index.png", 1400)
         browser.close()
 
