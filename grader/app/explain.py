@@ -72,7 +72,7 @@ def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation 
 
 
 def _pairs(rubrics: tuple[Path, ...]) -> list[tuple[Exercise, Criterion]]:
-    exercises = read_exercises(GradeRequest("", every=True, rubrics=rubrics, draw=First()))
+    exercises = read_exercises(GradeRequest("", every=True, rubrics=rubrics, draw=First()), recorded=True)
     return [(e, c) for e in exercises for c in e.criteria]
 
 

@@ -15,7 +15,7 @@ from grader.app.kept_recordings import PlannedRun, kept_traces, plays_odometry, 
 from grader.app.request import GradeRequest, recording_digest, reproduction, request_to_json
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
-from grader.core.errors import EvidenceError, SubmissionError
+from grader.core.errors import EnvironmentFault, EvidenceError, SubmissionError
 from grader.core.exercise import Exercise, exercise_name
 from grader.core.releases import TRIED
 from grader.core.report import Environment, Report
@@ -26,11 +26,13 @@ from grader.execution.bag import Odometry, read_odometry
 from grader.execution.evidence.store import check_place, keep, open_evidence
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
+from grader.execution.ros_installation import find_ros
 from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
 from grader.reporting.json_report import dumps
 from grader.rubrics.builtin import builtin_exercises, builtin_odometry, compiled, exercise_ids
+from grader.rubrics.interfaces import Interfaces
 from grader.rubrics.loader import read_rubric
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import read_reaches, read_sources
@@ -187,14 +189,30 @@ def _record_one(session: RecordingSession, progress: Progress, budget: RealTimeB
     return session.recorder.record([replace(job, budget=budget)], progress)[0]
 
 
-def read_exercises(request: GradeRequest, submissions: Sequence[Path] = ()) -> list[Exercise]:
+@cache
+def installed_interfaces() -> Interfaces | None:
+    """Return the message, service and action types that nodes can use; None without ROS."""
+    try:
+        return Interfaces(find_ros().share)
+    except EnvironmentFault:
+        return None
+
+
+def read_exercises(
+    request: GradeRequest, submissions: Sequence[Path] = (), *, recorded: bool = False
+) -> list[Exercise]:
     """Read the exercises to grade, in rubric order; raises RubricError if a rubric or a requested exercise is unusable.
 
-    The submissions are other paths that students control: no rubric may load its own checks from there.
+    Args:
+        request: Names the rubrics and exercises.
+        submissions: Other paths that students control: no rubric may load its own checks from there.
+        recorded: Whether nothing will run, so that rubrics may name message types that are not installed here.
     """
     theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
     if request.rubrics:
-        exercises = [read_rubric(path, submissions=theirs, draw=request.draw) for path in request.rubrics]
+        known = None if recorded else installed_interfaces()
+        read = partial(read_rubric, submissions=theirs, draw=request.draw, interfaces=known)
+        exercises = [read(path) for path in request.rubrics]
     else:
         exercises = list(builtin_exercises())
     chosen = exercise_ids(request.exercises, exercises)

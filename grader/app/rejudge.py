@@ -68,7 +68,8 @@ def judgement(
     chosen: tuple[str, ...], rubrics: tuple[Path, ...], *, pictures: bool = False, verify: bool = False
 ) -> Judgement:
     """Read the rubrics to judge by; raises RubricError for an unusable rubric or an unknown exercise."""
-    exercises = read_exercises(GradeRequest("", every=True, exercises=chosen, rubrics=rubrics, draw=First()))
+    request = GradeRequest("", every=True, exercises=chosen, rubrics=rubrics, draw=First())
+    exercises = read_exercises(request, recorded=True)
     return Judgement(tuple(exercises), chosen, rubrics, pictures, verify)
 
 
@@ -215,7 +216,7 @@ def _as_recorded(exercises: list[Exercise], request: GradeRequest) -> list[Exerc
     if all(exercise.variant is None for exercise in exercises):
         return exercises
     wanted = tuple(exercise.id for exercise in exercises)
-    return read_exercises(replace(request, submission="", exercises=wanted))
+    return read_exercises(replace(request, submission="", exercises=wanted), recorded=True)
 
 
 def _name(folder: Path, root: Path) -> str:

@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from grader.app.grade import installed_interfaces
 from grader.core.errors import RubricError
 from grader.core.exercise import Criterion, Exercise
 from grader.core.quantities import duration
@@ -80,7 +81,7 @@ class Checked:
 
 def check_rubric(path: Path) -> Checked:
     """Check a rubric, and summarise it; raises RubricError with every mistake."""
-    exercise = read_rubric(path, draw=First())
+    exercise = read_rubric(path, draw=First(), interfaces=installed_interfaces())
     where = shown(str(path), 500)
     odd = oddities(exercise, read_yaml(path.read_text(encoding="utf-8-sig")))
     return Checked(f"{where}: {_summary(exercise)}", tuple(f"{where}:{m.line}:{m.column}: {m.text}" for m in odd))

@@ -50,6 +50,8 @@ OF_THE_RUN = ("stamp.sec", "stamp.nanosec")
 ANY: list[dict[str, object]] = [{"when": {}, "then": {}}]
 #: Most distinct inputs to turn into cases, and most fields of an answer.
 _MOST_CASES, _MOST_ANSWER_FIELDS = 8, 8
+#: How many elements of a list can tell inputs apart.
+_MOST_ELEMENTS = 8
 
 
 def cases_seen(trace: Trace, given: str, answered: str) -> list[dict[str, object]]:
@@ -62,7 +64,24 @@ def cases_seen(trace: Trace, given: str, answered: str) -> list[dict[str, object
     if not 0 < len(different) <= _MOST_CASES:
         return ANY
     paths = _telling([answer for answer in answers if answer is not None])
-    return [_case(sent, answer, paths) for sent, answer in different.values()]
+    rows = [_scalars(sent.value) for sent, _ in different.values()]
+    differing = _differing(rows)
+    cases = []
+    for row, (_, answer) in zip(rows, different.values(), strict=True):
+        held = {path: value for path, value in row.items() if path in differing}
+        cases.append(_case(held or {path: value for path, value in row.items() if value}, answer, paths))
+    return cases
+
+
+def _differing(rows: Sequence[Mapping[str, float | str]]) -> list[str]:
+    """Return the first paths that tell every two messages apart; all that differ if none do."""
+    every = [
+        path for path in dict.fromkeys(path for row in rows for path in row) if len({row.get(path) for row in rows}) > 1
+    ]
+    for count in range(1, len(every) + 1):
+        if len({tuple(row.get(path) for path in every[:count]) for row in rows}) == len(rows):
+            return every[:count]
+    return every
 
 
 def texts(value: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
@@ -85,6 +104,8 @@ def _answers(trace: Trace, inputs: tuple[Delivery, ...], answered: str) -> list[
 
 
 def _scalars(value: Mapping[str, object]) -> dict[str, float | str]:
+    """Return every number and text of a message by path, with the first elements of lists."""
+    value = _with_elements(value)
     return {**dict(texts(value)), **{k: v for k, v in leaves(value).items() if not k.endswith(OF_THE_RUN) and v == v}}  # noqa: PLR0124  NaN
 
 
@@ -94,8 +115,18 @@ def _telling(answers: list[Message]) -> list[str]:
     return [path for path in (rows[0] if rows else ()) if any(row.get(path) for row in rows)][:_MOST_ANSWER_FIELDS]
 
 
-def _case(sent: Delivery, answer: Message | None, paths: list[str]) -> dict[str, object]:
-    when = {path: value for path, value in _scalars(sent.value).items() if value}
+def _with_elements(value: Mapping[str, object]) -> dict[str, object]:
+    """Return a message with the first elements of each list as fields: `ranges[0]`."""
+    found: dict[str, object] = {}
+    for name, inner in value.items():
+        if isinstance(inner, (list, tuple)):
+            found |= _with_elements({f"{name}[{n}]": item for n, item in enumerate(inner[:_MOST_ELEMENTS])})
+        else:
+            found[name] = _with_elements(inner) if isinstance(inner, Mapping) else inner
+    return found
+
+
+def _case(when: Mapping[str, object], answer: Message | None, paths: list[str]) -> dict[str, object]:
     if answer is None:
         return {"when": when, "silent": True}
     held = _scalars(answer.value)

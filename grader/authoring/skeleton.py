@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from grader.rubrics.schema import FILE
 from grader.submissions.collected import listed
 
 
@@ -81,6 +83,7 @@ def rubric_text(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]] = (
 
 
 def _lines(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]]) -> Iterator[str]:
+    yield f"# yaml-language-server: $schema={FILE}"
     files = listed(draft.files, "and")
     yield from _comment(f"A skeleton, made of what {files} did. What is marked `decide:` only you can know.")
     yield from _comment("`grade rubric check` says whether it can be used, `grade rubric explain` what it asks.")
@@ -172,6 +175,8 @@ def _value(value: object) -> str:
 
 
 def _number(value: float) -> str:
+    if not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
     if float(value).is_integer() and abs(value) < 1e15:
         return str(int(value))
     short = f"{value:.6g}"

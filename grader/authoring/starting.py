@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
-from grader.app.grade import Progress
+from grader.app.grade import Progress, installed_interfaces
 from grader.app.observe import ObserveRequest, watch
 from grader.authoring.questions import Seen, parameters, questions
 from grader.authoring.skeleton import (
@@ -30,7 +30,7 @@ from grader.judging.checks import CHECKS
 from grader.judging.findings import fault_sentence
 from grader.judging.values import carries_number, student_endpoints
 from grader.judging.wording import quote
-from grader.rubrics.loader import read_rubric
+from grader.rubrics.loader import RubricMistakes, read_rubric
 from grader.rubrics.yaml_tree import YamlSyntaxError, read_yaml
 
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -180,9 +180,16 @@ def _begun(trace: Trace, request: ObserveRequest, id_: str, given: SentMessages)
 
 
 def _scenario_of(draft: Draft) -> Scenario:
-    """Return the scenario of a draft, which must have at least one criterion to be read."""
+    """Return the scenario of a draft, which must have at least one criterion to be read.
+
+    Raises GraderError if a message to send has a field or a value that its type has not.
+    """
     asked = DraftCriterion("any", "Any", "uses_logger", {"process": draft.files[0]}, "any")
-    (scenario,) = _read(rubric_text(replace(draft, criteria=(asked,)))).scenarios
+    try:
+        (scenario,) = _read(rubric_text(replace(draft, criteria=(asked,)))).scenarios
+    except RubricMistakes as error:
+        first = error.mistakes[0]
+        raise GraderError(f"--send: {first.text}", first.hint) from None
     return scenario
 
 
@@ -190,7 +197,7 @@ def _read(text: str) -> Exercise:
     with tempfile.TemporaryDirectory(prefix="grade-new-") as folder:
         path = Path(folder) / "rubric.yaml"
         path.write_text(text, encoding="utf-8")
-        return read_rubric(path)
+        return read_rubric(path, interfaces=installed_interfaces())
 
 
 def _window_s(trace: Trace, duration_s: float) -> float:

@@ -117,10 +117,12 @@ def _new(  # noqa: PLR0913  one parameter an option
     """Run the FILEs of a reference solution, and write a rubric that asks for what they do.
 
     It is a skeleton: comments tell what was seen, and what its author has to decide. The reference meets all of it.
+    With -o, rubric.schema.json is written beside it, with which editors complete and check it.
     """
     from grader.app.observe import ObserveRequest
     from grader.authoring.starting import new_rubric
     from grader.reporting.escape import shown
+    from grader.rubrics.schema import FILE, schema_text
 
     if output is not None and output.exists():
         raise GraderError(f"{output}: expected a new file, found one that is there", "name another, or remove it")
@@ -133,6 +135,9 @@ def _new(  # noqa: PLR0913  one parameter an option
         print_for_programs(skeleton.text)
     else:
         write_file(output, skeleton.text.encode())
+        schema = output.with_name(FILE)
+        if not schema.exists():
+            write_file(schema, schema_text().encode())
         rows = "criterion" if skeleton.criteria == 1 else "criteria"
         click.echo(
             f"{shown(str(output))}: {skeleton.criteria} {rows}, all of them met; {skeleton.left_out} in comments"

@@ -69,6 +69,8 @@ class Kind:
     name: str
 
 
+#: A number that may be written as `.inf`, `-.inf` or `.nan`, because fields can hold these.
+FieldNumber = Annotated[float, Kind("field number")]
 #: An absolute topic, service or node name.
 Topic = Annotated[str, Kind("topic")]
 #: A message type such as `std_msgs/msg/Float32`.
@@ -81,3 +83,20 @@ ActionType = Annotated[str, Kind("action type")]
 Formula = Annotated[str, Kind("formula")]
 #: A regular expression.
 Pattern = Annotated[str, Kind("pattern")]
+
+
+@dataclass(frozen=True, slots=True)
+class FieldOf:
+    """Marks a field path, or a mapping by field paths, of what a check's parameter names: `linear.x`, `ranges[0]`.
+
+    Attributes:
+        parameter: The parameter that names the topic, service or action.
+        part: The part of a service or action that has the field: `_Request`, `_Response`, `_Result` or `_Feedback`.
+        values: For a mapping whose values are field paths as well: the parameter that names where these are.
+        unless: A word that stands for no field.
+    """
+
+    parameter: str
+    part: str = ""
+    values: str = ""
+    unless: str = ""

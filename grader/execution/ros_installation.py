@@ -64,6 +64,7 @@ class RosInstallation:
         distro: Name of the ROS release, e.g. `jazzy`.
         rclpy_version: Version of rclpy, e.g. `7.1.6`.
         prefix: Root folder of the installation.
+        share: The folders that hold packages' shared files, such as the definitions of their messages.
     """
 
     runtime: PythonRuntime
@@ -71,6 +72,7 @@ class RosInstallation:
     distro: str
     rclpy_version: str
     prefix: Path
+    share: tuple[Path, ...]
 
 
 def find_ros(environment: Mapping[str, str] | None = None) -> RosInstallation:
@@ -115,6 +117,7 @@ def _find_sourced(environment: Mapping[str, str]) -> RosInstallation | None:
     libraries = _below(siblings, _paths(environment.get("LD_LIBRARY_PATH", ""))) or tuple(
         other / "lib" for other in siblings
     )
+    share = tuple(other / "share" for other in siblings)
     python_paths = tuple(path for other in siblings for path in _python_folders(other, searched))
     runtime = PythonRuntime(
         executable=EXECUTABLE,
@@ -129,7 +132,7 @@ def _find_sourced(environment: Mapping[str, str]) -> RosInstallation | None:
             **NO_BOOTSTRAP,
         },
     )
-    return RosInstallation(runtime, "sourced", distro, _version_of_rclpy(prefix, folder), prefix)
+    return RosInstallation(runtime, "sourced", distro, _version_of_rclpy(prefix, folder), prefix, share)
 
 
 def _find_wheels() -> RosInstallation | None:
@@ -158,7 +161,7 @@ def _find_wheels() -> RosInstallation | None:
         environment={"ROS_DISTRO": distro, **NO_BOOTSTRAP},
     )
     version = importlib.metadata.Distribution.at(wheel).version
-    return RosInstallation(runtime, "wheels", distro, version, prefix)
+    return RosInstallation(runtime, "wheels", distro, version, prefix, (prefix / "share",))
 
 
 def _require_this_python(prefix: Path, folder: Path) -> None:

@@ -19,8 +19,7 @@ from grader.judging.texts import (
     template_of,
     with_decimal_points,
 )
-from grader.judging.values import JITTER_NS, delivered, per_trace
-from grader.judging.values import field as number_in
+from grader.judging.values import JITTER_NS, delivered, number_at, per_trace
 
 #: How long a pose stays acceptable after the next one arrived: a slow loop may read from a queue.
 STALE_NS = 500 * NS_PER_MS
@@ -116,7 +115,7 @@ def track_of(trace: Trace, topic: str) -> Track | None:
 
 
 def _number(fields: Mapping[str, object], path: str) -> float:
-    found = number_in(fields, path)
+    found = number_at(fields, path)
     return _NAN if found is None else found
 
 

@@ -10,7 +10,7 @@ from functools import lru_cache, wraps
 from types import MappingProxyType
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from grader.core.quantities import NS_PER_MS, SLACK, Pattern, within
+from grader.core.quantities import NS_PER_MS, SLACK, FieldNumber, Pattern, within
 from grader.core.trace import ClockKind, Delivery, Endpoint, Message, Trace
 from grader.judging.wording import number, quote
 
@@ -127,19 +127,9 @@ def held(trace: Trace, topic: str, *, heard_from_ns: int = 0) -> tuple[Held, ...
     return tuple(Held(start.t_ns, stop, start.value) for start, stop in zip(starts, stops, strict=True))
 
 
-def field(value: Mapping[str, object], path: str) -> float | None:
-    """Return the number at a path such as `linear.x`, or None if there is none."""
-    here: object = value
-    for name in _names(path):
-        if not isinstance(here, (dict, Mapping)) or name not in here:  # the check for dict is much faster
-            return None
-        here = here[name]
-    return as_number(here)
-
-
 @lru_cache(maxsize=256)
 def _names(path: str) -> tuple[str, ...]:
-    return tuple(path.split("."))
+    return tuple(re.sub(r"\[([0-9]+)\]", r".\1", path).split("."))
 
 
 def leaves(value: Mapping[str, object], prefix: str = "") -> dict[str, float]:
@@ -158,10 +148,15 @@ class NoSuchField(KeyError):  # noqa: N818 - says what is missing, and never end
 
 
 def at_path(value: Mapping[str, object], path: str) -> Any:
-    """Return the part of a value at a path, with list elements counted from 0; raises NoSuchField if there is none."""
+    """Return the part of a value at a path; raises NoSuchField if there is none.
+
+    Args:
+        value: The fields of a message.
+        path: Names joined by dots, with list elements counted from 0: `linear.x`, `ranges[0]` or `ranges.0`.
+    """
     here: object = value
     for name in _names(path):
-        if isinstance(here, Mapping) and name in here:
+        if isinstance(here, (dict, Mapping)) and name in here:  # the check for dict is much faster
             here = here[name]
         elif isinstance(here, (list, tuple)) and name.isdecimal() and len(name) < 9 and int(name) < len(here):
             here = here[int(name)]
@@ -194,6 +189,13 @@ _LONGEST = 2_000
 _YES_OR_NO = MappingProxyType({"yes": True, "no": False})
 
 
+def equals(got: float, want: float, tolerance: float) -> bool:
+    """Return whether a field has a value within a tolerance; infinities and NaN equal only themselves."""
+    if math.isfinite(want):
+        return within(got, want, tolerance)
+    return got == want or (math.isnan(got) and math.isnan(want))
+
+
 @dataclass(frozen=True, slots=True)
 class FieldRule:
     """The rule for one field; all given parameters apply.
@@ -205,16 +207,16 @@ class FieldRule:
         example: A matching text, shown instead of the pattern.
     """
 
-    equals: str | float | bool | None = None
-    items: tuple[str | float | bool, ...] | None = None
+    equals: str | FieldNumber | bool | None = None
+    items: tuple[str | FieldNumber | bool, ...] | None = None
     tolerance: float = 1e-6
-    low: float | None = None
-    high: float | None = None
+    low: FieldNumber | None = None
+    high: FieldNumber | None = None
     pattern: Pattern | None = None
     example: str | None = None
 
     def allows(self, value: object) -> bool:
-        """Return whether a field may hold a value; NaN is in no range and equals nothing."""
+        """Return whether a field may hold a value; NaN is in no range and equals only NaN."""
         equal = self.equals is None or self._equal(value, self.equals)
         return equal and self._listed(value) and self._in_range(value) and self._of_form(value)
 
@@ -224,7 +226,7 @@ class FieldRule:
         if isinstance(wanted, (bool, str)):
             return type(value) is type(wanted) and value == wanted
         got = as_number(value)
-        return got is not None and within(got, wanted, self.tolerance)
+        return got is not None and equals(got, wanted, self.tolerance)
 
     def _listed(self, value: object) -> bool:
         if self.items is None:
@@ -268,7 +270,7 @@ class FieldRule:
 
 
 #: A rule, or just the expected value.
-RuleOrValue = str | float | bool | FieldRule
+RuleOrValue = str | FieldNumber | bool | FieldRule
 
 
 def as_rule(rule: RuleOrValue, tolerance: float = 1e-6) -> FieldRule:

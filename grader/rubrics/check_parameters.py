@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, 
 from pydantic import AfterValidator, Field, create_model
 from pydantic.config import JsonDict
 
-from grader.core.quantities import DurationNs, Hertz, Kind, Least, Unit
+from grader.core.quantities import DurationNs, FieldOf, Hertz, Kind, Least, Unit
 from grader.rubrics.drawing import (
     Calls,
     CallsOrNever,
@@ -31,6 +31,7 @@ from grader.rubrics.types import (
     ActionType,
     Choice,
     Duration,
+    FieldNumber,
     FormulaText,
     Frequency,
     LongDuration,
@@ -77,6 +78,7 @@ _BY_KIND: Mapping[str, object] = {
     "message type": MessageType,
     "service type": ServiceType,
     "action type": ActionType,
+    "field number": FieldNumber,
     "formula": FormulaText,
     "pattern": PatternText,
     "time": SomeTime,
@@ -161,6 +163,8 @@ def _is_required(field: dataclasses.Field[object]) -> bool:
 
 def _accepted(annotation: object, name: str = "") -> object:
     """Return the type that a rubric may hold for a dataclass field: its annotation, made strict and given units."""
+    if _mark(annotation, FieldOf):
+        annotation = get_args(annotation)[0]
     if annotation is str:
         return _BY_NAME.get(name, Text)
     for known, accepted in _BY_ANNOTATION:

@@ -27,6 +27,7 @@ from grader.core.scenario import (
 from grader.rubrics.types import (
     Choice,
     Duration,
+    FieldNumber,
     LongDuration,
     MatchingText,
     Real,
@@ -48,8 +49,6 @@ def _rising(low_high: tuple[float, float]) -> bool:
     return low_high[0] < low_high[1]
 
 
-#: Unlike the numbers of checks, a field may be `.nan` or `.inf`: sensors send them.
-FieldNumber = Annotated[float, Strict()]
 FieldName = Annotated[str, MatchingText("[a-z][A-Za-z0-9_]*", "the name of a field such as data", "data")]
 LowHigh = Annotated[tuple[Real, Real], must(_rising, "two numbers, the lower one first")]
 Option = Annotated[str, Strict()] | YesNo | Whole | FieldNumber

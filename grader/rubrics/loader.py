@@ -28,6 +28,7 @@ from grader.core.scenario import (
     shortest,
 )
 from grader.judging.checks import CHECKS
+from grader.rubrics.interfaces import Interfaces, interface_mistakes
 from grader.rubrics.mistakes import mistakes_of, nearest
 from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, feedback_of, rubric_model
 from grader.rubrics.own_checks import OwnFile, digest_of, load, named_files, own_files
@@ -178,6 +179,7 @@ def read_rubric(
     checks: Mapping[str, type] = CHECKS,
     submissions: Sequence[Path] = (),
     draw: Draw | None = None,
+    interfaces: Interfaces | None = None,
 ) -> Exercise:
     """Read a rubric file; its own checks, if any, are run.
 
@@ -186,6 +188,7 @@ def read_rubric(
         checks: Checks that the rubric may use, besides its own.
         submissions: Folders that students write to: checks are never loaded from there.
         draw: Chooses the values of variants; without it, a rubric with variants is rejected.
+        interfaces: The installed types, which the rubric's types and field paths must be among; not checked if None.
 
     Raises:
         RubricError: The file cannot be read, or has mistakes; one line each, in the order of the file.
@@ -196,12 +199,12 @@ def read_rubric(
     checks = {**checks, **load(files, checks)}
     digest = digest_of(content, files)
     if not has_variants(tree):
-        return _exercise(path, tree, checks, digest)
+        return _exercise(path, tree, checks, digest, interfaces)
     options = options_of(_validated(path, tree, Variants))
     known = {option.name: option.value(0) for option in options}
-    nobodys = _exercise(path, with_values(tree, known), checks, digest)
+    nobodys = _exercise(path, with_values(tree, known), checks, digest, interfaces)
     for values in tried(options, known) if draw is None or isinstance(draw, First) else ():
-        _exercise(path, with_values(tree, values), checks, digest)
+        _exercise(path, with_values(tree, values), checks, digest, interfaces)
     variant = _variant(path, tree, nobodys, options, draw)
     exercise = _exercise(path, with_values(tree, dict(variant.values)), checks, varied_digest(digest, variant))
     return replace(exercise, variant=variant)
@@ -223,10 +226,14 @@ def _variant(
     return Variant(draw.student, tuple((name, value) for name, value in values if value is not None))
 
 
-def _exercise(path: Path, tree: YamlTree, checks: Mapping[str, type], digest: str) -> Exercise:
+def _exercise(
+    path: Path, tree: YamlTree, checks: Mapping[str, type], digest: str, interfaces: Interfaces | None = None
+) -> Exercise:
     rubric = _validated(path, tree, rubric_model(tuple(checks.items())))
     mistakes = [*tree.mistakes, *broken_links(rubric, tree)]
     criteria = tuple(_criteria(rubric, tree, mistakes))
+    if interfaces is not None:
+        mistakes += interface_mistakes(rubric, tree, interfaces)
     if mistakes:
         _refuse(path, mistakes)
     limits = build(rubric.limits)

@@ -16,6 +16,10 @@ from grader.judging.checks import CHECKS
 from grader.rubrics.model import rubric_model
 from grader.rubrics.variants import REFERENCE
 
+#: The identifier of the schema, the same in every version that reads `grader/rubric/v1`.
+ID = "urn:rclpy-grader:rubric:v1"
+#: The name of the file that rubrics refer to in their first line, for editors.
+FILE = "rubric.schema.json"
 _SCALARS = frozenset({"string", "number", "integer", "boolean"})
 _VARIANT = "VariantReference"
 _REFERS = {"$ref": f"#/$defs/{_VARIANT}"}
@@ -36,7 +40,7 @@ def rubric_schema(checks: Mapping[str, type] = CHECKS) -> JsonSchemaValue:
     schema = rubric_model(tuple(checks.items())).model_json_schema(by_alias=True)
     tidy = _tidy(schema)
     tidy["$defs"] = {name: _varying(name, node) for name, node in tidy["$defs"].items()} | {_VARIANT: _REFERENCE}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **tidy}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": ID, **tidy}
 
 
 def schema_text(checks: Mapping[str, type] = CHECKS) -> str:

@@ -183,6 +183,8 @@ CheckFile = Annotated[
 ]
 Number = Annotated[Text, BeforeValidator(_as_text)]
 Real = Annotated[float, Strict(), AllowInfNan(allow_inf_nan=False)]
+#: Unlike other numbers, a field may be `.nan` or `.inf`: sensors send them.
+FieldNumber = Annotated[float, Strict()]
 Whole = Annotated[int, Strict()]
 YesNo = Annotated[bool, Strict()]
 Duration = Annotated[int, Quantity(Unit("s"))]

@@ -229,3 +229,29 @@ def test_a_message_to_send_has_a_topic_and_fields(text: str) -> None:
     done = CliRunner().invoke(main.app, ["rubric", "new", "a.py", "--send", text])
     assert done.exit_code == 2
     assert "expected TOPIC={field: value}, found something else" in done.stderr
+
+
+def test_inputs_are_told_apart_by_what_differs_between_them() -> None:
+    """By the element of a list if need be; what they have in common says nothing, and infinite ranges are ordinary."""
+    silent = pump().subscription("/scan", "sensor_msgs/msg/LaserScan")
+    driven = pump().subscription("/scan", "sensor_msgs/msg/LaserScan")
+    for t_s, ranges in ((1, [2.0, math.inf]), (3, [2.0, 0.2])):
+        driven.delivery(t_s, "/scan", "sensor_msgs/msg/LaserScan", {"range_max": 10.0, "ranges": ranges})
+        driven.message(t_s + 0.1, "/goal", POSE, {"x": min(ranges), "y": 0.0})
+    _, parameters = asked(driven, alone=silent)["goal_reaction"]
+    assert parameters["cases"] == [
+        {"when": {"ranges[1]": math.inf}, "then": {"x": 2.0}},
+        {"when": {"ranges[1]": 0.2}, "then": {"x": 0.2}},
+    ]
+
+
+@pytest.mark.ros
+def test_a_message_to_send_has_the_fields_of_its_type(tmp_path: Path) -> None:
+    """The reference tells the type; a field that it has not is told like any mistake, and not as a failed run."""
+    code = "import rclpy\nfrom std_msgs.msg import String\nrclpy.init()\nnode = rclpy.create_node('pump')\n"
+    code += "node.create_subscription(String, '/say', print, 10)\nrclpy.spin(node)\n"
+    (tmp_path / "pump.py").write_text(code)
+    done = CliRunner().invoke(main.app, ["rubric", "new", str(tmp_path / "pump.py"), "--send", "/say={dat: hello}"])
+    assert done.exit_code == 2
+    assert "--send: expected a field of std_msgs/msg/String (`data`), found `dat`" in done.stderr
+    assert "did you mean `data`?" in done.stderr

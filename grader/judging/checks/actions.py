@@ -6,18 +6,18 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import DurationNs, seconds
+from grader.core.quantities import DurationNs, FieldOf, seconds
 from grader.core.trace import Message, Trace
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of, calls_of_node
 from grader.judging.values import (
     JITTER_NS,
-    FieldRule,
     NoSuchField,
+    RuleOrValue,
     as_number,
     at_path,
     breach,
@@ -52,7 +52,7 @@ class ActionResult:
 
     action: str
     status: Literal["succeeded", "canceled", "aborted", "rejected"] = "succeeded"
-    result: Mapping[str, str | float | bool | FieldRule] = field(default_factory=dict)
+    result: Annotated[Mapping[str, RuleOrValue], FieldOf("action", "_Result")] = field(default_factory=dict)
     within: DurationNs | None = None
 
     @property
@@ -126,8 +126,8 @@ class ActionFeedback:
     action: str
     at_least: int = 1
     at_most: int | None = None
-    fields: Mapping[str, str | float | bool | FieldRule] = field(default_factory=dict)
-    grows: str | None = None
+    fields: Annotated[Mapping[str, RuleOrValue], FieldOf("action", "_Feedback")] = field(default_factory=dict)
+    grows: Annotated[str, FieldOf("action", "_Feedback")] | None = None
     period: DurationNs | None = None
     tolerance: float = 0.1
 

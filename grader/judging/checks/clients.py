@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Annotated, Literal
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, Pattern, seconds
+from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, Pattern, seconds
 from grader.core.trace import OutputLine, Trace
 from grader.judging.checks.logs import LOGGER_HINT, complained
 from grader.judging.findings import (
@@ -240,8 +240,8 @@ class ReactsToResponses:
     service: str
     threshold: float
     side: Literal["above", "at_or_below", "both"] = "both"
-    field: str = "message"
-    success: str = "success"
+    field: Annotated[str, FieldOf("service", "_Response")] = "message"
+    success: Annotated[str, FieldOf("service", "_Response", unless="none")] = "success"
     pattern: Pattern | None = None
 
     @property
@@ -373,8 +373,8 @@ class NoGoWithoutAnswer:
     process: str
     service: str
     threshold: float
-    field: str = "message"
-    success: str = "success"
+    field: Annotated[str, FieldOf("service", "_Response")] = "message"
+    success: Annotated[str, FieldOf("service", "_Response", unless="none")] = "success"
     pattern: Pattern | None = None
 
     @property

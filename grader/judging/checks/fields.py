@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Annotated, Literal
 
 from grader.core.chart import Band, Chart, Look, Panel
 from grader.core.exercise import Finding, Problem, ProblemKind
-from grader.core.quantities import SLACK, Formula, seconds, within
+from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, seconds, within
 from grader.core.trace import Message, Trace
 from grader.judging.charts import plain_topic, points_of, series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, met, not_met
@@ -19,6 +19,7 @@ from grader.judging.values import (
     JITTER_NS,
     FieldRule,
     Reading,
+    RuleOrValue,
     as_rule,
     breach,
     broken_rules,
@@ -42,7 +43,7 @@ class FieldEqual:
     """
 
     topic: str
-    fields: Mapping[str, str | float | bool | FieldRule]
+    fields: Annotated[Mapping[str, RuleOrValue], FieldOf("topic")]
     tolerance: float = 1e-6
     at_least: int = 1
 
@@ -79,9 +80,9 @@ class FieldInRange:
     """
 
     topic: str
-    low: float | None = None
-    high: float | None = None
-    field: str = "data"
+    low: FieldNumber | None = None
+    high: FieldNumber | None = None
+    field: Annotated[str, FieldOf("topic")] = "data"
     at_least: int = 1
 
     @property
@@ -122,7 +123,7 @@ class FieldMonotone:
 
     topic: str
     direction: Literal["rising", "falling"] = "rising"
-    field: str = "data"
+    field: Annotated[str, FieldOf("topic")] = "data"
     strictly: bool = False
     at_least: int = 3
 
@@ -194,7 +195,7 @@ class FieldFunction:
 
     topic: str
     formula: Formula
-    field: str = "data"
+    field: Annotated[str, FieldOf("topic")] = "data"
     tolerance: float = 1e-6
     start_tolerance: int = 0
     at_least: int = 10

@@ -7,10 +7,10 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
+from typing import Annotated, Literal
 
 from grader.core.exercise import Finding, Location, ProblemKind
-from grader.core.quantities import DurationNs, Pattern, seconds, within
+from grader.core.quantities import DurationNs, FieldOf, Pattern, seconds, within
 from grader.core.trace import LogRecord, Message, Trace
 from grader.judging.findings import (
     explain_fault,
@@ -217,7 +217,7 @@ class LogsEvery:
     process: str
     topic: str
     every: int
-    field: str = "data"
+    field: Annotated[str, FieldOf("topic")] = "data"
 
     @property
     def expected(self) -> str:

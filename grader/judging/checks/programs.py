@@ -5,11 +5,11 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Location, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
+from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, seconds, within
 from grader.core.trace import FaultKind, Message, Trace
 from grader.judging.findings import (
     explain_fault,
@@ -128,7 +128,7 @@ class ParameterTakesEffect:
     name: str
     topic: str
     effect: Literal["field", "rate", "period"] = "field"
-    field: str = "data"
+    field: Annotated[str, FieldOf("topic")] = "data"
     tolerance: float = 0.05
     within: DurationNs = NS_PER_S
     node: str | None = None

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from functools import partial
 from itertools import pairwise
+from typing import Annotated
 
 from grader.core.chart import Chart, Look, Panel, Tone
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
+from grader.core.quantities import NS_PER_MS, NS_PER_S, FieldOf, seconds
 from grader.core.trace import ClockKind, Endpoint, Message, Trace
 from grader.judging.charts import plain_topic, points_of, series, time_chart, written_in_lane
 from grader.judging.checks.logs import LOGGER_HINT
@@ -91,7 +92,7 @@ class LogsValues:
 
     process: str
     topic: str
-    field: str = "data"
+    field: Annotated[str, FieldOf("topic")] = "data"
     unit_factors: tuple[float, ...] = (1.0,)
     share: float = 1.0
     units: Mapping[str, float] = dataclass_field(default_factory=dict)

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
+from typing import Annotated
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, Pattern, ServiceType, seconds, within
+from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, Pattern, ServiceType, seconds, within
 from grader.core.trace import Response, Trace
 from grader.judging.findings import explain_fault, explain_no_server, first_fault, met, not_met, waiting_for
 from grader.judging.output import number_in
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of
-from grader.judging.values import FieldRule, breach, broken_rules, number_at, rules_text, text_at
+from grader.judging.values import RuleOrValue, breach, broken_rules, number_at, rules_text, text_at
 from grader.judging.wording import counted, moment, number, numbers, quote, span
 
 _RETURN_HINT = "a service callback takes (self, request, response) and ends with return response"
@@ -112,7 +113,7 @@ class ServiceResponse:
     """
 
     service: str
-    fields: Mapping[str, str | float | bool | FieldRule]
+    fields: Annotated[Mapping[str, RuleOrValue], FieldOf("service", "_Response")]
     at_least: int = 1
 
     @property
@@ -200,7 +201,7 @@ class ServiceSequence:
     service: str
     first: float
     step: float
-    field: str = "message"
+    field: Annotated[str, FieldOf("service", "_Response")] = "message"
     floor: float | None = None
     reset_to: float | None = None
     pattern: Pattern | None = None

@@ -7,11 +7,11 @@ from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Literal
+from typing import Annotated, Literal
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
+from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, seconds, within
 from grader.core.trace import Delivery, Message, Trace
 from grader.judging.checks.fields import too_few_messages
 from grader.judging.findings import (
@@ -251,9 +251,9 @@ class ReactionCase:
         silent: Whether no output may come at all.
     """
 
-    when: Mapping[str, str | float | bool | FieldRule]
-    then: Mapping[str, str | float | bool | FieldRule] = field(default_factory=dict)
-    copies: Mapping[str, str] = field(default_factory=dict)
+    when: Annotated[Mapping[str, RuleOrValue], FieldOf("input")]
+    then: Annotated[Mapping[str, RuleOrValue], FieldOf("output")] = field(default_factory=dict)
+    copies: Annotated[Mapping[str, str], FieldOf("output", values="input")] = field(default_factory=dict)
     silent: bool = False
 
     def rules(self, given: Mapping[str, object]) -> dict[str, RuleOrValue]:

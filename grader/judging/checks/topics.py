@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 from grader.core.chart import Chart, Level, Look, Panel, Point, Tone
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import SLACK, Hertz, seconds, within
+from grader.core.quantities import SLACK, FieldNumber, FieldOf, Hertz, seconds, within
 from grader.core.trace import Endpoint, Message, Trace
 from grader.judging.charts import series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, explain_no_subscription, met, not_met
-from grader.judging.values import field, leaves, number_at, published, student_endpoints, text_at
+from grader.judging.values import equals, leaves, number_at, published, student_endpoints, text_at
 from grader.judging.wording import counted, listed, moment, number, numbers, quote
 
 
@@ -102,7 +103,7 @@ class FieldValues:
     """
 
     topic: str
-    values: Mapping[str, float]
+    values: Annotated[Mapping[str, FieldNumber], FieldOf("topic")]
     tolerance: float = 1e-6
 
     @property
@@ -136,8 +137,8 @@ class FieldValues:
         return wrong
 
     def _wrong_fields(self, message: Message) -> dict[str, float | None]:
-        got = {path: field(message.value, path) for path in self.values}
-        return {p: g for p, g in got.items() if g is None or not within(g, self.values[p], self.tolerance)}
+        got = {path: number_at(message.value, path) for path in self.values}
+        return {p: g for p, g in got.items() if g is None or not equals(g, self.values[p], self.tolerance)}
 
     def _differs(self, wrong: list[Message], total: int) -> Finding:
         first = wrong[0]
@@ -177,8 +178,8 @@ class FieldValues:
 
     def _misplaced(self, message: Message, path: str, want: float) -> str:
         for other, value in leaves(message.value).items():
-            free = other not in self.values or not within(value, self.values[other], self.tolerance)
-            if other != path and free and within(value, want, self.tolerance):
+            free = other not in self.values or not equals(value, self.values[other], self.tolerance)
+            if other != path and free and equals(value, want, self.tolerance):
                 return f"{number(want)} is in {quote(other)}; it belongs in {path}"
         return ""
 
@@ -220,12 +221,13 @@ def _field_panel(check: FieldValues, messages: tuple[Message, ...], group: str) 
     for place, path in enumerate(check.values):
         points: list[Point] = []
         for message in messages:
-            got = field(message.value, path)
+            got = number_at(message.value, path)
             points.append((seconds(message.t_ns), _NAN if got is None else got))
         look = Look.LINE if len(points) > 1 else Look.DOTS
         lines.append(series(path, points, look=look, tone=_TONES[place % len(_TONES)]))
     wanted = {w: [p for p, v in check.values.items() if v == w] for w in dict.fromkeys(check.values.values())}
-    levels = tuple(Level(w, f"{', '.join(paths)} = {number(w)}") for w, paths in wanted.items())
+    finite = {w: paths for w, paths in wanted.items() if math.isfinite(w)}
+    levels = tuple(Level(w, f"{', '.join(paths)} = {number(w)}") for w, paths in finite.items())
     same = all("." in path and path.startswith(f"{group}.") for path in check.values)
     return Panel(group if same else "value", _UNITS.get(group, "") if same else "", tuple(lines), levels=levels)
 
@@ -233,8 +235,8 @@ def _field_panel(check: FieldValues, messages: tuple[Message, ...], group: str) 
 def _describe_fields(check: FieldValues, messages: tuple[Message, ...]) -> str:
     parts = []
     for path, want in check.values.items():
-        got = [g for g in (field(m.value, path) for m in messages) if g is not None]
-        right = sum(within(g, want, check.tolerance) for g in got)
+        got = [g for g in (number_at(m.value, path) for m in messages) if g is not None]
+        right = sum(equals(g, want, check.tolerance) for g in got)
         spread = f", from {number(min(got))} to {number(max(got))}" if got and right < len(messages) else ""
         parts.append(f"{path} is {number(want)} in {right} of {counted(len(messages), 'message')}{spread}")
     return "; ".join(parts) + "."

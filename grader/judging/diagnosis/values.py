@@ -15,7 +15,7 @@ from grader.judging.checks.topics import FieldValues
 from grader.judging.diagnosis.rules import Case, Clue, rule
 from grader.judging.diagnosis.wiring import Constant, constant, given_leaf, made, made_for, number_at, runs, variable_of
 from grader.judging.source import Source, chain, first_line, last_name, words
-from grader.judging.values import field, leaves, published, published_numbers
+from grader.judging.values import as_number, leaves, published, published_numbers, value_at
 from grader.judging.wording import moment, number
 
 _DRAWS = words(
@@ -49,7 +49,7 @@ class _Wrong:
 def _wrong(case: Case) -> _Wrong | None:
     check: FieldValues = case.check
     for message in published(case.trace, check.topic):
-        got = {path: field(message.value, path) for path in check.values}
+        got = {path: as_number(value_at(message.value, path)) for path in check.values}
         wrong = {p: g for p, g in got.items() if g is not None and not _is(g, check.values[p])}
         if wrong:
             return _Wrong(case, case.source, message, check.values, wrong)

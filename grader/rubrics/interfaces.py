@@ -1,0 +1,351 @@
+"""The installed message, service and action types, and the mistakes of a rubric about them and their fields."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cached_property
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+
+from grader.core.quantities import FieldOf
+from grader.core.scenario import ActionGoal, MessageStream, NumberStream, ServiceCalls, ServiceServer, Stimulus
+from grader.rubrics.mistakes import found, nearest
+from grader.rubrics.model import RubricShape
+from grader.rubrics.types import build
+from grader.rubrics.yaml_tree import Mistake, Position, TreePath, YamlTree
+from grader.submissions.collected import listed, shown
+
+#: Numbers of type_description_interfaces/msg/FieldType: a nested message, integers, floating-point numbers, and so on.
+#: Arrays add 48, bounded sequences 96 and unbounded ones 144.
+_NESTED, _NUMBERS, _BOOLEAN, _TEXTS = 1, range(2, 13), 15, range(17, 23)
+_ARRAY, _SEQUENCE = 48, 96
+#: The part of a service or action that a stimulus or a check holds the fields of.
+_SENT: Mapping[type[Stimulus], tuple[str, str]] = {
+    MessageStream: ("values", ""),
+    ServiceServer: ("responses", "_Response"),
+    ServiceCalls: ("requests", "_Request"),
+    ActionGoal: ("goal", "_Goal"),
+}
+_KINDS = {"msg": "message", "srv": "service", "action": "action"}
+_ORDERS = ("any_order", "in_order", "some_of")
+_INDEX = re.compile(r"\[([0-9]+)\]")
+
+
+class _FieldType(msgspec.Struct):
+    type_id: int
+    capacity: int = 0
+    nested_type_name: str = ""
+
+
+class Field(msgspec.Struct):
+    """A field of a type, as type description files hold it (REP 2016)."""
+
+    name: str
+    type: _FieldType
+
+    @property
+    def is_list(self) -> bool:
+        """Whether it is an array or a sequence."""
+        return self.type.type_id > _ARRAY
+
+    @property
+    def element(self) -> int:
+        """The number of its type, or of the type of its elements."""
+        return self.type.type_id % _ARRAY
+
+    @property
+    def words(self) -> str:
+        """What its value is, e.g. `a list of numbers`."""
+        one, many = {_NESTED: ("a mapping", "mappings"), _BOOLEAN: ("true or false", "true or false")}.get(
+            self.element, ("a number", "numbers") if self.element in _NUMBERS else ("text", "texts")
+        )
+        return f"a list of {many}" if self.is_list else one
+
+
+class _Description(msgspec.Struct):
+    type_name: str
+    fields: list[Field]
+
+
+class _Descriptions(msgspec.Struct):
+    type_description: _Description
+    referenced_type_descriptions: list[_Description]
+
+
+class _File(msgspec.Struct):
+    type_description_msg: _Descriptions
+
+
+class Interfaces:
+    """The types that are installed in some folders.
+
+    Args:
+        folders: The `share` folders of ROS installations; the first one that has a package counts.
+    """
+
+    def __init__(self, folders: Sequence[Path]) -> None:
+        self._folders = folders
+        self._types: dict[str, Mapping[str, Field] | None] = {}
+
+    def fields(self, type_: str) -> Mapping[str, Field] | None:
+        """Return the fields of a type such as `std_srvs/srv/Trigger_Request`, by name; None if it is not installed."""
+        if type_ not in self._types:
+            self._types[type_] = None
+            package, kind, name = type_.split("/")
+            path = Path(package, kind, f"{name.partition('_')[0]}.json")
+            file = next((folder / path for folder in self._folders if (folder / package).is_dir()), None)
+            if file is not None and file.is_file():
+                self._read(file)
+        return self._types[type_]
+
+    def _read(self, file: Path) -> None:
+        """Add the types that a type description file holds; one that cannot be read holds none."""
+        try:
+            read = msgspec.json.decode(file.read_bytes(), type=_File).type_description_msg
+        except (OSError, msgspec.DecodeError):
+            return
+        for one in (read.type_description, *read.referenced_type_descriptions):
+            self._types[one.type_name] = {field.name: field for field in one.fields}
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The installed types, without the parts of services and actions, sorted."""
+        files = (file for folder in self._folders for kind in _KINDS for file in folder.glob(f"*/{kind}/*.json"))
+        return tuple(sorted({f"{file.parts[-3]}/{file.parts[-2]}/{file.stem}" for file in files}))
+
+    def of_kind(self, kind: str) -> list[str]:
+        """Return the installed types of a kind: `msg`, `srv` or `action`."""
+        return [name for name in self.names if name.split("/")[1] == kind]
+
+    def unknown(self, type_: str, where: Position) -> Mistake | None:
+        """Return a mistake if a type is not installed."""
+        if self.fields(type_) is not None:
+            return None
+        package, kind, _ = type_.split("/")
+        packages = {name.partition("/")[0] for name in self.names}
+        if package not in packages:
+            hint = nearest(package, packages) or f"install {package}, or source the ROS installation that has it"
+            return where.mistake(f"expected an installed package, found `{package}`", hint)
+        known = [name for name in self.of_kind(kind) if name.startswith(f"{package}/")]
+        hint = nearest(type_, known) or (f"{package} has {listed([name.rpartition('/')[2] for name in known])}")
+        return where.mistake(f"expected a {_KINDS[kind]} type of {package}, found `{shown(type_)}`", hint)
+
+    def at_path(self, type_: str, path: str) -> Field | str:
+        """Return the field at a path of a type, or the element of a list; a text with what is wrong if there is none.
+
+        The path has list elements counted from 0: `ranges[0]` or `ranges.0`, `poses[2].position.x`.
+        """
+        here: Field | None = None
+        for name in _INDEX.sub(r".\1", path).split("."):
+            if here is not None and here.is_list:
+                if not name.isdecimal():
+                    return f"expected an index such as `{here.name}[0]`, because `{here.name}` is a list"
+                if here.type.type_id < _SEQUENCE and int(name) >= here.type.capacity:
+                    return f"expected an index below {here.type.capacity}, the length of `{here.name}`"
+                element = _FieldType(here.element, 0, here.type.nested_type_name)
+                here = Field(f"{here.name}[{name}]", element)
+                continue
+            if here is not None and here.element != _NESTED:
+                return f"expected no field below `{here.name}`, which is {here.words}"
+            type_ = type_ if here is None else here.type.nested_type_name
+            known = self.fields(type_) or {}
+            if name not in known:
+                return _no_field(type_, known)
+            here = known[name]
+        return here or "expected the path of a field"
+
+
+def _no_field(type_: str, known: Iterable[str]) -> str:
+    # a message without fields has one that no program sees
+    names = [f"`{name}`" for name in known if name != "structure_needs_at_least_one_member"]
+    return f"expected a field of {type_} ({listed(names)})" if names else f"expected no fields of {type_}"
+
+
+def interface_mistakes(rubric: RubricShape, tree: YamlTree, interfaces: Interfaces) -> list[Mistake]:
+    """Return the types that are not installed, and the fields and values that the types do not have."""
+    checked = _Checked(rubric, tree, interfaces)
+    return [*checked.in_scenarios(), *checked.in_criteria()]
+
+
+@dataclass(frozen=True, slots=True)
+class _Named:
+    """A type that a rubric names, and where."""
+
+    type: str
+    where: Position
+
+
+class _Checked:
+    """A rubric whose types are looked up."""
+
+    def __init__(self, rubric: RubricShape, tree: YamlTree, interfaces: Interfaces) -> None:
+        self._rubric = rubric
+        self._tree = tree
+        self._interfaces = interfaces
+        #: Type of each topic, service and action; a topic with numbers has the type that the student's node chooses.
+        self._types: dict[str, set[str]] = {}
+        self._free: set[str] = set()
+        for named, on in (*self._of_stimuli(), *self._of_checks()):
+            if interfaces.fields(named.type) is not None:
+                self._types.setdefault(on, set()).add(named.type)
+
+    def _stimuli(self) -> Iterator[tuple[TreePath, Stimulus]]:
+        for index, scenario in enumerate(self._rubric.scenarios):
+            for number, shape in enumerate(scenario.stimuli):
+                yield ("scenarios", index, "stimuli", number, shape.chosen[0]), build(shape)
+
+    def _checks(self) -> Iterator[tuple[TreePath, Any]]:
+        for index, criterion in enumerate(self._rubric.criteria):
+            name, parameters = criterion.check.chosen
+            try:
+                yield ("criteria", index, "check", name), build(parameters)
+            except ValueError:
+                continue  # a mistake that is found where criteria are built
+
+    def _of_stimuli(self) -> Iterator[tuple[_Named, str]]:
+        for path, stimulus in self._stimuli():
+            where = self._tree.values.get((*path, "type"))
+            if where is None:
+                continue
+            on = _end_of(stimulus)
+            if isinstance(stimulus, NumberStream):
+                self._free.add(on)
+            yield _Named(stimulus.type, where), on  # type: ignore[union-attr]
+
+    def _of_checks(self) -> Iterator[tuple[_Named, str]]:
+        for path, check in self._checks():
+            where, type_ = self._tree.values.get((*path, "type")), getattr(check, "type", None)
+            if where is not None and isinstance(type_, str) and type_.count("/") == 2:
+                yield _Named(type_, where), _end_of(check)
+
+    def in_scenarios(self) -> Iterator[Mistake]:
+        """Yield mistakes in the types and messages of stimuli."""
+        for named, _ in self._of_stimuli():
+            if unknown := self._interfaces.unknown(named.type, named.where):
+                yield unknown
+        for path, stimulus in self._stimuli():
+            key, part = _SENT.get(type(stimulus), ("", ""))
+            type_ = f"{getattr(stimulus, 'type', '')}{part}"
+            if key and (*path, key) in self._tree.values and self._interfaces.fields(type_) is not None:
+                raw = self._raw((*path, key))
+                each = [((*path, key), raw)] if isinstance(raw, Mapping) else _cases(raw, (*path, key))
+                yield from (m for place, value in each for m in self._in_message(value, type_, place))
+
+    def _raw(self, path: TreePath) -> Any:
+        here = self._tree.data
+        for part in path:
+            here = here[part]  # type: ignore[index]
+        return here
+
+    def _in_message(self, value: Mapping[str, object], type_: str, path: TreePath) -> Iterator[Mistake]:
+        known = self._interfaces.fields(type_) or {}
+        for name, inner in value.items():
+            if name not in known:
+                text = f"{_no_field(type_, known)}, found `{shown(name)}`"
+                yield self._tree.at_key((*path, name)).mistake(text, nearest(name, known))
+            else:
+                yield from self._in_value(inner, known[name], (*path, name))
+
+    def _in_value(self, value: object, field: Field, path: TreePath) -> Iterator[Mistake]:
+        if field.is_list and isinstance(value, list):
+            element = Field(field.name, _FieldType(field.element, 0, field.type.nested_type_name))
+            for index, item in enumerate(value):
+                yield from self._in_value(item, element, (*path, index))
+        elif field.element == _NESTED and not field.is_list and isinstance(value, Mapping):
+            yield from self._in_message(value, field.type.nested_type_name, path)
+        elif not _fits(value, field):
+            text = f"expected {field.words} for `{field.name}`, found {found(value)}"
+            yield self._tree.at(path).mistake(text)
+
+    def in_criteria(self) -> Iterator[Mistake]:
+        """Yield mistakes in the types and field paths of checks."""
+        for named, _ in self._of_checks():
+            if unknown := self._interfaces.unknown(named.type, named.where):
+                yield unknown
+        for path, check in self._checks():
+            for place, mark, value in _paths(check, path):
+                if isinstance(value, Mapping):
+                    for key, inner in value.items():
+                        yield from self._at_path(key, check, mark, self._tree.at_key((*place, key)))
+                        if mark.values:
+                            yield from self._at_path(inner, check, FieldOf(mark.values), self._tree.at((*place, key)))
+                elif isinstance(value, str) and place in self._tree.values and value != mark.unless:
+                    yield from self._at_path(value, check, mark, self._tree.at(place))
+
+    def _at_path(self, path: str, check: object, mark: FieldOf, where: Position) -> Iterator[Mistake]:
+        on = getattr(check, mark.parameter, None)
+        named = () if on in self._free else self._types.get(on or "", ())
+        kind = {"action": "action", "service": "srv"}.get(mark.parameter, "msg")
+        types = [f"{type_}{mark.part}" for type_ in named or self._interfaces.of_kind(kind)]
+        answers = [self._interfaces.at_path(type_, path) for type_ in types]
+        if any(isinstance(answer, Field) and (answer.is_list or answer.element != _NESTED) for answer in answers):
+            return
+        answer = answers[0] if named else f"expected a field of an installed {_KINDS[kind]} type"
+        if isinstance(answer, Field):
+            inside = [f"`{path}.{name}`" for name in self._interfaces.fields(answer.type.nested_type_name) or ()]
+            yield where.mistake(f"expected a field with a value ({listed(inside)}), found `{shown(path)}`")
+        else:
+            known = [one for type_ in types for one in self._every_path(type_) if not path.startswith(one)]
+            yield where.mistake(f"{answer}, found `{shown(path)}`", nearest(path, known))
+
+    def _every_path(self, type_: str, prefix: str = "") -> Iterator[str]:
+        for name, field in (self._interfaces.fields(type_) or {}).items():
+            if field.element == _NESTED and not field.is_list:
+                yield from self._every_path(field.type.nested_type_name, f"{prefix}{name}.")
+            else:
+                yield f"{prefix}{name}"
+
+
+def _end_of(part: object) -> str:
+    """Return the topic, service or action that a stimulus or a check is about; empty if none."""
+    return next((getattr(part, name) for name in ("topic", "service", "action") if hasattr(part, name)), "")
+
+
+def _cases(raw: Any, path: TreePath) -> Iterator[tuple[TreePath, Mapping[str, object]]]:
+    """Yield each message of a list of cases, whose order may be drawn."""
+    for index, item in enumerate(raw):
+        order = next((name for name in _ORDERS if name in item), "")
+        if order:
+            yield from _cases(item[order], (*path, index, order))
+        else:
+            yield (*path, index), item
+
+
+def _fits(value: object, field: Field) -> bool:
+    """Return whether a field may hold a value; a mapping for a number or text is a draw, which is checked elsewhere."""
+    if field.is_list or field.element == _NESTED:
+        return False
+    if isinstance(value, Mapping):
+        return True
+    if field.element in _NUMBERS:
+        return isinstance(value, (int, float)) and not isinstance(value, bool)
+    if field.element == _BOOLEAN:
+        return isinstance(value, bool)
+    return field.element not in _TEXTS or isinstance(value, str)
+
+
+def _paths(part: object, path: TreePath) -> Iterator[tuple[TreePath, FieldOf, object]]:
+    """Yield the parameters of a check that hold field paths: place, mark and value of each."""
+    hints = get_type_hints(type(part), include_extras=True)
+    for field in fields(part):  # type: ignore[arg-type]
+        value, place = getattr(part, field.name), (*path, field.name)
+        mark = _mark(hints[field.name])
+        if mark is not None:
+            yield place, mark, value
+        elif isinstance(value, tuple):
+            for index, item in enumerate(value):
+                if is_dataclass(item):
+                    yield from _paths(item, (*place, index))
+
+
+def _mark(annotation: Any) -> FieldOf | None:
+    if get_origin(annotation) is Annotated:
+        return next((mark for mark in annotation.__metadata__ if isinstance(mark, FieldOf)), None)
+    if get_origin(annotation) in (Union, UnionType):
+        return next((mark for inner in get_args(annotation) if (mark := _mark(inner)) is not None), None)
+    return None

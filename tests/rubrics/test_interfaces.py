@@ -1,0 +1,146 @@
+"""What a rubric says about message, service and action types is checked against those that are installed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from grader.app.grade import read_exercises
+from grader.app.request import GradeRequest
+from grader.cli import main
+from grader.core.errors import RubricError
+from grader.execution.ros_installation import find_ros
+from grader.rubrics.builtin import builtin_rubrics
+from grader.rubrics.interfaces import Interfaces
+from grader.rubrics.loader import read_rubric
+
+GOOD = """\
+schema: grader/rubric/v1
+exercise: {id: stop, number: 9, title: Stop}
+files: [stopper.py]
+scenarios:
+  - id: alone
+    processes: [stopper.py]
+    observe: {duration: 10 s}
+    stimuli:
+      - messages:
+          topic: /scan
+          type: sensor_msgs/msg/LaserScan
+          values:
+            - {range_max: 12, ranges: [1.0, .inf], header: {frame_id: laser}}
+            - any_order:
+                - {ranges: [0.2, .nan]}
+                - in_order: [{ranges: [{between: [0.1, 0.3]}]}, {ranges: []}]
+      - calls: {service: /switch, type: std_srvs/srv/SetBool, requests: [{data: true}]}
+      - goal: {action: /count, type: test_msgs/action/Fibonacci, goal: {order: 5}}
+criteria:
+  - id: drives
+    title: Drives
+    points: 5
+    scenario: alone
+    check: {publishes: {topic: /cmd_vel, type: geometry_msgs/msg/Twist}}
+  - id: speed
+    title: Speed
+    points: 5
+    scenario: alone
+    check: {field_values: {topic: /cmd_vel, values: {linear.x: 0.2, angular.z: .nan}}}
+  - id: stops
+    title: Stops
+    points: 5
+    scenario: alone
+    check:
+      reaction:
+        input: /scan
+        output: /cmd_vel
+        cases: [{when: {"ranges[0]": {high: 0.5}, ranges.1: .inf}, then: {linear.x: 0}, copies: {linear.y: range_max}}]
+  - id: answers
+    title: Answers
+    points: 5
+    scenario: alone
+    check: {service_response: {service: /switch, fields: {success: true}}}
+  - id: counts
+    title: Counts
+    points: 5
+    scenario: alone
+    check: {action_feedback: {action: /count, grows: sequence}}
+  - id: level
+    title: Level
+    points: 5
+    scenario: alone
+    check: {field_in_range: {topic: /level, field: data, low: 0, high: .inf}}
+"""
+
+#: What an author may write by mistake: old text, new text, line and column, what was expected, and the hint.
+MISTAKES = [
+    ("LaserScan", "LazerScan", "11:17", "a message type of sensor_msgs", "`sensor_msgs/msg/LaserScan`?"),
+    ("sensor_msgs", "sensor_mgs", "11:17", "an installed package", "`sensor_msgs`?"),
+    ("sensor_msgs", "turtle_race", "11:17", "an installed package", "install turtle_race"),
+    ("std_srvs/srv/SetBool", "std_srvs/srv/Setbool", "17:41", "a service type of std_srvs", "`std_srvs/srv/SetBool`?"),
+    ("{range_max", "{rangemax", "13:16", "a field of sensor_msgs/msg/LaserScan", "`range_max`?"),
+    ("frame_id", "frame", "13:61", "a field of std_msgs/msg/Header (`stamp` or `frame_id`)", "`frame_id`?"),
+    ("[{ranges: [{between", "[{rages: [{between", "16:31", "a field of sensor_msgs/msg/LaserScan", "`ranges`?"),
+    ("range_max: 12", "range_max: far", "13:27", "a number for `range_max`", ""),
+    ("[0.2, .nan]", "0.2", "15:28", "a list of numbers for `ranges`", ""),
+    ("{data: true}", "{data: 1}", "17:81", "true or false for `data`", ""),
+    ("{order: 5}", "{oder: 5}", "18:73", "a field of test_msgs/action/Fibonacci_Goal (`order`)", "`order`?"),
+    ("{linear.x: 0.2", "{linaer.x: 0.2", "29:54", "a field of geometry_msgs/msg/Twist", "`linear.x`?"),
+    ("{linear.x: 0.2", "{linear: 0.2", "29:54", "a field with a value (`linear.x`", ""),
+    ('"ranges[0]"', "ranges.first", "38:25", "an index such as `ranges[0]`", ""),
+    ("then: {linear.x", "then: {linear.x.y", "38:75", "no field below `x`, which is a number", "`linear.y`?"),
+    (": range_max}", ": range_mx}", "38:108", "a field of sensor_msgs/msg/LaserScan", "`range_max`?"),
+    ("{success: true}", "{succes: true}", "43:59", "a field of std_srvs/srv/SetBool_Response", "`success`?"),
+    ("sequence}", "sequnce}", "48:54", "a field of test_msgs/action/Fibonacci_Feedback", "`sequence`?"),
+    ("field: data", "field: dta", "53:52", "a field of an installed message type", "`data`?"),
+]
+
+
+@pytest.fixture(scope="module")
+def interfaces() -> Interfaces:
+    """Return the types of the ROS installation that nodes use."""
+    return Interfaces(find_ros().share)
+
+
+@pytest.mark.parametrize(("old", "new", "place", "expected", "hint"), MISTAKES, ids=[new for _, new, *_ in MISTAKES])
+def test_a_mistake_about_a_type_is_told_before_anything_runs(
+    tmp_path: Path, interfaces: Interfaces, old: str, new: str, place: str, expected: str, hint: str
+) -> None:
+    """With its place and, if one is near, what was probably meant; exit code 2, and no student's file is started."""
+    path = tmp_path / "r.yaml"
+    path.write_text(GOOD)
+    read_rubric(path, interfaces=interfaces)
+    path.write_text(GOOD.replace(old, new, 1))
+    read_rubric(path)  # what nobody will run needs no types
+    with pytest.raises(RubricError) as caught:
+        read_rubric(path, interfaces=interfaces)
+    assert f"r.yaml:{place}: expected {expected}" in caught.value.message
+    assert hint in caught.value.hint
+    assert len(caught.value.message.splitlines()) == 1
+    with pytest.raises(RubricError):
+        read_exercises(GradeRequest(str(tmp_path), rubrics=(path,)))
+    assert CliRunner().invoke(main.app, ["rubric", "check", str(path)]).exit_code == 2
+
+
+@pytest.mark.parametrize("path", builtin_rubrics().values(), ids=builtin_rubrics())
+def test_the_rubrics_that_come_with_the_grader_name_installed_types(path: Path, interfaces: Interfaces) -> None:
+    """They are not checked when they are used, so they are checked here."""
+    read_rubric(path, interfaces=interfaces)
+
+
+def test_an_index_must_be_within_a_fixed_array(interfaces: Interfaces) -> None:
+    """A covariance has 36 elements; a sequence has as many as it has."""
+    assert interfaces.at_path("nav_msgs/msg/Odometry", "pose.covariance[36]") == (
+        "expected an index below 36, the length of `covariance`"
+    )
+    assert not isinstance(interfaces.at_path("nav_msgs/msg/Odometry", "pose.covariance[35]"), str)
+    assert not isinstance(interfaces.at_path("nav_msgs/msg/Path", "poses[100].pose.position.x"), str)
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b'{"type_description_msg": 3}', b"\xff"])
+def test_a_damaged_description_is_no_description(tmp_path: Path, content: bytes) -> None:
+    """The author is told that the type is missing, and nothing else breaks."""
+    folder = tmp_path / "odd_msgs" / "msg"
+    folder.mkdir(parents=True)
+    (folder / "Odd.json").write_bytes(content)
+    assert Interfaces([tmp_path]).fields("odd_msgs/msg/Odd") is None
