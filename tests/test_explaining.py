@@ -31,9 +31,9 @@ def _read_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(explaining, "read_exercises", _read)
 
 
-def _read(request: GradeRequest) -> list[Exercise]:
+def _read(request: GradeRequest, *, recorded: bool) -> list[Exercise]:
     if request.rubrics not in _READ:
-        _READ[request.rubrics] = session.read_exercises(request)
+        _READ[request.rubrics] = session.read_exercises(request, recorded=recorded)
     return _READ[request.rubrics]
 
 

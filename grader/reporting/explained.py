@@ -76,7 +76,7 @@ def _parameters(parameters: Sequence[Parameter], width: int) -> Iterator[str]:
     for parameter, text in zip(parameters, given, strict=True):
         start = f"    {text:<{column}}"
         if len(start) > column + 4:
-            yield start
+            yield from _wrapped("    ", text, width, after=6)
             start = " " * (column + 4)
         yield from _wrapped(start, shown(parameter.meaning), width, after=column + 4)
 

@@ -26,6 +26,8 @@ places = {places!r} + glob.glob("/proc/*/environ") + glob.glob("/proc/*/cmdline"
 places += [os.path.join(folder, name) for folder, _, names in os.walk("/tmp") for name in names][:2000]
 found = sum("canary" in value for value in os.environ.values())
 for place in places:
+    if os.path.exists(place) and not os.path.isfile(place):
+        continue  # a pipe of another program would be waited for
     try:
         with open(place, "rb") as file:
             found += b"canary" + b"0123" in file.read(1 << 20)
@@ -101,8 +103,10 @@ def test_without_a_sandbox_the_prying_student_finds_something(checkout: Path, tm
         exercises="velocity_publisher",
         isolation="none",
     )
-    assert "canaries: 0" not in job.log
-    assert "canaries: " in job.log
+    (upload,) = job.uploads.values()
+    faults = json.dumps(json.loads(Path(upload["path"], "report.json").read_text())["exercises"][0]["faults"])
+    assert "canaries: 0" not in faults
+    assert "canaries: " in faults
 
 
 @pytest.fixture

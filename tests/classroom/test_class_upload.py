@@ -89,7 +89,7 @@ def test_final_scores_and_feedback_arrive_once(upload: Upload) -> None:
     assert upload("--send").exit_code == 0
     assert upload.there.scores == FINAL
     assert [len(upload.there.comments[number]) for number in FINAL] == [1, 1, 1]
-    assert upload.there.comments[101][0].startswith("8 of 10 points. 10 points, less 2 for 1 days late.")
+    assert upload.there.comments[101][0].startswith("8 of 10 points. 10 points, less 2 for 1 day late.")
     again = upload("--send")
     assert again.exit_code == 0
     assert "marks: 0 to send, 3 already there" in again.stdout

@@ -130,7 +130,7 @@ threading.Thread(target=run, daemon=True).start()
 """
 
 
-@pytest.mark.parametrize(("later", "reason"), [("", ""), ("sum(range(3_000_000))", BUSY)], ids=["polls", "works"])
+@pytest.mark.parametrize(("later", "reason"), [("", ""), ("sum(range(12_000_000))", BUSY)], ids=["polls", "works"])
 def test_polls_of_a_busy_loop_are_no_work_but_work_among_them_is(
     run: Callable[..., Trace], later: str, reason: str
 ) -> None:
