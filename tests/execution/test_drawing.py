@@ -169,9 +169,9 @@ def test_a_client_hears_of_the_limit_within_five_questions(seed: int) -> None:
     """High charges come first, for a client may ask no more after a low one; then the limit, then one digit."""
     found = [charge_of(answer) for answer in charges(seed, "client_limit")]
     place = found.index(20.0)
-    assert 2 <= place <= 3
+    assert place == 3
     assert all(charge > 20 for charge in found[:place])
-    assert 20.1 in found[:place]
+    assert {20.1, 100.0} <= set(found[:place])
     assert len(found) == place + 2
     assert found[-1] < 10
 
@@ -193,12 +193,13 @@ def test_a_useless_answer_comes_between_good_ones_and_two_low_ones(scenario: str
 
 
 @given(SEEDS)
-def test_a_server_goes_away_after_two_good_answers_and_a_refusal(seed: int) -> None:
+def test_a_server_goes_away_after_a_good_answer_and_some_time_after_a_refusal(seed: int) -> None:
     """So that what is written after any answer is told from a start."""
     (server,) = planned("battery_service", "client_deserted", seed).servers
-    told = [r["success"] and charge_of((True, r["message"])) > 20 for r in server.responses[: server.answers]]
-    assert told.count(False) == 1
-    assert 1 <= told.index(False) <= 2
+    answers = [server.responses[min(k, len(server.responses) - 1)] for k in range(server.answers)]
+    told = [r["success"] and charge_of((True, r["message"])) > 20 for r in answers]
+    assert told[:3] == [True, False, True]
+    assert told[-1]  # an old charge is there to be taken
     assert 3 <= server.answers <= 4
 
 
