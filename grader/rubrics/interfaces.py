@@ -58,6 +58,10 @@ class Field(msgspec.Struct):
         """The number of its type, or of the type of its elements."""
         return self.type.type_id % _ARRAY
 
+    def item(self, name: str) -> Field:
+        """Return an element of a list as a field with a name of its own."""
+        return Field(name, _FieldType(self.element, 0, self.type.nested_type_name))
+
     @property
     def words(self) -> str:
         """What its value is, e.g. `a list of numbers`."""
@@ -147,8 +151,7 @@ class Interfaces:
                     return f"expected an index such as `{here.name}[0]`, because `{here.name}` is a list"
                 if here.type.type_id < _SEQUENCE and int(name) >= here.type.capacity:
                     return f"expected an index below {here.type.capacity}, the length of `{here.name}`"
-                element = _FieldType(here.element, 0, here.type.nested_type_name)
-                here = Field(f"{here.name}[{name}]", element)
+                here = here.item(f"{here.name}[{name}]")
                 continue
             if here is not None and here.element != _NESTED:
                 return f"expected no field below `{here.name}`, which is {here.words}"
@@ -184,9 +187,10 @@ class _Checked:
     """A rubric whose types are looked up."""
 
     def __init__(self, rubric: RubricShape, tree: YamlTree, interfaces: Interfaces) -> None:
-        self._rubric = rubric
         self._tree = tree
         self._interfaces = interfaces
+        self._stimuli = tuple(_stimuli(rubric))
+        self._checks = tuple(_checks(rubric))
         #: Type of each topic, service and action; a topic with numbers has the type that the student's node chooses.
         self._types: dict[str, set[str]] = {}
         self._free: set[str] = set()
@@ -194,21 +198,8 @@ class _Checked:
             if interfaces.fields(named.type) is not None:
                 self._types.setdefault(on, set()).add(named.type)
 
-    def _stimuli(self) -> Iterator[tuple[TreePath, Stimulus]]:
-        for index, scenario in enumerate(self._rubric.scenarios):
-            for number, shape in enumerate(scenario.stimuli):
-                yield ("scenarios", index, "stimuli", number, shape.chosen[0]), build(shape)
-
-    def _checks(self) -> Iterator[tuple[TreePath, Any]]:
-        for index, criterion in enumerate(self._rubric.criteria):
-            name, parameters = criterion.check.chosen
-            try:
-                yield ("criteria", index, "check", name), build(parameters)
-            except ValueError:
-                continue  # a mistake that is found where criteria are built
-
     def _of_stimuli(self) -> Iterator[tuple[_Named, str]]:
-        for path, stimulus in self._stimuli():
+        for path, stimulus in self._stimuli:
             where = self._tree.values.get((*path, "type"))
             if where is None:
                 continue
@@ -218,7 +209,7 @@ class _Checked:
             yield _Named(stimulus.type, where), on  # type: ignore[union-attr]
 
     def _of_checks(self) -> Iterator[tuple[_Named, str]]:
-        for path, check in self._checks():
+        for path, check in self._checks:
             where, type_ = self._tree.values.get((*path, "type")), getattr(check, "type", None)
             if where is not None and isinstance(type_, str) and type_.count("/") == 2:
                 yield _Named(type_, where), _end_of(check)
@@ -228,7 +219,7 @@ class _Checked:
         for named, _ in self._of_stimuli():
             if unknown := self._interfaces.unknown(named.type, named.where):
                 yield unknown
-        for path, stimulus in self._stimuli():
+        for path, stimulus in self._stimuli:
             key, part = _SENT.get(type(stimulus), ("", ""))
             type_ = f"{getattr(stimulus, 'type', '')}{part}"
             if key and (*path, key) in self._tree.values and self._interfaces.fields(type_) is not None:
@@ -253,9 +244,8 @@ class _Checked:
 
     def _in_value(self, value: object, field: Field, path: TreePath) -> Iterator[Mistake]:
         if field.is_list and isinstance(value, list):
-            element = Field(field.name, _FieldType(field.element, 0, field.type.nested_type_name))
             for index, item in enumerate(value):
-                yield from self._in_value(item, element, (*path, index))
+                yield from self._in_value(item, field.item(field.name), (*path, index))
         elif field.element == _NESTED and not field.is_list and isinstance(value, Mapping):
             yield from self._in_message(value, field.type.nested_type_name, path)
         elif not _fits(value, field):
@@ -267,7 +257,7 @@ class _Checked:
         for named, _ in self._of_checks():
             if unknown := self._interfaces.unknown(named.type, named.where):
                 yield unknown
-        for path, check in self._checks():
+        for path, check in self._checks:
             for place, mark, value in _paths(check, path):
                 if isinstance(value, Mapping):
                     for key, inner in value.items():
@@ -299,6 +289,21 @@ class _Checked:
                 yield from self._every_path(field.type.nested_type_name, f"{prefix}{name}.")
             else:
                 yield f"{prefix}{name}"
+
+
+def _stimuli(rubric: RubricShape) -> Iterator[tuple[TreePath, Stimulus]]:
+    for index, scenario in enumerate(rubric.scenarios):
+        for number, shape in enumerate(scenario.stimuli):
+            yield ("scenarios", index, "stimuli", number, shape.chosen[0]), build(shape)
+
+
+def _checks(rubric: RubricShape) -> Iterator[tuple[TreePath, Any]]:
+    for index, criterion in enumerate(rubric.criteria):
+        name, parameters = criterion.check.chosen
+        try:
+            yield ("criteria", index, "check", name), build(parameters)
+        except ValueError:
+            continue  # a mistake that is found where criteria are built
 
 
 def _end_of(part: object) -> str:
