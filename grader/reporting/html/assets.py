@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from grader.core.errors import EnvironmentFault
 from grader.reporting.escape import shown
@@ -25,6 +26,22 @@ def page_environment(package: str) -> Environment:
     )
     templates.filters["shown"] = shown
     return templates
+
+
+@cache
+def page_template(name: str) -> Template:
+    """Return a template of the report page."""
+    return page_environment("grader.reporting.html").get_template(f"{name}.html")
+
+
+def fill(page: str, place: str, **values: object) -> str:
+    """Return a finished page with the template of a place in its header, instead of what was put there earlier.
+
+    Every page holds `<!--PLACE--><!--/PLACE-->` once, before any text of a student; all other text is escaped. The
+    values may be hostile.
+    """
+    made = f"<!--{place}-->{page_template(place).render(**values)}<!--/{place}-->"
+    return re.sub(f"<!--{place}-->.*?<!--/{place}-->", lambda _: made, page, count=1, flags=re.DOTALL)
 
 
 _LIBRARIES = "vendor/echarts/dist/echarts.common.min.js", "vendor/@dagrejs/dagre/dist/dagre.min.js"

@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from functools import cache
 
-from jinja2 import Template
-
-from grader.reporting.html.assets import page_environment
-
-# Every page holds this once, in its header and before any text of a student; all other text is escaped.
-_PLACE = re.compile(r"<!--class-links-->.*?<!--/class-links-->", re.DOTALL)
+from grader.reporting.html.assets import fill
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +20,4 @@ class ClassLinks:
 
 def with_class_links(page: str, links: ClassLinks) -> str:
     """Return a page with these links in its header, in place of any earlier ones; names may be hostile."""
-    made = _template().render(links=links)
-    return _PLACE.sub(lambda _: f"<!--class-links-->{made}<!--/class-links-->", page, count=1)
-
-
-@cache
-def _template() -> Template:
-    return page_environment("grader.reporting.html").get_template("class_links.html")
+    return fill(page, "class-links", links=links)

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from grader.reporting.html.assets import bundle, page_environment
-
-# Every page holds this once, in its header and before any text of a student; all other text is escaped.
-_PLACE = re.compile(r"<!--final-mark-->.*?<!--/final-mark-->", re.DOTALL)
+from grader.reporting.html.assets import bundle, fill, page_template
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,12 +20,11 @@ class FinalMark:
 
 def with_final_mark(page: str, mark: FinalMark) -> str:
     """Return a page with this mark in its header, in place of any earlier one; its texts may be hostile."""
-    made = page_environment("grader.reporting.html").get_template("final_mark.html").render(mark=mark)
-    return _PLACE.sub(lambda _: f"<!--final-mark-->{made}<!--/final-mark-->", page, count=1)
+    return fill(page, "final-mark", mark=mark)
 
 
 def render_refusal(mark: FinalMark, problem: str, hint: str) -> str:
     """Return the page of a student whose submission cannot be used, which makes no network requests."""
-    page = page_environment("grader.reporting.html").get_template("refusal.html")
-    made = page.render(mark=mark, problem=problem, hint=hint, style=Markup(bundle().style))  # noqa: S704  our own style sheet
+    style = Markup(bundle().style)  # noqa: S704  our own style sheet
+    made = page_template("refusal").render(mark=mark, problem=problem, hint=hint, style=style)
     return with_final_mark(made, mark)
