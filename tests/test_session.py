@@ -10,7 +10,7 @@ from grader.app.grade import read_exercises, read_recording
 from grader.app.request import GradeRequest
 from grader.app.start import grade, may_run
 from grader.core.errors import RecordingError, RubricError
-from grader.core.exercise import Outcome
+from grader.core.exercise import Location, Outcome
 from grader.execution.ros_installation import find_ros
 from grader.rubrics.builtin import builtin_rubrics, exercise_ids
 
@@ -64,6 +64,11 @@ def test_what_holds_no_file_to_run_is_graded_without_a_process(tmp_path: Path, m
     for place in (tmp_path, tmp_path / "velocity_pub.py"):
         report = grade(GradeRequest(str(place), isolation="none"), lambda _: None)
         assert {v.outcome for e in report.exercises for v in e.verdicts} == {Outcome.NOT_MET, Outcome.BLOCKED}
+    (tmp_path / "velocity_publisher.py").write_text("import rclpy\n\ndef main()\n    rclpy.init()\n")
+    report = grade(GradeRequest(str(tmp_path), isolation="none"), lambda _: None)
+    first = report.exercises[0].verdicts[0]
+    assert "SyntaxError" in first.reason
+    assert first.location == Location("velocity_publisher.py", 3)
 
 
 @pytest.mark.parametrize("id_", builtin_rubrics())

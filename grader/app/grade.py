@@ -9,10 +9,10 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 import grader
-from grader.app.kept_recordings import PlannedRun, kept_traces, plays_odometry, recorded_alike
-from grader.app.request import GradeRequest, recording_digest, reproduction, request_to_json
+from grader.app.request import GradeRequest, recording_digest, reproduction
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
 from grader.core.errors import EnvironmentFault, EvidenceError, SubmissionError
@@ -23,20 +23,19 @@ from grader.core.shipped import PACKAGE
 from grader.core.submission import Run, Submission
 from grader.core.trace import Trace
 from grader.execution.bag import Odometry, read_odometry
-from grader.execution.evidence.store import check_place, keep, open_evidence
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
 from grader.execution.ros_installation import find_ros
 from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
-from grader.reporting.json_report import dumps
 from grader.rubrics.builtin import builtin_exercises, builtin_odometry, compiled, exercise_ids
-from grader.rubrics.interfaces import Interfaces
-from grader.rubrics.loader import read_rubric
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import read_reaches, read_sources
 from grader.submissions.submission import stage_collected, stage_submission
+
+if TYPE_CHECKING:
+    from grader.rubrics.interfaces import Interfaces
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
@@ -73,35 +72,6 @@ class EarlyReports:
             duration_s = self._run.duration_s + time.perf_counter() - self._started
             run = replace(self._run, traces=dict(self._traces), duration_s=duration_s)
             self._on_report(judge_run(self._exercises, run, pictures=False, pending=pending))
-
-
-class EvidenceWriter:
-    """Remembers a run while it is graded, and writes it after its report has been delivered.
-
-    The folders are checked right away, because grading takes long; raises EvidenceError if one cannot be written to.
-    """
-
-    def __init__(self, folders: Sequence[Path], request: GradeRequest) -> None:
-        for folder in folders:
-            check_place(folder)
-        self._folders = folders
-        self._request = request
-        self._recorded: tuple[Run, Sequence[Exercise]] | None = None
-
-    def remember(self, run: Run, exercises: Sequence[Exercise]) -> None:
-        """Remember a complete run and the exercises it was recorded for."""
-        self._recorded = (run, exercises)
-
-    def write(self, report: Report) -> None:
-        """Write the run and its report; raises EvidenceError if that fails."""
-        if self._recorded is None:
-            return
-        run, exercises = self._recorded
-        run = replace(run, duration_s=report.duration_s)
-        for folder in self._folders:
-            ids = exercise_ids(self._request.exercises, exercises)
-            asked = request_to_json(replace(self._request, exercises=ids), exercises)
-            keep(folder, run, exercises, request=asked, report=dumps(report).encode())
 
 
 def grade_in(  # noqa: PLR0913  what to grade, and who is told
@@ -175,6 +145,9 @@ def _kept(  # noqa: PLR0913  all that a recording depends on
     """Return the kept recordings that this run would make again with the same software; none if one is damaged."""
     if request.recordings is None:
         return {}
+    from grader.app.kept_recordings import PlannedRun, kept_traces, recorded_alike  # noqa: PLC0415 - seldom needed
+    from grader.execution.evidence.store import open_evidence  # noqa: PLC0415 - takes long, and is seldom needed
+
     planned = PlannedRun(submission.digest, seed, "" if odometry is None else recording_digest(odometry))
     try:
         evidence = open_evidence(request.recordings)
@@ -192,6 +165,8 @@ def _record_one(session: RecordingSession, progress: Progress, budget: RealTimeB
 @cache
 def installed_interfaces() -> Interfaces | None:
     """Return the message, service and action types that nodes can use; None without ROS."""
+    from grader.rubrics.interfaces import Interfaces  # noqa: PLC0415 - takes long, as reading rubrics does
+
     try:
         return Interfaces(find_ros().share)
     except EnvironmentFault:
@@ -210,6 +185,8 @@ def read_exercises(
     """
     theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
     if request.rubrics:
+        from grader.rubrics.loader import read_rubric  # noqa: PLC0415 - takes long; built-in rubrics are compiled
+
         known = None if recorded else installed_interfaces()
         read = partial(read_rubric, submissions=theirs, draw=request.draw, interfaces=known)
         exercises = [read(path) for path in request.rubrics]
@@ -233,7 +210,7 @@ def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odom
     """Read the /odom recording if one was given or an exercise plays one."""
     if request.odom_bag is not None:
         return read_odometry(request.odom_bag)
-    return builtin_recording() if plays_odometry(exercises) else None
+    return builtin_recording() if any(exercise.plays_odometry for exercise in exercises) else None
 
 
 def plan_jobs(

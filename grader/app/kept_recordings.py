@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.core.exercise import Exercise
-from grader.core.scenario import OdometryStream
 from grader.core.trace import Trace
 from grader.execution.evidence.manifest import scenario_digest
 from grader.execution.evidence.store import Evidence, run_of
@@ -19,12 +18,6 @@ class PlannedRun:
     submission: str  # digest of the submission
     seed: int
     odometry: str  # digest of the /odom recording; empty if none is played
-
-
-def plays_odometry(exercises: Iterable[Exercise]) -> bool:
-    """Return whether any exercise plays the /odom recording."""
-    stimuli = (stimulus for e in exercises for scenario in e.scenarios for stimulus in scenario.stimuli)
-    return any(isinstance(stimulus, OdometryStream) for stimulus in stimuli)
 
 
 def recorded_alike(evidence: Evidence, exercises: Sequence[Exercise], planned: PlannedRun) -> tuple[Exercise, ...]:
@@ -43,7 +36,7 @@ def recorded_alike(evidence: Evidence, exercises: Sequence[Exercise], planned: P
         if exercise.id in asked
         and found.issuperset(exercise.files)
         and all(asked[exercise.id].get(s.id) == scenario_digest(s) for s in exercise.scenarios)
-        and (manifest.run.recording == planned.odometry or not plays_odometry([exercise]))
+        and (manifest.run.recording == planned.odometry or not exercise.plays_odometry)
     )
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import cast
 
 from grader.app.grade import read_exercises
-from grader.app.kept_recordings import kept_traces, plays_odometry
+from grader.app.kept_recordings import kept_traces
 from grader.app.request import GradeRequest, command_words, request_of
 from grader.core.errors import ALL_MET, NOT_ALL_MET, UNDECIDED, UNUSABLE, EvidenceError, GraderError, exit_code
 from grader.core.exercise import Exercise
@@ -94,7 +94,7 @@ def judged_again(evidence: Evidence, exercises: Sequence[Exercise], request: Gra
     given = Reproduction(
         command=command_words(request, run.seed),
         rubrics=run.reproduce.rubrics,
-        recording=odometry if plays_odometry(exercises) else "",
+        recording=odometry if any(exercise.plays_odometry for exercise in exercises) else "",
     )
     submission = replace(run.submission, path=request.submission)
     return judge_run(exercises, replace(run, submission=submission, reproduce=given), pictures=True)

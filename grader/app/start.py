@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from grader.core.shipped import shipped
 from grader.execution.recording_session import RecordingSession, open_session
+from grader.execution.unrunnable import compile_error
 
 if TYPE_CHECKING:
     from grader.app.grade import Progress
@@ -51,7 +52,7 @@ def opened(request: GradeRequest, progress: Progress) -> AbstractContextManager[
 
 
 def may_run(request: GradeRequest) -> bool:
-    """Return whether a submission may hold a file to run, judged by names alone; True in doubt.
+    """Return whether a submission may hold a file to run, judged by names and syntax alone; True in doubt.
 
     If not, no worker is started in advance. Reading the rubrics instead would take as long as the start of a worker.
     """
@@ -61,8 +62,9 @@ def may_run(request: GradeRequest) -> bool:
     texts = (path.read_text(encoding="utf-8") for path in shipped("rubrics").glob("*.yaml"))
     wanted = {name.strip() for text in texts for found in _FILES.findall(text) for name in found.split(",")}
     if not place.is_dir():
-        return place.name in wanted
-    for number, (_, _, names) in enumerate(os.walk(place)):
-        if number >= _MOST_FOLDERS or not wanted.isdisjoint(names):
+        return place.name in wanted and compile_error(place) is None
+    for number, (folder, _, names) in enumerate(os.walk(place)):
+        found = (Path(folder, name) for name in wanted.intersection(names))
+        if number >= _MOST_FOLDERS or any(compile_error(file) is None for file in found):
             return True
     return False

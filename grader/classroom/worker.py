@@ -16,7 +16,8 @@ from datetime import date
 
 import msgspec
 
-from grader.app.grade import EvidenceWriter, Progress, grade_in
+from grader.app.grade import Progress, grade_in
+from grader.app.keeping import EvidenceWriter
 from grader.app.request import GradeRequest
 from grader.classroom import store as kept
 from grader.classroom.local import Task

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
-    from grader.app.grade import EvidenceWriter
+    from grader.app.keeping import EvidenceWriter
     from grader.app.request import GradeRequest
     from grader.core.report import Report
     from grader.execution.recording_session import RecordingSession
@@ -300,7 +300,7 @@ class _Grading:
 
 
 def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> EvidenceWriter:
-    from grader.app.grade import EvidenceWriter
+    from grader.app.keeping import EvidenceWriter
 
     return EvidenceWriter(folders, request)
 

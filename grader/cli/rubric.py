@@ -181,7 +181,7 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
     require("grade selftest", "libcst", "authors")
     from grader.mutation.running import SelftestOptions, selftest
     from grader.mutation.showing import render_results, results_to_json
-    from grader.rubrics.loader import NOTES
+    from grader.rubrics.builtin import NOTES
 
     # A shell pattern such as rubrics/*.yaml matches the notes as well.
     named = [path for path in rubrics if not path.name.endswith(NOTES)]

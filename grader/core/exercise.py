@@ -9,7 +9,7 @@ from enum import Enum
 from fractions import Fraction
 from typing import Any, Protocol, runtime_checkable
 
-from grader.core.scenario import Scenario
+from grader.core.scenario import OdometryStream, Scenario
 from grader.core.trace import Trace
 
 
@@ -234,3 +234,8 @@ class Exercise:
     digest: str  # `sha256:` digest of the rubric file and its own check files
     by_request: bool = False  # whether it is graded only on request
     variant: Variant | None = None  # the values for this student; None if nothing varies
+
+    @property
+    def plays_odometry(self) -> bool:
+        """Whether any scenario plays the /odom recording."""
+        return any(isinstance(stimulus, OdometryStream) for s in self.scenarios for stimulus in s.stimuli)

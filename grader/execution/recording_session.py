@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import TypeVar
 
@@ -18,6 +19,7 @@ from grader.execution.sandbox.choose import choose_isolation
 from grader.execution.sandbox.protocol import Isolation
 from grader.execution.supervisor import Job, Recorder
 from grader.execution.temp_dirs import scratch_folder
+from grader.execution.unrunnable import trace_without_run
 from grader.execution.worker import FOREVER_S, RealTimeBudget
 
 #: The name of a run without a sandbox in reports.
@@ -57,7 +59,7 @@ class RecordingSession:
         *,
         budget_s: float = FOREVER_S,
     ) -> dict[Key, Trace]:
-        """Record jobs and return their traces.
+        """Record jobs and return their traces, in the same order.
 
         With `auto`, a job that virtual time does not suit is recorded again on the wall clock. These jobs run one at a
         time, because parallel ones would disturb each other.
@@ -70,9 +72,12 @@ class RecordingSession:
             budget_s: Real time that all jobs may take together.
         """
         budget = RealTimeBudget(budget_s)
-        first = [Job(job.title, replace(job.plan, stop_when_unfit=clock == AUTO), budget) for job in jobs.values()]
+        known = {key: trace for key, job in jobs.items() if (trace := trace_without_run(job.plan)) is not None}
+        to_run = {key: job for key, job in jobs.items() if key not in known}
+        first = [Job(job.title, replace(job.plan, stop_when_unfit=clock == AUTO), budget) for job in to_run.values()]
         traces: dict[Key, Trace] = {}
-        for key, trace in zip(jobs, self.recorder.each(first, progress), strict=True):
+        recorded = zip(to_run, self.recorder.each(first, progress), strict=True)
+        for key, trace in chain(known.items(), recorded):
             traces[key] = trace
             if finished is not None and not _unfit(trace, clock):
                 finished(key, trace)
@@ -82,7 +87,7 @@ class RecordingSession:
             traces[key] = replace(repeated, clock_reason=traces[key].clock_reason)
             if finished is not None:
                 finished(key, traces[key])
-        return traces
+        return {key: traces[key] for key in jobs}
 
 
 def workers_for(processors: int) -> int:

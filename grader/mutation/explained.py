@@ -13,7 +13,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
-from grader.rubrics.loader import NOTES
+from grader.rubrics.builtin import NOTES
 from grader.rubrics.mistakes import mistakes_of, nearest
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
 from grader.submissions.collected import listed, shown

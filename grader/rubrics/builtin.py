@@ -18,12 +18,12 @@ from typing import Any, TypeVar
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
 from grader.core.shipped import PACKAGE, shipped
-from grader.rubrics.loader import NOTES, read_rubric
-from grader.rubrics.yaml_tree import read_yaml
 from grader.submissions.collected import shown
 
 #: Where Python keeps the byte code of the package: who may write there decides what the grader executes anyway.
 COMPILED = PACKAGE / "__pycache__"
+#: Suffix of files beside rubrics that are not rubrics: notes on their self-tests.
+NOTES = ".selftest.yaml"
 _Value = TypeVar("_Value")
 
 
@@ -45,8 +45,13 @@ class Header:
 @cache
 def builtin_exercises() -> tuple[Exercise, ...]:
     """Return the built-in exercises, ordered by number; raises RubricError without any."""
-    sources = [*_paths(), *PACKAGE.rglob("*.py")]
-    return compiled("rubrics", sources, lambda: tuple(read_rubric(header.path) for header in builtin_headers()))
+    return compiled("rubrics", [*_paths(), *PACKAGE.rglob("*.py")], _read_exercises)
+
+
+def _read_exercises() -> tuple[Exercise, ...]:
+    from grader.rubrics.loader import read_rubric  # noqa: PLC0415 - takes long, and the compiled form needs it not
+
+    return tuple(read_rubric(header.path) for header in builtin_headers())
 
 
 def compiled(name: str, sources: Iterable[Path], read: Callable[[], _Value]) -> _Value:
@@ -101,6 +106,8 @@ def _paths() -> list[Path]:
 
 def _header(path: Path) -> Header:
     """Read the header of a built-in rubric, without validating the rest."""
+    from grader.rubrics.yaml_tree import read_yaml  # noqa: PLC0415 - as above
+
     above, _, _ = path.read_text(encoding="utf-8").partition("\nscenarios:")
     tree: Any = read_yaml(above).data
     exercise = tree["exercise"]

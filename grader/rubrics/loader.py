@@ -152,9 +152,6 @@ _Model = TypeVar("_Model", bound=BaseModel)
 #: Largest rubric file, in bytes.
 MAX_BYTES = 256 * 1024
 
-#: Suffixes of files beside rubrics that are not rubrics: notes on their self-tests.
-NOTES = ".selftest.yaml"
-
 #: Maximum number of mistakes listed at once.
 MAX_MISTAKES = 10
 

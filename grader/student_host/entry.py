@@ -22,6 +22,7 @@ from .packages import (
     layout_of,
     never_true,
     package_folders,
+    parse,
     start_of,
 )
 from .shadows import Shadows
@@ -54,7 +55,7 @@ def run_file(root: str, file: str, notify: Notify, install_ros: Callable[[], Non
         install_ros: Called when the program imports rclpy, if a module of the submission hides another one.
     """
     path = os.path.join(root, file)
-    tree = _parse(path)  # raises a syntax error before any code has run
+    tree = parse(path)  # raises a syntax error before any code has run
     layout = layout_of(root, file)
     start = start_of(root, file, layout, tree)
     shadows = shadows_of(root, file)
@@ -78,15 +79,6 @@ def run_file(root: str, file: str, notify: Notify, install_ros: Callable[[], Non
     result = called()
     if start.way != MAIN:
         sys.exit(result)
-
-
-def _parse(path: str) -> ast.Module:
-    with open(path, "rb") as source:
-        text = source.read()
-    before, null, _ = text.partition(b"\0")
-    if null:  # Python's own error has no line number
-        raise SyntaxError("source code cannot contain null bytes", (path, before.count(b"\n") + 1, None, None))
-    return ast.parse(text, path)
 
 
 def _run_as_main(path: str, name: str, layout: PackageLayout) -> dict[str, Any]:

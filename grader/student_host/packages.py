@@ -56,6 +56,16 @@ class StartMethod(NamedTuple):
     base: str = ""
 
 
+def parse(path: str) -> ast.Module:
+    """Parse a file as the interpreter would; raises what it cannot compile as an error with a line."""
+    with open(path, "rb") as source:
+        text = source.read()
+    before, null, _ = text.partition(b"\0")
+    if null:  # Python's own error has no line number
+        raise SyntaxError("source code cannot contain null bytes", (path, before.count(b"\n") + 1, None, None))
+    return ast.parse(text, path)
+
+
 def layout_of(root: str, file: str) -> PackageLayout:
     """Find the package of a file: by an `__init__.py` in its folder, or a setup.py or package.xml above."""
     folder = os.path.dirname(file)

@@ -9,8 +9,8 @@ import pytest
 
 from grader.core.errors import RubricError
 from grader.mutation.explained import Explained, beside, read_explained
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.loader import NOTES, read_rubric
+from grader.rubrics.builtin import NOTES, builtin_rubrics
+from grader.rubrics.loader import read_rubric
 
 EXERCISE = read_rubric(builtin_rubrics()["velocity_publisher"])
 GOOD = """\

@@ -17,8 +17,8 @@ from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S
 from grader.core.scenario import OdometryStream, longest_course_ns, shortest
 from grader.judging.checks import CHECKS
-from grader.rubrics.builtin import builtin_headers, builtin_rubrics
-from grader.rubrics.loader import NOTES, read_rubric
+from grader.rubrics.builtin import NOTES, builtin_headers, builtin_rubrics
+from grader.rubrics.loader import read_rubric
 from grader.rubrics.schema import rubric_schema, schema_text
 
 RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"

@@ -1,0 +1,64 @@
+"""Files that Python cannot compile need no run, and are recorded exactly as a run records them."""
+
+from pathlib import Path
+
+import pytest
+from hostile import record
+
+from grader.core.trace import OutputLine
+from grader.execution.plan import Plan
+from grader.execution.recording_session import RecordingSession
+from grader.execution.unrunnable import trace_without_run
+
+BROKEN = {
+    "no_colon": "import rclpy\n\ndef main()\n    pass\n",
+    "unfinished": "import rclpy\nrclpy.init(\n",
+    "mixed_tabs": "if True:\n\tx = 1\n        y = 2\n",
+    "indented": "import rclpy\n  rclpy.init()\n",
+    "null_byte": "import rclpy\nx = '\0'\n",
+    "unknown_encoding": "# -*- coding: klingon -*-\n",
+    "markup": "```python\nimport rclpy\n```\n",
+    "too_deep": f"x = {'(' * 5_000}{')' * 5_000}\n",
+    "odd_escape": "x = '\\d'\ny = = 1\n",
+}
+#: What only the compiler or the program itself would find, after the file has been read.
+ACCEPTED = {
+    "empty": "",
+    "return_outside": "import rclpy\nreturn 1\n",
+    "odd_escape": "x = '\\d'\n",
+    "raised": "raise SyntaxError('expected a colon')\n",
+}
+
+
+def _plan(folder: Path, *names: str) -> Plan:
+    processes = tuple((name, name) for name in names)
+    return Plan("alone", processes, str(folder), "ab" * 32, 10_000_000_000, "", 60_000_000_000, (), (), "virtual")
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_the_trace_is_the_one_that_a_run_records(name: str, studio: RecordingSession, tmp_path: Path) -> None:
+    """All but the text that Python prints, which the report takes from the fault."""
+    run = record(studio, tmp_path / "in", BROKEN[name])
+    known = trace_without_run(_plan(tmp_path / "in", "a.py"))
+    assert known is not None
+    assert known.observations == tuple(o for o in run.observations if not isinstance(o, OutputLine))
+    assert known.observations
+    assert (known.clock, known.stop_ns, known.starts, known.notes) == (run.clock, run.stop_ns, run.starts, run.notes)
+
+
+@pytest.mark.parametrize("name", ACCEPTED)
+def test_what_can_be_compiled_or_not_be_read_is_run(name: str, tmp_path: Path) -> None:
+    """Only a process can tell what happens then."""
+    (tmp_path / "a.py").write_text(ACCEPTED[name])
+    assert trace_without_run(_plan(tmp_path, "a.py")) is None
+
+
+def test_a_scenario_is_run_if_any_of_its_files_can_be(tmp_path: Path) -> None:
+    """The other node may earn points; two broken ones cannot."""
+    for name, text in (("a.py", "("), ("b.py", ")"), ("c.py", "x = 1")):
+        (tmp_path / name).write_text(text)
+    both = trace_without_run(_plan(tmp_path, "a.py", "b.py"))
+    assert both is not None
+    assert [fault.process for fault in both.faults()] == ["a.py", "b.py"]
+    assert trace_without_run(_plan(tmp_path, "a.py", "c.py")) is None
+    assert trace_without_run(_plan(tmp_path, "a.py", "gone.py")) is None
