@@ -16,8 +16,11 @@ REAL = ROOT / "tests" / "real_checks"
 NODES = ROOT / "tests" / "execution" / "service_nodes"
 #: Rubrics that are asked of real nodes, here or in the tests of whole submissions.
 RUBRICS = [p for p in (*(ROOT / "rubrics").glob("*.yaml"), *REAL.glob("*.yaml")) if ".selftest." not in p.name]
+RUBRICS += [p.parent / f"{p.parent.name}.yaml" for p in (ROOT / "examples").glob("*/README.md")]
 #: Checks that no real node here is asked, and why.
 NOT_REAL = {"transform": "tf2_msgs comes with no package that pip installs, so no node here can publish a transform"}
+_NO_NUMBERS = "no package that pip installs has a service of numbers for it"
+NOT_REAL |= {"service_function": _NO_NUMBERS, "logs_response": _NO_NUMBERS}
 
 
 @lru_cache

@@ -81,6 +81,8 @@ ServiceType = Annotated[str, Kind("service type")]
 ActionType = Annotated[str, Kind("action type")]
 #: A formula of `n` and `t` such as `sin(0.1 * n)`.
 Formula = Annotated[str, Kind("formula")]
+#: A formula of the fields of a message, such as `a + b`.
+FieldFormula = Annotated[str, Kind("formula of fields")]
 #: A regular expression.
 Pattern = Annotated[str, Kind("pattern")]
 
@@ -94,9 +96,11 @@ class FieldOf:
         part: The part of a service or action that has the field: `_Request`, `_Response`, `_Result` or `_Feedback`.
         values: For a mapping whose values are field paths as well: the parameter that names where these are.
         unless: A word that stands for no field.
+        formula: Whether the value is a formula of fields, or the values of the mapping are.
     """
 
     parameter: str
     part: str = ""
     values: str = ""
     unless: str = ""
+    formula: bool = False

@@ -63,10 +63,19 @@ class Curve:
 
     def at(self, n: float, t: float = 0.0) -> float:
         """Return the value at `n` and `t`; NaN if undefined, as for a root of -1."""
+        return self.of({"n": n, "t": t})
+
+    def of(self, known: Mapping[str, float]) -> float:
+        """Return the value for a number of each name; NaN if undefined."""
         try:
-            return _value(self.tree, {"n": n, "t": t})
+            return _value(self.tree, known)
         except (ArithmeticError, ValueError):
             return math.nan
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The variables, or the paths of fields, in order."""
+        return tuple(dict.fromkeys(name for name in _names(self.tree) if name not in _CONSTANTS))
 
     @property
     def mistaken(self) -> Curve | None:
@@ -79,34 +88,55 @@ class Curve:
 
 
 @lru_cache(maxsize=64)
-def curve(text: str) -> Curve:
-    """Return the formula in a text; raises FormulaError if it is none."""
+def curve(text: str, *, of_fields: bool = False) -> Curve:
+    """Return the formula in a text, of `n` and `t` or of the fields of a message such as `pose.x`.
+
+    Raises:
+        FormulaError: It is none.
+    """
     if len(text) > _MOST_CHARACTERS:
         raise FormulaError(f"at most {_MOST_CHARACTERS} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise FormulaError("a formula such as sin(0.1 * n)") from None
-    _check(tree)
+    _check(tree, of_fields=of_fields)
     return Curve(text.strip(), tree)
 
 
-def _check(node: ast.expr) -> None:
+def _is_path(node: ast.expr) -> bool:
+    if isinstance(node, ast.Subscript):
+        return isinstance(node.slice, ast.Constant) and type(node.slice.value) is int and _is_path(node.value)
+    return isinstance(node, ast.Name) or (isinstance(node, ast.Attribute) and _is_path(node.value))
+
+
+def _names(node: ast.expr) -> Iterator[str]:
+    if _is_path(node):
+        yield ast.unparse(node)
+    else:
+        inside = node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node)
+        yield from (name for child in inside if isinstance(child, ast.expr) for name in _names(child))
+
+
+def _check(node: ast.expr, *, of_fields: bool) -> None:
     """Raise FormulaError unless every part is allowed."""
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
-        _check(node.left)
-        _check(node.right)
+        _check(node.left, of_fields=of_fields)
+        _check(node.right, of_fields=of_fields)
     elif isinstance(node, ast.UnaryOp) and type(node.op) in _UNARY:
-        _check(node.operand)
+        _check(node.operand, of_fields=of_fields)
     elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS:
         if len(node.args) != 1 or node.keywords or isinstance(node.args[0], ast.Starred):
             raise FormulaError(f"one number in the brackets of {node.func.id}")
-        _check(node.args[0])
+        _check(node.args[0], of_fields=of_fields)
+    elif of_fields and _is_path(node):
+        pass
     elif isinstance(node, ast.Name):
         if node.id not in VARIABLES and node.id not in _CONSTANTS:
             raise FormulaError(f"n, t, pi or one of {', '.join(_FUNCTIONS)} with its brackets, found {node.id[:40]}")
     elif not (isinstance(node, ast.Constant) and type(node.value) in (int, float)):
-        raise FormulaError(f"numbers, n, t, pi, + - * / % ** and {', '.join(_FUNCTIONS)}")
+        variables = "fields" if of_fields else "n, t"
+        raise FormulaError(f"numbers, {variables}, pi, + - * / % ** and {', '.join(_FUNCTIONS)}")
 
 
 def _value(node: ast.expr, known: Mapping[str, float]) -> float:
@@ -117,8 +147,9 @@ def _value(node: ast.expr, known: Mapping[str, float]) -> float:
     if isinstance(node, ast.Call):
         assert isinstance(node.func, ast.Name)
         return float(_FUNCTIONS[node.func.id](_value(node.args[0], known)))
-    if isinstance(node, ast.Name):
-        return known[node.id] if node.id in known else _CONSTANTS[node.id]
+    if _is_path(node):
+        name = ast.unparse(node)
+        return known[name] if name in known else _CONSTANTS[name]
     assert isinstance(node, ast.Constant)
     return float(node.value)  # type: ignore[arg-type]  # the check above allows only numbers
 

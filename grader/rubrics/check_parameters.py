@@ -31,6 +31,7 @@ from grader.rubrics.types import (
     ActionType,
     Choice,
     Duration,
+    FieldFormulaText,
     FieldNumber,
     FormulaText,
     Frequency,
@@ -80,6 +81,7 @@ _BY_KIND: Mapping[str, object] = {
     "action type": ActionType,
     "field number": FieldNumber,
     "formula": FormulaText,
+    "formula of fields": FieldFormulaText,
     "pattern": PatternText,
     "time": SomeTime,
     "time above 0": SomeLongTime,
@@ -163,6 +165,8 @@ def _is_required(field: dataclasses.Field[object]) -> bool:
 
 def _accepted(annotation: object, name: str = "") -> object:
     """Return the type that a rubric may hold for a dataclass field: its annotation, made strict and given units."""
+    if kind := _mark(annotation, Kind):
+        return _BY_KIND[kind.name]
     if _mark(annotation, FieldOf):
         annotation = get_args(annotation)[0]
     if annotation is str:
@@ -170,8 +174,6 @@ def _accepted(annotation: object, name: str = "") -> object:
     for known, accepted in _BY_ANNOTATION:
         if annotation == known:
             return accepted
-    if kind := _mark(annotation, Kind):
-        return _BY_KIND[kind.name]
     if least := _mark(annotation, Least):
         unit = _mark(annotation, Unit)
         number = Annotated[int, Quantity(unit, above_zero=True)] if unit else Whole

@@ -14,6 +14,7 @@ import msgspec
 
 from grader.core.quantities import FieldOf
 from grader.core.scenario import ActionGoal, MessageStream, NumberStream, ServiceCalls, ServiceServer, Stimulus
+from grader.judging.series import curve
 from grader.rubrics.mistakes import found, nearest
 from grader.rubrics.model import RubricShape
 from grader.rubrics.types import build
@@ -263,9 +264,11 @@ class _Checked:
                     for key, inner in value.items():
                         yield from self._at_path(key, check, mark, self._tree.at_key((*place, key)))
                         if mark.values:
-                            yield from self._at_path(inner, check, FieldOf(mark.values), self._tree.at((*place, key)))
+                            for one in _named(inner, mark):
+                                yield from self._at_path(one, check, FieldOf(mark.values), self._tree.at((*place, key)))
                 elif isinstance(value, str) and place in self._tree.values and value != mark.unless:
-                    yield from self._at_path(value, check, mark, self._tree.at(place))
+                    for one in _named(value, mark):
+                        yield from self._at_path(one, check, mark, self._tree.at(place))
 
     def _at_path(self, path: str, check: object, mark: FieldOf, where: Position) -> Iterator[Mistake]:
         on = getattr(check, mark.parameter, None)
@@ -346,6 +349,11 @@ def _paths(part: object, path: TreePath) -> Iterator[tuple[TreePath, FieldOf, ob
             for index, item in enumerate(value):
                 if is_dataclass(item):
                     yield from _paths(item, (*place, index))
+
+
+def _named(value: str, mark: FieldOf) -> tuple[str, ...]:
+    """Return the field paths in a value: itself, or those in a formula."""
+    return curve(value, of_fields=True).names if mark.formula else (value,)
 
 
 def _mark(annotation: Any) -> FieldOf | None:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import Annotated, Any
 
 from annotated_types import GroupedMetadata
@@ -194,9 +195,9 @@ Frequency = Annotated[float, Quantity(Unit("Hz"))]
 _LONGEST_PATTERN = 400
 
 
-def _formula(text: str) -> str:
+def _formula(text: str, *, of_fields: bool = False) -> str:
     try:
-        curve(text)
+        curve(text, of_fields=of_fields)
     except FormulaError as error:
         raise wrong(str(error)) from None
     return text
@@ -215,6 +216,11 @@ def _pattern(text: str) -> str:
 _StrictText = Annotated[str, Strict()]
 FormulaText = Annotated[
     _StrictText, AfterValidator(_formula), WithJsonSchema({"type": "string", "examples": ["sin(0.1 * n)"]})
+]
+FieldFormulaText = Annotated[
+    _StrictText,
+    AfterValidator(partial(_formula, of_fields=True)),
+    WithJsonSchema({"type": "string", "examples": ["a + b"]}),
 ]
 PatternText = Annotated[
     _StrictText,

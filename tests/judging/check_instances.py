@@ -28,11 +28,14 @@ INSTANCES: dict[str, Check] = {
     "field_function": CHECKS["field_function"]("/joint_commands", "sin(0.1 * n)"),
     "logs_every": CHECKS["logs_every"]("velocity_publisher.py", "/cmd_vel", 20, "linear.x"),
     "logs_values": CHECKS["logs_values"]("temperature_sensor.py", "/fan_speed", unit_factors=(1.0, 2.0)),
+    "logs_texts": CHECKS["logs_texts"]("velocity_publisher.py", "/chatter"),
+    "logs_response": CHECKS["logs_response"]("battery_service_client.py", "/battery/get_status", "message"),
     "service_available": CHECKS["service_available"]("/battery/get_status", TRIGGER),
     "service_answers_all": CHECKS["service_answers_all"]("/battery/get_status"),
     "service_response": CHECKS["service_response"](
         "/battery/get_status", {"success": True, "message": FieldRule(pattern="Battery: .*")}
     ),
+    "service_function": CHECKS["service_function"]("/add_two_ints", "sum", "a + b"),
     "service_sequence": CHECKS["service_sequence"]("/battery/get_status", 84.5, -0.5, floor=0.0, reset_to=100.0),
     "service_calls": CHECKS["service_calls"]("/battery/get_status", 5, period=NS_PER_S),
     "waits_for_service": CHECKS["waits_for_service"]("battery_service_client.py", "/battery/get_status"),

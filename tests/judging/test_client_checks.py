@@ -375,3 +375,13 @@ def test_a_recording_without_a_wait_is_ours() -> None:
     for rec in (Recording(9, process=CLIENT), Recording(9, process=CLIENT).mark(0.0, "server_starts", BATTERY)):
         with pytest.raises(HarnessError):
             WAITS.judge(rec.trace())
+
+
+@pytest.mark.parametrize(("a", "credit"), [(17, 1), (18, 0)])
+def test_what_a_client_asks_may_be_asked_for(a: int, credit: int) -> None:
+    """The fields of every request."""
+    check = CallsOfClient("/add_two_ints", 1, fields={"a": 17, "b": 25})
+    rec = Recording(5.0).request(1.0, "/add_two_ints", 1, "student", {"a": a, "b": 25})
+    finding = check.judge(rec.trace())
+    assert finding.credit == credit
+    assert finding.reason.startswith("/add_two_ints: 1 request" if credit else "t = 1.000 s, /add_two_ints: a is 18, ")

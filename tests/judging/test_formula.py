@@ -70,3 +70,17 @@ def test_sine_and_cosine_can_be_taken_for_each_other() -> None:
     assert other is not None
     assert other.at(0.7) == pytest.approx(math.exp(0.7) + math.cos(0.7))
     assert curve("exp(n)").mistaken is None
+
+
+def test_a_formula_of_fields_names_them_in_order() -> None:
+    """By their paths, each once; a function and pi are no fields."""
+    formula = curve("sin(pose.theta / 2) * pi + ranges[0] - n + pose.theta", of_fields=True)
+    assert formula.names == ("pose.theta", "ranges[0]", "n")
+    assert formula.of({"pose.theta": math.pi, "ranges[0]": 2.0, "n": 1.0}) == pytest.approx(2 * math.pi + 1)
+
+
+@pytest.mark.parametrize("text", ["a()", "a.b(1)", "a[b]", "a['b']", "(a + b).c", "[1].a", "a if b else c"])
+def test_a_formula_of_fields_is_nothing_else(text: str) -> None:
+    """No call, no index that is not a number."""
+    with pytest.raises(FormulaError):
+        curve(text, of_fields=True)

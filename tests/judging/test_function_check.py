@@ -144,3 +144,23 @@ def test_a_wider_tolerance_never_takes_credit() -> None:
     trace = each(lambda n: math.sin(0.1 * n) + 0.01).trace()
     earned = [FieldFunction("/joint_commands", "sin(0.1 * n)", tolerance=t).judge(trace).credit for t in (0, 0.01, 1)]
     assert earned == [0, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("write", "credit", "said"),
+    [
+        ("Hello World: {}", 1, "data follows n in 20 messages"),
+        ("Hello World:{}", 0, "no number where expected in data, 'Hello World:0'"),
+        ("Hello World: {}.5", 0, "data is 0.5 in message n = 0, expected n = 0"),
+        ("Hello World: 7", 0, "it is 7 in every message"),
+    ],
+)
+def test_the_number_may_stand_in_a_text(write: str, credit: int, said: str) -> None:
+    """A pattern tells where."""
+    check = FieldFunction("/topic", "n", pattern=r"Hello World: ([\d.]+)")
+    rec = Recording(5.0)
+    for k in range(20):
+        rec.message(0.1 * k, "/topic", {"data": write.format(k)}, "std_msgs/msg/String")
+    finding = check.judge(rec.trace())
+    assert finding.credit == credit
+    assert said in finding.reason

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -147,3 +148,23 @@ def test_silence_and_crashes_are_explained() -> None:
     for k, word in enumerate(WORDS):
         deaf.deliver(1.0 + 2 * k, "/voice_command", {"data": word}, TEXT)
     assert "/voice_commands" in CHECK.judge(deaf.trace()).reason
+
+
+def test_an_output_may_follow_a_formula_of_the_input() -> None:
+    """Half the angle and twice the distance; the first that does not is named, and NaN has none."""
+    case = ReactionCase({"x": FieldRule(low=-9)}, formulas={"data": "sin(theta / 2) + 2 * x"})
+    check = Reaction("/pose", "/half", (case,), tolerance=0.001)
+
+    def follower(*thetas: float, factor: float = 0.5) -> Recording:
+        rec = Recording(9.0).endpoint("subscription", "/pose", "turtlesim/msg/Pose")
+        for k, theta in enumerate(thetas):
+            rec.deliver(1.0 + k, "/pose", {"x": 1.5, "theta": theta}, "turtlesim/msg/Pose")
+            rec.number(1.1 + k, "/half", math.sin(factor * theta if math.isfinite(theta) else 0) + 3)
+        return rec
+
+    assert check.judge(follower(0.4, -1.2).trace()).credit == 1
+    finding = check.judge(follower(0.0, 1.0, factor=1.0).trace())
+    assert finding.credit == 0
+    assert "data is 3.84147, expected 3.47943" in finding.reason
+    with pytest.raises(HarnessError, match="has no value"):
+        check.judge(follower(math.inf).trace())

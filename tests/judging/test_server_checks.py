@@ -12,7 +12,13 @@ from tracing import TRIGGER, Recording
 from grader.core.errors import HarnessError
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind
-from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse, ServiceSequence
+from grader.judging.checks.services import (
+    ServiceAnswersAll,
+    ServiceAvailable,
+    ServiceFunction,
+    ServiceResponse,
+    ServiceSequence,
+)
 from grader.judging.findings import FAULT_KEY
 from grader.judging.values import FieldRule
 
@@ -229,3 +235,35 @@ def test_a_rule_allows_what_it_says(rule: FieldRule, right: list[Any], wrong: li
     """Yes is no 1, and no number is in a range."""
     assert all(map(rule.allows, right))
     assert not any(map(rule.allows, wrong))
+
+
+@pytest.mark.parametrize(
+    ("add", "credit", "said"),
+    [
+        (lambda a, b: {"sum": a + b}, 1, "sum = a + b in 3 responses, such as 5"),
+        (lambda a, b: {"sum": a - b}, 0, "t = 1.010 s, /add_two_ints: sum is -8, expected a + b = 42; wrong in 3 of 3"),
+        (lambda a, b: {"sum": a + abs(b)}, 0, "sum is 9, expected a + b = 5; wrong in 1 of 3"),
+        (lambda a, b: {"sum": 0}, 0, "sum is 0"),
+        (lambda a, b: {"total": a + b}, 0, "sum is no number"),
+    ],
+)
+def test_an_answer_may_follow_a_formula_of_its_request(add: Any, credit: int, said: str) -> None:
+    """The numbers of each request are drawn, so that no table of answers helps."""
+    check = ServiceFunction("/add_two_ints", "sum", "a + b", at_least=3)
+    rec = Recording(9.0).service("service", "/add_two_ints", TRIGGER)
+    for k, (a, b) in enumerate([(17, 25), (0, 3), (7, -2)], 1):
+        rec.request(k, "/add_two_ints", k, value={"a": a, "b": b}).response(k + 0.01, "/add_two_ints", k, add(a, b))
+    finding = check.judge(rec.trace())
+    assert finding.credit == credit
+    assert said in finding.reason
+    assert ("set response.sum" in finding.hint) == (add(17, 25).get("sum", 0) == 0)
+
+
+def test_too_few_answers_and_requests_without_a_value_prove_no_formula() -> None:
+    """A request that the formula has no value for asks nothing."""
+    check = ServiceFunction("/divide", "quotient", "a / b")
+    rec = Recording(9.0).service("service", "/divide", TRIGGER)
+    rec.request(1, "/divide", 1, value={"a": 1, "b": 0}).response(1.1, "/divide", 1, {"quotient": 9.0})
+    assert check.judge(rec.trace()).reason == "/divide: 0 responses, expected at least 1"
+    rec.request(2, "/divide", 2, value={"a": 1, "b": 2}).response(2.1, "/divide", 2, {"quotient": 0.5})
+    assert check.judge(rec.trace()).credit == 1

@@ -70,6 +70,17 @@ criteria:
     points: 5
     scenario: alone
     check: {field_in_range: {topic: /level, field: data, low: 0, high: .inf}}
+  - id: turns
+    title: Turns
+    points: 5
+    scenario: alone
+    check:
+      reaction:
+        input: /scan
+        output: /cmd_vel
+        cases:
+          - when: {range_max: 12}
+            formulas: {angular.z: "2 - ranges[1] * range_min"}
 """
 
 #: What an author may write by mistake: old text, new text, line and column, what was expected, and the hint.
@@ -93,6 +104,9 @@ MISTAKES = [
     ("{success: true}", "{succes: true}", "43:59", "a field of std_srvs/srv/SetBool_Response", "`success`?"),
     ("sequence}", "sequnce}", "48:54", "a field of test_msgs/action/Fibonacci_Feedback", "`sequence`?"),
     ("field: data", "field: dta", "53:52", "a field of an installed message type", "`data`?"),
+    ("{angular.z: ", "{angular.w: ", "64:24", "a field of geometry_msgs/msg/Vector3", ""),
+    ("* range_min", "* range_mim", "64:35", "a field of sensor_msgs/msg/LaserScan", "`range_min`?"),
+    ("* range_min", "* range_min[0]", "64:35", "no field below `range_min`, which is a number", ""),
 ]
 
 

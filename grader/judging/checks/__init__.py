@@ -5,6 +5,7 @@ from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, Reac
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange, FieldMonotone, RandomInRange
 from grader.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
+from grader.judging.checks.heard import LogsResponse, LogsTexts
 from grader.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.programs import (
@@ -17,7 +18,13 @@ from grader.judging.checks.programs import (
 )
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.received import LogsReceived, LogsValues
-from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse, ServiceSequence
+from grader.judging.checks.services import (
+    ServiceAnswersAll,
+    ServiceAvailable,
+    ServiceFunction,
+    ServiceResponse,
+    ServiceSequence,
+)
 from grader.judging.checks.timing import Latency, Period, Reaction, Silence
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes, Transform
@@ -40,9 +47,12 @@ CHECKS: dict[str, type] = {
     "field_function": FieldFunction,
     "logs_every": LogsEvery,
     "logs_values": LogsValues,
+    "logs_texts": LogsTexts,
+    "logs_response": LogsResponse,
     "service_available": ServiceAvailable,
     "service_answers_all": ServiceAnswersAll,
     "service_response": ServiceResponse,
+    "service_function": ServiceFunction,
     "service_sequence": ServiceSequence,
     "service_calls": CallsOfClient,
     "waits_for_service": WaitsForService,

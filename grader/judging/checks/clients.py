@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -38,6 +38,7 @@ from grader.judging.service_calls import (
     episodes_of,
     text_of,
 )
+from grader.judging.values import RuleOrValue, breach, broken_rules, rules_text
 from grader.judging.wording import counted, moment, number, quote, span
 
 _WAIT_HINT = "wait in a loop: while not client.wait_for_service(timeout_sec=1.0): log that it is still waited for"
@@ -56,6 +57,8 @@ class CallsOfClient:
         at_most: Largest number of requests; `calls` if left out.
         period: Time expected from one request to the next; free if left out.
         tolerance: Largest difference of each gap from the period.
+        fields: What every request must hold by field path: a value, or `{equals, items, tolerance, low, high, pattern,
+            example}`.
     """
 
     service: str
@@ -63,10 +66,12 @@ class CallsOfClient:
     at_most: int | None = None
     period: DurationNs | None = None
     tolerance: DurationNs = NS_PER_S // 4
+    fields: Annotated[Mapping[str, RuleOrValue], FieldOf("service", "_Request")] = field(default_factory=dict)
 
     @property
     def expected(self) -> str:
-        text = f"{self.calls} requests on {self.service}"
+        text = f"{counted(self.calls, 'request')} on {self.service}"
+        text += f" with {rules_text(self.fields)}" if self.fields else ""
         if self.period is None:
             return text
         return f"{text}, {number(seconds(self.period))} ± {number(seconds(self.tolerance))} s apart"
@@ -83,6 +88,11 @@ class CallsOfClient:
         }
         if not self.calls <= len(calls) <= max(self.calls, self.at_most or 0):
             return self._miscounted(trace, calls, evidence)
+        for request in (c.request for c in calls):
+            for path in broken_rules(request.value, self.fields)[:1]:
+                flaw = breach(request.value, path, self.fields[path])
+                reason = f"{moment(request.t_ns)}, {self.service}: {flaw} in the request"
+                return not_met(reason, evidence | {"field": path}, problem=ProblemKind.WRONG_VALUE)
         wrong = self._wrong_gap(trace, calls) if self.period is not None else None
         asked = f"{self.service}: {counted(len(calls), 'request')}"
         if wrong is None:

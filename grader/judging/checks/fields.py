@@ -10,10 +10,11 @@ from typing import Annotated, Literal
 
 from grader.core.chart import Band, Chart, Look, Panel
 from grader.core.exercise import Finding, Problem, ProblemKind
-from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, seconds, within
+from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern, seconds, within
 from grader.core.trace import Message, Trace
 from grader.judging.charts import plain_topic, points_of, series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, met, not_met
+from grader.judging.output import number_in
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
 from grader.judging.values import (
     JITTER_NS,
@@ -27,6 +28,7 @@ from grader.judging.values import (
     published,
     published_numbers,
     rules_text,
+    text_at,
 )
 from grader.judging.wording import counted, moment, number, numbers, quote, unit_of
 
@@ -159,14 +161,24 @@ class FieldMonotone:
         return step > 0 if self.strictly else step >= -SLACK * max(1.0, abs(before))
 
 
-def _numbers(messages: Sequence[Message], path: str) -> Finding | tuple[float, ...]:
-    values = [number_at(m.value, path) for m in messages]
+def _numbers(messages: Sequence[Message], path: str, pattern: str | None = None) -> Finding | tuple[float, ...]:
+    """Return the number at a path of each message, or in the text there if a pattern finds it; or why there is none."""
+    values = [_number(m, path, pattern) for m in messages]
     found = tuple(v for v in values if v is not None)
     if len(found) == len(values):
         return found
     bare = next(m for m, v in zip(messages, values, strict=True) if v is None)
+    text = text_at(bare.value, path)
+    if pattern is not None and text is not None:
+        reason = f"{moment(bare.t_ns)}, {bare.topic}: no number where expected in {path}, {quote(text, 60)!r}"
+        return not_met(reason, {"topic": bare.topic, "text": text[:200]}, problem=ProblemKind.NO_NUMBER)
     reason = f"{moment(bare.t_ns)}, {bare.topic}: {quote(bare.type)} has no number {path}"
     return not_met(reason, {"topic": bare.topic, "type": bare.type}, problem=ProblemKind.NO_FIELD)
+
+
+def _number(message: Message, path: str, pattern: str | None) -> float | None:
+    text = None if pattern is None else text_at(message.value, path)
+    return number_at(message.value, path) if text is None else number_in(text, pattern)
 
 
 def too_few_messages(trace: Trace, topic: str, found: int, wanted: int) -> Finding:
@@ -191,6 +203,7 @@ class FieldFunction:
         tolerance: Largest difference, unit of the field.
         start_tolerance: Number of messages that may be lost before the first one received.
         at_least: Number of messages needed for a judgement.
+        pattern: Regular expression whose first group, or whole match, is the number, if the field is a text.
     """
 
     topic: str
@@ -199,6 +212,7 @@ class FieldFunction:
     tolerance: float = 1e-6
     start_tolerance: int = 0
     at_least: int = 10
+    pattern: Pattern | None = None
 
     @property
     def expected(self) -> str:
@@ -208,7 +222,7 @@ class FieldFunction:
         messages = published(trace, self.topic)
         if not messages:
             return explain_no_message(trace, self.topic)
-        values = _numbers(messages, self.field)
+        values = _numbers(messages, self.field, self.pattern)
         if isinstance(values, Finding):
             return values
         times = (seconds(m.t_ns - messages[0].t_ns) for m in messages)

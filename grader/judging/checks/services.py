@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
@@ -9,10 +10,11 @@ from typing import Annotated
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, Pattern, ServiceType, seconds, within
+from grader.core.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, Pattern, ServiceType, seconds, within
 from grader.core.trace import Response, Trace
 from grader.judging.findings import explain_fault, explain_no_server, first_fault, met, not_met, waiting_for
 from grader.judging.output import number_in
+from grader.judging.series import curve
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of
 from grader.judging.values import RuleOrValue, breach, broken_rules, number_at, rules_text, text_at
 from grader.judging.wording import counted, moment, number, numbers, quote, span
@@ -163,6 +165,67 @@ def never_asked(trace: Trace, service: str) -> Finding:
     if crashed := explain_fault(trace, f"{service} could not be asked"):
         return crashed
     raise HarnessError(f"{service}: nothing was asked of it, or too late to be answered")
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceFunction:
+    """A number in every response of a student's server follows a formula of the fields of its request.
+
+    The formula may use the request's numeric fields, such as `a` or `pose.x`, numbers, pi, + - * / % **, and sin, cos,
+    tan, exp, sqrt, abs and floor. Requests for which it has no value are left out. Whether every request has a response
+    is judged by `service_answers_all`.
+
+    Attributes:
+        service: Service name as on the wire.
+        field: Path of the number in the response.
+        formula: What it must be, e.g. `a + b`.
+        tolerance: Largest difference.
+        at_least: Number of responses needed for a judgement.
+    """
+
+    service: str
+    field: Annotated[str, FieldOf("service", "_Response")]
+    formula: Annotated[FieldFormula, FieldOf("service", "_Request", formula=True)]
+    tolerance: float = 1e-6
+    at_least: int = 1
+
+    @property
+    def expected(self) -> str:
+        return f"{self.field} = {self.formula} in every response of {self.service}"
+
+    def judge(self, trace: Trace) -> Finding:
+        answers = self._answers(calls_of(trace, self.service, "grader"))
+        if len(answers) < max(1, self.at_least):
+            return too_few_responses(trace, self.service, len(answers), self.at_least)
+        wrong = [a for a in answers if a.got is None or not within(a.got, a.wanted, self.tolerance)]
+        evidence: dict[str, object] = {
+            "service": self.service,
+            "responses": len(answers),
+            "wrong": len(wrong),
+            "numbers": [a.got for a in answers[:_MOST_IN_EVIDENCE]],
+        }
+        if not wrong:
+            reason = f"{self.service}: {self.field} = {self.formula} in {counted(len(answers), 'response')}"
+            return met(f"{reason}, such as {number(answers[-1].wanted)}", evidence)
+        first = wrong[0]
+        found = "no number" if first.got is None else number(first.got)
+        brief = f"{self.service}: {self.field} is {found}, expected {self.formula} = {number(first.wanted)}"
+        reason = f"{moment(first.response.t_ns)}, {brief}; wrong in {len(wrong)} of "
+        reason += counted(len(answers), "response")
+        hint = f"set response.{self.field} before the response is returned" if not any(a.got for a in answers) else ""
+        known = evidence | {"first_wrong_s": seconds(first.response.t_ns)}
+        return not_met(reason, known, hint=hint, problem=ProblemKind.WRONG_VALUE, brief=brief)
+
+    def _answers(self, calls: Sequence[Call]) -> list[_Answer]:
+        wanted = curve(self.formula, of_fields=True)
+        found = []
+        for call in calls:
+            given = {name: number_at(call.request.value, name) for name in wanted.names}
+            known = {name: value for name, value in given.items() if value is not None}
+            value = wanted.of(known) if len(known) == len(given) else math.nan
+            if call.response is not None and math.isfinite(value):
+                found.append(_Answer(call.response, number_at(call.response.value, self.field), value))
+        return found
 
 
 _MOST_IN_EVIDENCE = 250

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
@@ -11,7 +12,7 @@ from typing import Annotated, Literal
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, seconds, within
+from grader.core.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, seconds, within
 from grader.core.trace import Delivery, Message, Trace
 from grader.judging.checks.fields import too_few_messages
 from grader.judging.findings import (
@@ -24,6 +25,7 @@ from grader.judging.findings import (
     not_met,
     waiting_for,
 )
+from grader.judging.series import curve
 from grader.judging.values import (
     JITTER_NS,
     FieldRule,
@@ -34,6 +36,7 @@ from grader.judging.values import (
     breach,
     broken_rules,
     heard_from_ns,
+    number_at,
     published,
     rules_text,
     student_endpoints,
@@ -248,17 +251,22 @@ class ReactionCase:
         when: Content of the input, by field path; the first matching case applies.
         then: Content of the output, by field path.
         copies: Output field path -> input field path with the same value.
+        formulas: Output field path -> formula of the input's numeric fields, such as `sin(theta / 2)`.
         silent: Whether no output may come at all.
     """
 
     when: Annotated[Mapping[str, RuleOrValue], FieldOf("input")]
     then: Annotated[Mapping[str, RuleOrValue], FieldOf("output")] = field(default_factory=dict)
     copies: Annotated[Mapping[str, str], FieldOf("output", values="input")] = field(default_factory=dict)
+    formulas: Annotated[Mapping[str, FieldFormula], FieldOf("output", values="input", formula=True)] = field(
+        default_factory=dict
+    )
     silent: bool = False
 
     def rules(self, given: Mapping[str, object]) -> dict[str, RuleOrValue]:
         """Return the rules for the output after an input."""
-        return {**self.then, **{path: _copied(given, source) for path, source in self.copies.items()}}
+        copied = {path: _copied(given, source) for path, source in self.copies.items()}
+        return {**self.then, **copied, **{path: _computed(given, text) for path, text in self.formulas.items()}}
 
 
 def _copied(given: Mapping[str, object], source: str) -> RuleOrValue:
@@ -271,6 +279,15 @@ def _copied(given: Mapping[str, object], source: str) -> RuleOrValue:
     if isinstance(found, (str, int, float)):
         return FieldRule(equals=found)
     raise HarnessError(f"the field {source} of the input is neither a number nor a text nor a list")
+
+
+def _computed(given: Mapping[str, object], formula: str) -> float:
+    wanted = curve(formula, of_fields=True)
+    known = {name: value for name in wanted.names if (value := number_at(given, name)) is not None}
+    value = wanted.of(known) if len(known) == len(wanted.names) else math.nan
+    if not math.isfinite(value):
+        raise HarnessError(f"{formula} has no value for an input")
+    return value
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,7 +310,7 @@ class Reaction:
     Attributes:
         input: Topic of the inputs.
         output: Topic of the outputs.
-        cases: Each with `when`, and `then`, `copies` or `silent`.
+        cases: Each with `when`, and `then`, `copies`, `formulas` or `silent`.
         within: Longest time to the output.
         tolerance: Largest difference of a number without a tolerance of its own.
     """

@@ -1,0 +1,173 @@
+"""Checks on a node that logs what came to it: each text on a topic, or each response of a service."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding, ProblemKind
+from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, seconds
+from grader.core.trace import Trace
+from grader.judging.checks.logs import LOGGER_HINT
+from grader.judging.findings import (
+    explain_fault,
+    explain_no_client,
+    explain_no_subscription,
+    faulted,
+    first_fault,
+    met,
+    not_met,
+    only_printed,
+)
+from grader.judging.output import Output, in_window, numbers_in, printed_lines, student_records
+from grader.judging.service_calls import calls_of
+from grader.judging.values import JITTER_NS, as_number, heard_from_ns, shown, student_endpoints, value_at
+from grader.judging.wording import counted, moment, quote, span
+
+#: More numbers than this in one text, besides those expected, show nothing.
+_FEW = 6
+
+
+@dataclass(frozen=True, slots=True)
+class _Heard:
+    """Something that came to the node and must be logged: its time, and the content of its field."""
+
+    t_ns: int
+    value: object
+
+
+@dataclass(frozen=True, slots=True)
+class LogsTexts:
+    """A process logs each text that it receives, word for word, with any words around it.
+
+    Texts that are printed instead of logged give half the points.
+
+    Attributes:
+        process: File name of the student process.
+        topic: Topic of the texts.
+        field: Path of the text.
+        within: Longest time from a message to its log record.
+    """
+
+    process: str
+    topic: str
+    field: Annotated[str, FieldOf("topic")] = "data"
+    within: DurationNs = NS_PER_S
+
+    @property
+    def expected(self) -> str:
+        return f"{self.process} logs the text of each message on {self.topic}; printing alone is half of it"
+
+    def judge(self, trace: Trace) -> Finding:
+        if not student_endpoints(trace, "subscription", self.topic) and first_fault(trace, self.process) is None:
+            return explain_no_subscription(trace, self.topic)
+        from_ns = heard_from_ns(trace, self.topic)
+        sent = ((d.t_ns, value_at(d.value, self.field)) for d in trace.deliveries(self.topic) if d.t_ns >= from_ns)
+        texts = [_Heard(t_ns, value) for t_ns, value in sent if isinstance(value, str)]
+        hint = f"log msg.{self.field} in the callback of the subscription to {self.topic}"
+        return _judged(trace, self.process, texts, self.within, _Source(self.topic, "message", hint))
+
+
+@dataclass(frozen=True, slots=True)
+class LogsResponse:
+    """A client logs what each response of the grader's server says: a text, a number, or a list of numbers.
+
+    Texts count word for word, numbers to the precision printed, and lists if all of their numbers follow each other in
+    one record. Printing instead of logging gives half the points.
+
+    Attributes:
+        process: File name of the client.
+        service: Service name as on the wire.
+        field: Path of the field in the response.
+        within: Longest time from a response to its log record.
+    """
+
+    process: str
+    service: str
+    field: Annotated[str, FieldOf("service", "_Response")]
+    within: DurationNs = NS_PER_S
+
+    @property
+    def expected(self) -> str:
+        return f"{self.process} logs {self.field} of each response of {self.service}; printing alone is half of it"
+
+    def judge(self, trace: Trace) -> Finding:
+        calls = calls_of(trace, self.service, "student")
+        if not calls:
+            return explain_no_client(trace, self.service)
+        responses = [c.response for c in calls if c.response is not None]
+        heard = [_Heard(r.t_ns, value_at(r.value, self.field)) for r in responses]
+        hint = f"log response.{self.field} once the response has come"
+        return _judged(trace, self.process, heard, self.within, _Source(self.service, "response", hint))
+
+
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """Where something came from: its name, the word for what comes from it, and how to log that."""
+
+    name: str
+    word: str
+    hint: str
+
+    def all(self, count: int) -> str:
+        """Return that so many, which are all, are something."""
+        return f"the {self.word} of {self.name} is" if count == 1 else f"all {count} {self.word}s of {self.name} are"
+
+
+def _judged(trace: Trace, process: str, heard: Sequence[_Heard], within_ns: int, source: _Source) -> Finding:
+    """Return the finding about what came from a source."""
+    jitter_ns = JITTER_NS[trace.clock]
+    late_ns = within_ns + jitter_ns + 1
+    due = [one for one in heard if one.t_ns + late_ns <= trace.stop_ns or _ended(trace, process)]
+    if not due:
+        if crashed := explain_fault(trace, "nothing was logged after it", process=process):
+            return crashed
+        raise HarnessError(f"{source.name}: no {source.word} came, or too late to be logged")
+
+    def near(outputs: Sequence[Output], one: _Heard) -> list[Output]:
+        return in_window(outputs, one.t_ns - jitter_ns, one.t_ns + late_ns)
+
+    def unlogged(outputs: Sequence[Output]) -> list[_Heard]:
+        return [one for one in due if not any(_says(o.text, one.value) for o in near(outputs, one))]
+
+    records = student_records(trace, process)
+    missing = unlogged(records)
+    evidence: dict[str, object] = {f"{source.word}s": len(due), "missing": [shown(one.value) for one in missing[:20]]}
+    if not missing:
+        return met(f"{process}: {source.all(len(due))} logged, such as {shown(due[0].value)}", evidence)
+    if not unlogged(sorted([*records, *printed_lines(trace, process)], key=lambda o: o.t_ns)):
+        return only_printed(f"{process}: {source.all(len(due))} printed, not all of them logged", evidence, LOGGER_HINT)
+    first = missing[0]
+    found = near(records, first)
+    wrote = f"found {quote(' / '.join(o.text for o in found), 80)}" if found else "found no log"
+    wanted = f"expected {shown(first.value)} within {span(within_ns)}, {wrote}"
+    reason = f"{process}: {len(missing)} of {counted(len(due), source.word)} of {source.name} not logged, the first at "
+    reason += f"{moment(first.t_ns)}: {wanted}"
+    fault = first_fault(trace, process)
+    if fault is not None and fault.t_ns < first.t_ns + late_ns:
+        return faulted(fault, reason, evidence, last=True)
+    problem = ProblemKind.WRONG_VALUE if found else ProblemKind.NOT_LOGGED
+    known = evidence | {"first_missing_s": seconds(first.t_ns)}
+    return not_met(reason, known, hint=source.hint, problem=problem, brief=f"{source.name}: {wanted}")
+
+
+def _ended(trace: Trace, process: str) -> bool:
+    """Return whether a process ended before the recording did, so that nothing more is to be expected of it."""
+    return any(mark.t_ns < trace.stop_ns for mark in trace.marks("exited", process))
+
+
+def _says(text: str, value: object) -> bool:
+    """Return whether a text shows a value: word for word, or as numbers next to each other and few others."""
+    if isinstance(value, str):
+        return re.search(rf"(?<!\w){re.escape(value)}(?!\w)", text) is not None
+    wanted = [as_number(one) for one in (value if isinstance(value, (list, tuple)) else [value])]
+    found = numbers_in(text)
+    if None in wanted or len(found) > len(wanted) + _FEW:
+        return False
+    return any(
+        all(n.shows(w) for n, w in zip(found[k:], wanted, strict=False) if w is not None)
+        for k in range(len(found) - len(wanted) + 1)
+    )
