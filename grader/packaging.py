@@ -20,7 +20,7 @@ from grader.app.seeds import read_key
 from grader.core.errors import EnvironmentFault, GraderError, RubricError
 from grader.core.shipped import shipped
 from grader.rubrics.builtin import builtin_rubrics, exercise_ids
-from grader.rubrics.loader import own_check_files, read_rubric
+from grader.rubrics.loader import read_rubric, side_files
 from grader.rubrics.variants import First
 
 PACKAGE = "rclpy-grader"
@@ -210,7 +210,7 @@ def _common(chosen: Chosen) -> dict[str, bytes]:
     # Numbered, because rubrics in different folders may share a name, and file names may be arbitrary.
     folders = {f"rubrics/{n}": path for n, path in enumerate(chosen.rubrics, start=1)}
     rubrics = {f"{folder}/rubric.yaml": path.read_bytes() for folder, path in folders.items()}
-    checks = {f"{folder}/{f.name}": f.content for folder, path in folders.items() for f in own_check_files(path)}
+    checks = {f"{folder}/{f.name}": f.content for folder, path in folders.items() for f in side_files(path)}
     settings = {"exercises": chosen.exercises, "rubrics": list(rubrics), "isolation": chosen.isolation}
     return {
         "prepare": integration("prepare"),

@@ -225,7 +225,7 @@ def plan_jobs(
         )
         for exercise in exercises
         for scenario in exercise.scenarios
-        if all(submission.files[name].found for name in scenario.processes)
+        if all(submission.files[name].found for name in scenario.handed_in)
     }
 
 

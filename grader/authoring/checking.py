@@ -44,7 +44,7 @@ def _of_exercise(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
         if scenario.id not in judged:
             text = f"the scenario {scenario.id} is recorded, but no criterion looks at it"
             yield tree.at(("scenarios", index, "id")).mistake(text)
-    run = {process for scenario in exercise.scenarios for process in scenario.processes}
+    run = {process for scenario in exercise.scenarios for process in scenario.handed_in}
     for index, name in enumerate(exercise.files):
         if name not in run:
             yield tree.at(("files", index)).mistake(f"{name} is asked for, but no scenario runs it")

@@ -268,6 +268,19 @@ def is_open(stimulus: Stimulus) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
+class RunOptions:
+    """What a process is given when it is started, as on the command line of `ros2 run` or `ros2 launch`."""
+
+    arguments: tuple[str, ...] = ()  # arguments of the program, before the ROS arguments
+    name: str = ""  # node name; empty for the program's own
+    namespace: str = ""
+    remappings: tuple[tuple[str, str], ...] = ()
+    parameters: tuple[tuple[str, str], ...] = ()  # name, with dots for nested ones, and value as YAML
+    parameters_file: str = ""  # name of a YAML file in ROS's format, handed in or provided
+    launch_arguments: tuple[tuple[str, str], ...] = ()  # of a launch file
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """One situation that is recorded once."""
 
@@ -281,6 +294,20 @@ class Scenario:
     starts_ns: tuple[tuple[str, Time], ...] = ()
     may_exit: tuple[str, ...] = ()  # processes that may end by themselves; exit code 0 is then no fault
     shutdown_ns: int = 0  # how long the processes may take to end after the stop signal; 0 if this is not checked
+    run: tuple[tuple[str, RunOptions], ...] = ()  # `(process, options)` of processes that are started with some
+    provided: tuple[tuple[str, str], ...] = ()  # name and text of the rubric's own files that this scenario uses
+
+    @property
+    def handed_in(self) -> tuple[str, ...]:
+        """The files that a student has to hand in for this scenario: programs, then parameter files."""
+        used = (*self.processes, *(options.parameters_file for _, options in self.run if options.parameters_file))
+        own = dict(self.provided)
+        return tuple(dict.fromkeys(name for name in used if name not in own))
+
+
+def is_launch_file(name: str) -> bool:
+    """Return whether a file is a launch file, by its name: `robot.launch.py` or `robot_launch.py`."""
+    return name.endswith((".launch.py", "_launch.py"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ class StudentFile:
     # If it is missing: other .py files in the submission that no exercise asks for, likeliest first
     candidates: tuple[str, ...] = ()
     likely: bool = False  # whether the first candidate resembles it, by its name or its text
+    executable: str = ""  # name of the entry point that runs the file, if it was found by one
 
 
 @dataclass(frozen=True, slots=True)

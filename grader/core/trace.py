@@ -49,16 +49,20 @@ class Start:
     target: str = ""  # `MODULE` or `MODULE:FUNCTION`; empty for a script
     # Files and folders of the submission that are imported instead of a module of Python or ROS
     hidden: tuple[str, ...] = ()
+    arguments: str = ""  # what the program was given on its command line, as it is typed
+    launched_by: str = ""  # the launch file that started it, with its line; empty for the scenario itself
 
     @property
     def words(self) -> str:
         """The way of starting, as a phrase that follows `run`."""
-        return {
+        way = {
             StartWay.SCRIPT: f"as `python3 {self.file}`",
             StartWay.MODULE: f"as `python3 -m {self.target}`",
             StartWay.MAIN: f"as `ros2 run` would: {self.target}()",
             StartWay.ENTRY_POINT: f"as `ros2 run` does: the entry point {self.target}",
         }[self.way]
+        given = f" with {self.arguments}" if self.arguments else ""
+        return f"{way}{given}{f' by {self.launched_by}' if self.launched_by else ''}"
 
 
 @dataclass(frozen=True, slots=True)

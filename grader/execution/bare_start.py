@@ -15,6 +15,7 @@ from typing import Any
 from grader.core.limits import Limits
 from grader.core.trace import LogRecord, OutputLine
 from grader.execution.console import last_traceback
+from grader.execution.plan import PlannedStart
 from grader.execution.sandbox.protocol import Command
 from grader.execution.student_process import NodeProcess
 from grader.student_host.packages import ENTRY_POINT, layout_of, never_true, package_folders, start_of
@@ -38,7 +39,7 @@ for _name in ("", ".msg", ".srv", ".action"):
 _NODES = frozenset({"Node", "LifecycleNode"})
 
 
-def bare_arguments(here: Path, root: str, file: str) -> tuple[str, ...]:
+def bare_arguments(here: Path, root: str, file: str, given: PlannedStart | None = None) -> tuple[str, ...]:
     """Return the Python arguments that run a file as its author would.
 
     A file in a package is started as `ros2 run` starts it. If a file starts nothing by itself, the command calls its
@@ -48,30 +49,35 @@ def bare_arguments(here: Path, root: str, file: str) -> tuple[str, ...]:
         here: The staged submission.
         root: The path at which the process sees the submission.
         file: The file, relative to `root`.
+        given: What it is started with; None for its file alone.
     """
+    given = given or PlannedStart(file)
     path = f"{root}/{file}"
-    missing = _missing(here)
+    missing = f"{_missing(here)}{_with_parameter_files(given)}"
+    plain = (*given.arguments, *(("--ros-args", *given.ros_arguments) if given.ros_arguments else ()))
     beside = str(PurePosixPath(path).parent)
     script = f"runpy.run_path({path!r}, run_name='__main__')"
     tree = _parsed(here / file)
     if tree is None:
-        return _by_import(script, [beside], path, missing) if missing else ("-u", path)
+        return _by_import(script, [beside], path, missing, plain) if missing else ("-u", path, *plain)
     layout = layout_of(str(here), file)
-    start = start_of(str(here), file, layout, tree)
+    start = start_of(str(here), file, layout, tree, given.executable)
     folders = [f for f in dict.fromkeys((start.base, layout.base, *package_folders(str(here)))) if f]
     seen = [root + folder.removeprefix(str(here)) for folder in folders]
     if layout.module and not layout.base:  # its package is the submission's own folder
         seen.append(str(PurePosixPath(root).parent))
     if start.function:
         called = f"importlib.import_module({start.module!r}).{start.function}()"
-        return _by_import(f"sys.exit({called})" if start.way == ENTRY_POINT else called, seen, path, missing)
+        return _by_import(f"sys.exit({called})" if start.way == ENTRY_POINT else called, seen, path, missing, plain)
     module = start.module or PurePosixPath(file).stem
     seen = seen if start.module else list(dict.fromkeys([beside, *(seen if layout.package is not None else ())]))
     if run := _help(tree, module):
-        return _by_import(run, seen, path, missing)
+        return _by_import(run, seen, path, missing, plain)
     if start.module:
-        return _by_import(f"runpy.run_module({module!r}, run_name='__main__', alter_sys=True)", seen, path, missing)
-    return _by_import(script, seen, path, missing) if missing or len(seen) > 1 else ("-u", path)
+        return _by_import(
+            f"runpy.run_module({module!r}, run_name='__main__', alter_sys=True)", seen, path, missing, plain
+        )
+    return _by_import(script, seen, path, missing, plain) if missing or len(seen) > 1 else ("-u", path, *plain)
 
 
 def _help(tree: ast.Module, module: str) -> str:
@@ -85,11 +91,27 @@ def _help(tree: ast.Module, module: str) -> str:
     return spin if len(nodes) == 1 else ""
 
 
-def _by_import(run: str, folders: Sequence[str], path: str, missing: str) -> tuple[str, ...]:
+def _with_parameter_files(given: PlannedStart) -> str:
+    """Return code that writes the parameter files and adds them to the command line; usually empty."""
+    if not given.parameter_files:
+        return ""
+    return f"""
+import os, sys
+sys.argv += {["--ros-args"] if not given.ros_arguments else []!r}
+for _number, _text in enumerate({[text for _, text in given.parameter_files]!r}):
+    _path = os.path.join(os.environ["HOME"], f"parameters_{{os.getpid()}}_{{_number}}.yaml")
+    open(_path, "w", encoding="utf-8").write(_text)
+    sys.argv += ["--params-file", _path]
+"""
+
+
+def _by_import(
+    run: str, folders: Sequence[str], path: str, missing: str, arguments: Sequence[str] = ()
+) -> tuple[str, ...]:
     beside = str(PurePosixPath(path).parent)
     behind = "" if beside in folders else f"; sys.path.append({beside!r})"
     begin = f"import importlib, runpy, sys; sys.path[:1] = {list(folders)!r}; sys.argv[0] = {path!r}{behind}"
-    return ("-u", "-c", f"{missing}{begin}; {run}")
+    return ("-u", "-c", f"{missing}{begin}; {run}", *arguments)
 
 
 def _missing(here: Path) -> str:

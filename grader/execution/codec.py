@@ -27,6 +27,7 @@ from grader.core.trace import (
     OutputLine,
     Request,
     Response,
+    Start,
     Trace,
 )
 
@@ -59,10 +60,16 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
         "stop_ns": trace.stop_ns,
         "notes": list(trace.notes),
         "harness_problem": trace.harness_problem,
-        **({"starts": plain(trace.starts)} if trace.starts else {}),
+        **({"starts": [_start_to_json(start) for start in trace.starts]} if trace.starts else {}),
         **({"most_starved_ns": trace.most_starved_ns} if trace.most_starved_ns else {}),
         "observations": [observation_to_json(o) for o in trace.observations],
     }
+
+
+def _start_to_json(start: Start) -> list[Any]:
+    """Convert how a process was started; what it was given on the command line follows in a list, if there is any."""
+    *row, arguments, launched_by = plain(start)
+    return [*row, [arguments, launched_by]] if arguments or launched_by else row
 
 
 def observation_to_json(observation: Observation) -> list[Any]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import random
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from shlex import quote
 from typing import Any
 
 from grader.core.limits import Limits
@@ -18,10 +19,12 @@ from grader.core.scenario import (
     NumberSpec,
     NumberStream,
     OdometryStream,
+    RunOptions,
     Scenario,
     ServiceCalls,
     ServiceServer,
     TimeBetween,
+    is_launch_file,
     shortest,
 )
 from grader.core.submission import Submission
@@ -68,6 +71,36 @@ class PlannedRecording:
 
 
 @dataclass(frozen=True, slots=True)
+class PlannedStart:
+    """What one process is started with.
+
+    Attributes:
+        process: Name of the process.
+        executable: Name of the entry point to run; empty for the one that suits the file.
+        arguments: Arguments of the program, before the ROS arguments.
+        ros_arguments: What follows `--ros-args`, without parameter files.
+        parameter_files: Name and text of parameter files.
+        launch_arguments: Name and value of each argument, for a launch file.
+        provided: Name and text of files that the launch file may need.
+    """
+
+    process: str
+    executable: str = ""
+    arguments: tuple[str, ...] = ()
+    ros_arguments: tuple[str, ...] = ()
+    parameter_files: tuple[tuple[str, str], ...] = ()
+    launch_arguments: tuple[tuple[str, str], ...] = ()
+    provided: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def words(self) -> str:
+        """The arguments as they are typed; empty if there are none."""
+        files = [f"--params-file {quote(name)}" for name, _ in self.parameter_files]
+        ros = [*map(quote, self.ros_arguments), *files]
+        return " ".join([*map(quote, self.arguments), *(["--ros-args", *ros] if ros else [])])
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """Everything that a worker needs to run one scenario.
 
@@ -94,6 +127,7 @@ class Plan:
         bare: Whether the files run as with `python3 FILE`, on the wall clock, without the grader's code in their
             processes.
         first_node_ns: When the first node of the bare processes is expected, from which their time is counted.
+        starts: What processes are started with, where that is more than their file.
         publishers: The publishers that bare processes are expected to create; the grader subscribes before they do.
     """
 
@@ -119,6 +153,11 @@ class Plan:
     bare: bool = False
     first_node_ns: int = 0
     publishers: tuple[Endpoint, ...] = ()
+    starts: tuple[PlannedStart, ...] = ()
+
+    def start_of(self, process: str) -> PlannedStart:
+        """Return what a process is started with."""
+        return next((start for start in self.starts if start.process == process), PlannedStart(process))
 
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage
@@ -149,7 +188,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
     )
     return Plan(
         scenario=scenario.id,
-        processes=tuple((name, submission.files[name].found or name) for name in scenario.processes),
+        processes=tuple((name, _file_of(name, submission)) for name in scenario.processes),
         root=str(submission.root),
         host_seed=derive(seed, "host", exercise, scenario.id),
         duration_ns=duration_ns,
@@ -166,7 +205,54 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         starts_ns=tuple((name, drawn_time(t_ns, course)) for name, t_ns in scenario.starts_ns),
         may_exit=scenario.may_exit,
         shutdown_ns=scenario.shutdown_ns,
+        starts=tuple(start for name in scenario.processes if (start := _start(name, scenario, submission)) is not None),
     )
+
+
+def _file_of(process: str, submission: Submission) -> str:
+    """Return the file of a process in the submission; a launch file of the rubric's own keeps its name."""
+    handed_in = submission.files.get(process)
+    return (handed_in.found if handed_in is not None else None) or process
+
+
+def _start(process: str, scenario: Scenario, submission: Submission) -> PlannedStart | None:
+    """Return what a process is started with; None if that is its file alone."""
+    options = dict(scenario.run).get(process, RunOptions())
+    own, handed_in = dict(scenario.provided), submission.files.get(process)
+    start = PlannedStart(
+        process,
+        executable=handed_in.executable if handed_in is not None else "",
+        arguments=options.arguments,
+        ros_arguments=ros_arguments(options.name, options.namespace, options.remappings, options.parameters),
+        parameter_files=tuple(
+            (name, _parameters(name, own, submission)) for name in (options.parameters_file,) if name
+        ),
+        launch_arguments=options.launch_arguments,
+        provided=scenario.provided if is_launch_file(process) else (),
+    )
+    return start if start != PlannedStart(process) else None
+
+
+def _parameters(name: str, provided: Mapping[str, str], submission: Submission) -> str:
+    """Return the text of a parameter file, which the rubric provides or the student has handed in."""
+    if name in provided:
+        return provided[name]
+    found = submission.files[name].found or name
+    return (submission.root / found).read_text(encoding="utf-8", errors="replace")
+
+
+def ros_arguments(
+    name: str, namespace: str, remappings: Iterable[tuple[str, str]], parameters: Iterable[tuple[str, str]] = ()
+) -> tuple[str, ...]:
+    """Return ROS arguments for a node's name and namespace, remappings, and parameters with values in YAML."""
+    rules = [*([f"__node:={name}"] if name else []), *([f"__ns:={_absolute(namespace)}"] if namespace else [])]
+    rules += [f"{old}:={new}" for old, new in remappings]
+    given = [f"{parameter}:={value}" for parameter, value in parameters]
+    return (*(part for rule in rules for part in ("-r", rule)), *(part for one in given for part in ("-p", one)))
+
+
+def _absolute(namespace: str) -> str:
+    return namespace if namespace.startswith("/") else f"/{namespace}"
 
 
 def derive(seed: int, *purpose: str) -> str:

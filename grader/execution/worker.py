@@ -166,9 +166,14 @@ class Worker:
     def _start(self, plan: Plan, name: str, file: str, domain: int) -> NodeProcess:
         ours, theirs = socket.socketpair()
         root = self._isolation.submission_seen_at or plan.root
+        start = plan.start_of(name)
         request = {
             "root": root,
             "file": file,
+            "executable": start.executable,
+            "arguments": start.arguments,
+            "ros_arguments": start.ros_arguments,
+            "parameter_files": start.parameter_files,
             "seed": plan.host_seed,
             "clock": plan.clock,
             "log_format": LOG_FORMAT,
@@ -204,7 +209,7 @@ class Worker:
             raise
         finally:
             theirs.close()
-        student.file, student.places = file, Places(Path(plan.root))
+        student.file, student.places, student.arguments = file, Places(Path(plan.root)), start.words
         return student
 
     def _starter(self, clock: str) -> Starter:
@@ -220,7 +225,7 @@ class Worker:
                 runtime=self._runtime,
                 host_folder=None,
                 submission=Path(plan.root),
-                arguments=bare_arguments(Path(plan.root), root, file),
+                arguments=bare_arguments(Path(plan.root), root, file, plan.start_of(name)),
                 environment={"ROS_DOMAIN_ID": str(domain)},
                 pass_fds=(),
             ),

@@ -12,6 +12,7 @@ from fractions import Fraction
 from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.report import NOT_JUDGED, ExerciseReport, Pace, Report, ReportedFault, Summary, TopicSummary, Verdict
+from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import EXPORT_NOTEBOOK, Run, Submission, is_notebook
 from grader.core.trace import ClockKind, Fault, GraphSnapshot, Message, Offer, StartWay, Trace
 from grader.judging.charts import excerpts_for, illustrated
@@ -99,8 +100,9 @@ def _notes(
 
 
 def started(trace: Trace) -> tuple[str, ...]:
-    """Return the files that were not started as `python3 FILE`, and how they were started."""
-    return tuple(f"{s.file}: run {s.words}" for s in trace.starts if s.way is not StartWay.SCRIPT)
+    """Return the files that were not started as `python3 FILE` alone, and how they were started."""
+    plain = [s.way is StartWay.SCRIPT and not s.arguments and not s.launched_by for s in trace.starts]
+    return tuple(f"{s.file}: run {s.words}" for s, alone in zip(trace.starts, plain, strict=True) if not alone)
 
 
 def _faults(recorded: list[tuple[str, Trace]]) -> tuple[ReportedFault, ...]:
@@ -118,9 +120,15 @@ def _faults(recorded: list[tuple[str, Trace]]) -> tuple[ReportedFault, ...]:
 
 def _graph(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphSnapshot | None:
     """Return the graph with most edges, the last of equals, from the last scenario with all files."""
-    whole = [s for s in exercise.scenarios if set(s.processes) == set(exercise.files) and s.id in traces]
+    whole = [s for s in exercise.scenarios if _runs_all(s, exercise) and s.id in traces]
     graphs = traces[whole[-1].id].graphs() if whole else ()
     return max(reversed(graphs), key=_edge_count, default=None)
+
+
+def _runs_all(scenario: Scenario, exercise: Exercise) -> bool:
+    """Return whether every program of an exercise runs in a scenario, as far as a launch file does not decide it."""
+    programs = {name for name in exercise.files if not name.endswith((".yaml", ".yml"))}
+    return programs == set(scenario.processes) or any(map(is_launch_file, scenario.processes))
 
 
 def _edge_count(graph: GraphSnapshot) -> int:

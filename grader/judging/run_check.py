@@ -60,7 +60,7 @@ def run_check(
 ) -> Answer:
     """Run the criterion's check on the trace of its scenario, or on the source of its files."""
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
-    missing = tuple(p for p in scenario.processes if p in submission.files and submission.files[p].found is None)
+    missing = tuple(p for p in scenario.handed_in if p in submission.files and submission.files[p].found is None)
     if missing:
         return Answer(missing=missing)
     trace = traces.get(scenario.id)

@@ -121,7 +121,8 @@ def json_text(values: Mapping[str, object]) -> str:
 
 def start_values(start: Start) -> Mapping[str, object]:
     """Return how a file was started, for JSON."""
-    return {**asdict(start), "target": start.target or None}
+    values = {name: value for name, value in asdict(start).items() if value or name not in ("arguments", "launched_by")}
+    return {**values, "target": start.target or None}
 
 
 def _exercise(exercise: ExerciseReport, report: Report) -> Mapping[str, object]:

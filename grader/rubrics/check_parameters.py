@@ -38,7 +38,7 @@ from grader.rubrics.types import (
     LongDuration,
     MessageType,
     PatternText,
-    PythonFile,
+    ProgramName,
     Quantity,
     Real,
     ServiceType,
@@ -63,7 +63,7 @@ _BY_NAME: Mapping[str, object] = {
         ("topic", "input", "output", "forward", "back", "service", "action", "publishes", "subscribes"), Topic
     ),
     "type": MessageType,
-    "process": PythonFile,
+    "process": ProgramName,
 }
 
 _BY_ANNOTATION: tuple[tuple[object, object], ...] = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,11 +18,13 @@ from grader.core.limits import Limits
 from grader.core.quantities import duration
 from grader.core.scenario import (
     NumberStream,
+    RunOptions,
     Scenario,
     Span,
     Stimulus,
     Time,
     TimeBetween,
+    is_launch_file,
     is_open,
     longest,
     longest_course_ns,
@@ -31,8 +34,9 @@ from grader.judging.checks import CHECKS
 from grader.rubrics.interfaces import Interfaces, interface_mistakes
 from grader.rubrics.mistakes import mistakes_of, nearest
 from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, feedback_of, rubric_model
-from grader.rubrics.own_checks import OwnFile, digest_of, load, named_files, own_files
-from grader.rubrics.types import CHECK_FILE, build
+from grader.rubrics.own_checks import OwnFile, digest_of, load, named_files, own_files, provided_files
+from grader.rubrics.run_options import RunShape
+from grader.rubrics.types import CHECK_FILE, PROVIDED_FILE, PROVIDED_WORDS, build
 from grader.rubrics.variants import (
     Draw,
     First,
@@ -54,9 +58,11 @@ def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:
     criterion_ids = [criterion.id for criterion in rubric.criteria]
     return [
         *_repeated(rubric.files, ("files",), tree),
+        *_repeated(rubric.provided, ("provided",), tree),
+        *_both(rubric, tree),
         *_repeated(scenario_ids, ("scenarios",), tree, "id"),
         *_repeated(criterion_ids, ("criteria",), tree, "id"),
-        *(m for i, scenario in enumerate(rubric.scenarios) for m in _in_scenario(scenario, i, rubric.files, tree)),
+        *(m for i, scenario in enumerate(rubric.scenarios) for m in _in_scenario(scenario, i, rubric, tree)),
         *(m for i, criterion in enumerate(rubric.criteria) for m in _in_criterion(criterion, i, rubric, tree)),
     ]
 
@@ -75,16 +81,29 @@ def _unknown(name: str, known: Iterable[str], what: str, where: Position) -> Ite
         yield where.mistake(text, nearest(name, known))
 
 
-def _in_scenario(scenario: ScenarioShape, index: int, files: Sequence[str], tree: YamlTree) -> Iterator[Mistake]:
+def _both(rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
+    for index, name in enumerate(rubric.provided):
+        if name in rubric.files:
+            text = f"expected a file that students do not hand in, found `{shown(name)}`, which is in `files`"
+            yield tree.at(("provided", index)).mistake(text)
+
+
+def _in_scenario(scenario: ScenarioShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
     path: TreePath = ("scenarios", index)
     yield from _repeated(scenario.processes, (*path, "processes"), tree)
+    programs = [name for name in (*rubric.files, *filter(is_launch_file, rubric.provided)) if not _is_yaml(name)]
+    one_of = "one of `files`" if len(programs) == len(rubric.files) else "a program in `files` or `provided`"
     for number, process in enumerate(scenario.processes):
-        yield from _unknown(process, files, "one of `files`", tree.at((*path, "processes", number)))
+        yield from _unknown(process, programs, one_of, tree.at((*path, "processes", number)))
+    for process, options in scenario.run.items():
+        yield from _in_run(process, options, rubric, (*path, "run", process), tree)
     yield from _repeated(scenario.may_exit, (*path, "may_exit"), tree)
     known, what = scenario.processes, "one of `processes`"
     for number, process in enumerate(scenario.may_exit):
         yield from _unknown(process, known, what, tree.at((*path, "may_exit", number)))
     observed: Span = build(scenario.observe)
+    for process in scenario.run:
+        yield from _unknown(process, known, what, tree.at_key((*path, "run", process)))
     for process, start in scenario.start.items():
         yield from _unknown(process, known, what, tree.at_key((*path, "start", process)))
         yield from _too_late(build(start), observed, (*path, "start", process), tree)
@@ -92,6 +111,27 @@ def _in_scenario(scenario: ScenarioShape, index: int, files: Sequence[str], tree
         stimulus = build(shape)
         yield from _in_stimulus(stimulus, observed, (*path, "stimuli", number, shape.chosen[0]), tree)
         yield from _cut_off(stimulus, observed, (*path, "observe", "duration"), tree)
+
+
+def _is_yaml(name: str) -> bool:
+    return name.endswith((".yaml", ".yml"))
+
+
+def _in_run(process: str, options: RunShape, rubric: RubricShape, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    if options.parameters_file is not None:
+        known = [name for name in (*rubric.files, *rubric.provided) if _is_yaml(name)]
+        what, where = "a YAML file in `files` or `provided`", tree.at((*path, "parameters_file"))
+        if known:
+            yield from _unknown(options.parameters_file, known, what, where)
+        else:
+            yield where.mistake(f"expected {what}, found none there")
+    for key in options.model_fields_set:
+        if is_launch_file(process) and key != "launch_arguments":
+            text = f"expected only `launch_arguments` for a launch file, found `{key}`"
+            yield tree.at_key((*path, key)).mistake(text, "a launch file itself says what its nodes are given")
+        if not is_launch_file(process) and key == "launch_arguments":
+            text = f"expected `launch_arguments` for a launch file only, found it for `{shown(process)}`"
+            yield tree.at_key((*path, key)).mistake(text, "name launch files like robot.launch.py")
 
 
 def _too_late(start: Time, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
@@ -127,6 +167,8 @@ def _in_criterion(criterion: CriterionShape, index: int, rubric: RubricShape, tr
     if isinstance(process, str) and criterion.scenario in scenarios:
         known = scenarios[criterion.scenario].processes
         what = f"a process of the scenario {criterion.scenario}"
+        if any(map(is_launch_file, known)):  # what it starts goes by the names of the files that are handed in
+            known = (*known, *(name for name in rubric.files if not _is_yaml(name)))
         yield from _unknown(process, known, what, tree.at((*path, "check", name, "process")))
 
 
@@ -151,6 +193,9 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 #: Largest rubric file, in bytes.
 MAX_BYTES = 256 * 1024
+
+#: The key of a ROS parameter file that holds the parameters of a node.
+PARAMETERS_KEY = "ros__parameters"
 
 #: Maximum number of mistakes listed at once.
 MAX_MISTAKES = 10
@@ -193,17 +238,19 @@ def read_rubric(
     content = _content(path)
     tree = _tree(path, content)
     files = own_files(path, _own_names(path, tree), submissions)
+    provided = {file.name: _provided(file) for file in own_files(path, _provided_names(path, tree), submissions)}
     checks = {**checks, **load(files, checks)}
-    digest = digest_of(content, files)
+    digest = digest_of(content, (*files, *own_files(path, tuple(provided), submissions)))
     if not has_variants(tree):
-        return _exercise(path, tree, checks, digest, interfaces)
+        return _exercise(path, tree, checks, digest, interfaces, provided)
     options = options_of(_validated(path, tree, Variants))
     known = {option.name: option.value(0) for option in options}
-    nobodys = _exercise(path, with_values(tree, known), checks, digest, interfaces)
+    nobodys = _exercise(path, with_values(tree, known), checks, digest, interfaces, provided)
     for values in tried(options, known) if draw is None or isinstance(draw, First) else ():
-        _exercise(path, with_values(tree, values), checks, digest, interfaces)
+        _exercise(path, with_values(tree, values), checks, digest, interfaces, provided)
     variant = _variant(path, tree, nobodys, options, draw)
-    exercise = _exercise(path, with_values(tree, dict(variant.values)), checks, varied_digest(digest, variant))
+    varied = with_values(tree, dict(variant.values))
+    exercise = _exercise(path, varied, checks, varied_digest(digest, variant), None, provided)
     return replace(exercise, variant=variant)
 
 
@@ -223,8 +270,43 @@ def _variant(
     return Variant(draw.student, tuple((name, value) for name, value in values if value is not None))
 
 
-def _exercise(
-    path: Path, tree: YamlTree, checks: Mapping[str, type], digest: str, interfaces: Interfaces | None = None
+def _provided(file: OwnFile) -> str:
+    """Return the text of a provided file; raises RubricError if ROS could not read it."""
+    where = shown(str(file.path), 500)
+    try:
+        text = file.content.decode()
+        if not _is_yaml(file.name):
+            ast.parse(text)
+            return text
+        data = read_yaml(text).data
+    except UnicodeDecodeError as error:
+        raise RubricError(f"{where}: expected UTF-8 text, found the byte 0x{file.content[error.start]:02x}") from None
+    except YamlSyntaxError as error:
+        mistake = error.mistake
+        raise RubricError(f"{where}:{mistake.line}:{mistake.column}: {mistake.text}", mistake.hint) from None
+    except (SyntaxError, ValueError, RecursionError) as error:
+        line = getattr(error, "lineno", None) or 1
+        raise RubricError(f"{where}:{line}: expected a launch file in Python, found {type(error).__name__}") from None
+    if not isinstance(data, dict) or not data or not all(map(_has_parameters, data.values())):
+        text = f"{where}: expected a parameter file of ROS, with `ros__parameters` below each node"
+        raise RubricError(text, "write: /**: {ros__parameters: {rate: 5.0}}")
+    return text
+
+
+def _has_parameters(value: object) -> bool:
+    """Return whether a node or a namespace of a parameter file has parameters."""
+    if not isinstance(value, dict) or not value:
+        return False
+    return isinstance(value.get(PARAMETERS_KEY), dict) or all(map(_has_parameters, value.values()))
+
+
+def _exercise(  # noqa: PLR0913  what a rubric and its own files hold
+    path: Path,
+    tree: YamlTree,
+    checks: Mapping[str, type],
+    digest: str,
+    interfaces: Interfaces | None = None,
+    provided: Mapping[str, str] | None = None,
 ) -> Exercise:
     rubric = _validated(path, tree, rubric_model(tuple(checks.items())))
     mistakes = [*tree.mistakes, *broken_links(rubric, tree)]
@@ -240,7 +322,7 @@ def _exercise(
         title=rubric.exercise.title,
         required=rubric.exercise.required,
         files=rubric.files,
-        scenarios=tuple(_scenario(shape, limits) for shape in rubric.scenarios),
+        scenarios=tuple(_scenario(shape, limits, provided or {}) for shape in rubric.scenarios),
         criteria=criteria,
         digest=digest,
         by_request=rubric.exercise.by_request,
@@ -250,6 +332,12 @@ def _exercise(
 def own_check_files(path: Path) -> tuple[OwnFile, ...]:
     """Return the check files that a rubric names, without running them; raises RubricError like `read_rubric`."""
     return own_files(path, _own_names(path, _tree(path, _content(path))))
+
+
+def side_files(path: Path) -> tuple[OwnFile, ...]:
+    """Return every file that a rubric names beside it, without running any; raises RubricError like `read_rubric`."""
+    tree = _tree(path, _content(path))
+    return own_files(path, (*_own_names(path, tree), *_provided_names(path, tree)))
 
 
 def own_checks(path: Path) -> Mapping[str, type]:
@@ -273,6 +361,16 @@ def _own_names(path: Path, tree: YamlTree) -> tuple[str, ...]:
     if wrong:
         text = "expected a Python file in the rubric's folder such as my_checks.py, found"
         _refuse(path, [tree.at(("checks", n)).mistake(f"{text} `{shown(name)}`") for n, name in wrong])
+    return names
+
+
+def _provided_names(path: Path, tree: YamlTree) -> tuple[str, ...]:
+    """Return the named provided files; raises RubricError for a name that leads elsewhere."""
+    names = provided_files(tree.data)
+    wrong = [(n, name) for n, name in enumerate(names) if re.fullmatch(PROVIDED_FILE, name) is None]
+    if wrong:
+        text = f"expected {PROVIDED_WORDS}, found"
+        _refuse(path, [tree.at(("provided", n)).mistake(f"{text} `{shown(name)}`") for n, name in wrong])
     return names
 
 
@@ -342,7 +440,13 @@ def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> I
         )
 
 
-def _scenario(shape: ScenarioShape, limits: Limits) -> Scenario:
+def _scenario(shape: ScenarioShape, limits: Limits, provided: Mapping[str, str]) -> Scenario:
+    run: tuple[tuple[str, RunOptions], ...] = tuple(
+        (name, build(shape.run[name])) for name in shape.processes if name in shape.run
+    )
+    named = {*shape.processes, *(options.parameters_file for _, options in run)}
+    # A launch file may name any of them
+    used = provided if any(map(is_launch_file, shape.processes)) else {n: provided[n] for n in provided if n in named}
     return Scenario(
         id=shape.id,
         processes=shape.processes,
@@ -352,4 +456,6 @@ def _scenario(shape: ScenarioShape, limits: Limits) -> Scenario:
         starts_ns=tuple((name, build(shape.start[name])) for name in shape.processes if name in shape.start),
         may_exit=shape.may_exit,
         shutdown_ns=shape.shutdown or 0,
+        run=run,
+        provided=tuple(sorted(used.items())),
     )

@@ -25,14 +25,17 @@ from grader.core.scenario import (
 from grader.rubrics.check_parameters import choice_model, part_model
 from grader.rubrics.drawing import ParameterShape, SomeLongTime, StateShape, TransitionShape, list_of
 from grader.rubrics.mistakes import nearest
+from grader.rubrics.run_options import RunShape
 from grader.rubrics.types import (
     CheckFile,
     Choice,
+    HandedIn,
     Id,
     LongDuration,
     Number,
     Points,
-    PythonFile,
+    ProgramName,
+    ProvidedFile,
     Shape,
     Text,
     YesNo,
@@ -156,11 +159,12 @@ class ScenarioShape(Shape):
     """One situation that is recorded once."""
 
     id: Id
-    processes: tuple[PythonFile, ...] = Field(min_length=1)
+    processes: tuple[ProgramName, ...] = Field(min_length=1)
     observe: ObserveShape
     stimuli: tuple[StimulusShape, ...] = ()
-    start: dict[PythonFile, SomeLongTime] = Field(default={}, description="processes that start late")
-    may_exit: Annotated[tuple[PythonFile, ...], Field(description="processes that are free to end by themselves")] = ()
+    start: dict[ProgramName, SomeLongTime] = Field(default={}, description="processes that start late")
+    run: dict[ProgramName, RunShape] = Field(default={}, description="what processes are given when they are started")
+    may_exit: Annotated[tuple[ProgramName, ...], Field(description="processes that are free to end by themselves")] = ()
     shutdown: Annotated[
         LongDuration | None, Field(description="how long they may take to end after Ctrl-C, which comes at the end")
     ] = None
@@ -185,7 +189,10 @@ class RubricShape(Shape):
 
     format: Literal["grader/rubric/v1"] = Field(alias="schema")
     exercise: ExerciseShape
-    files: tuple[PythonFile, ...] = Field(min_length=1)
+    files: tuple[HandedIn, ...] = Field(min_length=1)
+    provided: tuple[ProvidedFile, ...] = Field(
+        default=(), description="launch files and parameter files of the rubric's own, beside it"
+    )
     checks: tuple[CheckFile, ...] = Field(default=(), description="files of checks of one's own, beside the rubric")
     limits: LimitsShape = Field(default_factory=LimitsShape)
     feedback: FeedbackField | None = None

@@ -30,7 +30,7 @@ _ALONE = "a file of checks may import the standard library, grader and what is i
 
 @dataclass(frozen=True, slots=True)
 class OwnFile:
-    """A check file, with its name as written in the rubric: relative to it, with `/`."""
+    """A file that a rubric brings, with its name as written in the rubric: relative to it, with `/`."""
 
     name: str
     path: Path
@@ -38,7 +38,7 @@ class OwnFile:
 
 
 def own_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ()) -> tuple[OwnFile, ...]:
-    """Return the check files that a rubric names, without running them.
+    """Return the check files and provided files that a rubric names, without running them.
 
     Raises:
         RubricError: A file is missing, too large, neither in the rubric's folder nor below, or in one of the folders
@@ -49,7 +49,16 @@ def own_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ())
 
 def named_files(data: object) -> tuple[str, ...]:
     """Return the check files named in a rubric's data; the rubric's shape reports anything else."""
-    names = data.get("checks") if isinstance(data, Mapping) else None
+    return _named(data, "checks")
+
+
+def provided_files(data: object) -> tuple[str, ...]:
+    """Return the provided files named in a rubric's data; the rubric's shape reports anything else."""
+    return _named(data, "provided")
+
+
+def _named(data: object, key: str) -> tuple[str, ...]:
+    names = data.get(key) if isinstance(data, Mapping) else None
     return tuple(name for name in names if isinstance(name, str)) if isinstance(names, list) else ()
 
 
@@ -75,7 +84,7 @@ def digest_of(rubric: bytes, files: Sequence[OwnFile]) -> str:
 
 def _own_file(rubric: Path, name: str, never_in: Sequence[Path]) -> OwnFile:
     path = rubric.parent / name
-    where = f"{shown(str(rubric), 500)}: checks: {shown(name)}"
+    where = f"{shown(str(rubric), 500)}: {shown(name)}"
     try:
         real = path.resolve(strict=True)
         inside = real.is_relative_to(rubric.parent.resolve()) and real.is_file()

@@ -177,6 +177,28 @@ PythonFile = Annotated[
         r"[^/\\\x00-\x1f]+\.py", "a file name such as fan_controller.py, without folders", "fan_controller.py"
     ),
 ]
+#: A program that the student hands in: a file, or an executable that the entry points of a package name.
+ProgramName = Annotated[
+    str,
+    MatchingText(
+        r"[^/\\\x00-\x1f]+\.py|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-]+",
+        "a file name such as fan_controller.py, without folders, or an executable such as my_package/talker",
+        "fan_controller.py",
+    ),
+]
+#: What the student hands in: programs and parameter files.
+HandedIn = Annotated[
+    str,
+    MatchingText(
+        r"[^/\\\x00-\x1f]+\.(?:py|ya?ml)|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-]+",
+        "a file name such as fan_controller.py, without folders, or an executable such as my_package/talker",
+        "fan_controller.py",
+    ),
+]
+#: A launch file or parameter file of the rubric's own, beside it.
+PROVIDED_FILE = r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:[._]launch\.py|\.ya?ml)"
+PROVIDED_WORDS = "a launch file such as robot.launch.py or a YAML file, beside the rubric"
+ProvidedFile = Annotated[str, MatchingText(PROVIDED_FILE, PROVIDED_WORDS, "robot.launch.py")]
 #: A check file must be beside the rubric or below, and not hidden.
 CHECK_FILE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*\.py"
 CheckFile = Annotated[

@@ -7,7 +7,8 @@ import importlib
 import importlib.util
 import os
 import sys
-from collections.abc import Callable, Sequence
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import ModuleType
 from typing import Any
@@ -45,19 +46,30 @@ def shadows_of(root: str, file: str) -> Shadows:
     return Shadows(path_of(root, file))
 
 
-def run_file(root: str, file: str, notify: Notify, install_ros: Callable[[], None]) -> None:
+def command_line(request: Mapping[str, Any]) -> list[str]:
+    """Return the arguments of the program; parameter files are written to the folder for temporary files."""
+    given = list(request.get("ros_arguments", ()))
+    for number, (_, text) in enumerate(request.get("parameter_files", ()), 1):
+        path = os.path.join(os.environ.get("HOME") or tempfile.gettempdir(), f"parameters_{os.getpid()}_{number}.yaml")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        given += ["--params-file", path]
+    return [*request.get("arguments", ()), *(["--ros-args", *given] if given else [])]
+
+
+def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[], None]) -> None:
     """Run one file of a submission to its end; raises whatever the file raises.
 
     Args:
-        root: The submission's folder.
-        file: The file, relative to it.
+        request: The submission's folder as `root`; the file, relative to it; and what it is started with.
         notify: Called with the way the file is started, before any of its code runs, and with notes for the report.
         install_ros: Called when the program imports rclpy, if a module of the submission hides another one.
     """
+    root, file = request["root"], request["file"]
     path = os.path.join(root, file)
     tree = parse(path)  # raises a syntax error before any code has run
     layout = layout_of(root, file)
-    start = start_of(root, file, layout, tree)
+    start = start_of(root, file, layout, tree, request.get("executable", ""))
     shadows = shadows_of(root, file)
     how = {"way": start.way, "module": start.module, "function": start.function}
     notify({"code": "started", **how, "hidden": shadows.files})
@@ -66,7 +78,7 @@ def run_file(root: str, file: str, notify: Notify, install_ros: Callable[[], Non
     sys.path[:0] = [f for f in dict.fromkeys((start.base, *path_of(root, file))) if f]
     if layout.module:
         _find_neighbours(tree, path, notify)
-    sys.argv = [path]
+    sys.argv = [path, *command_line(request)]
     if start.way in (SCRIPT, MODULE):
         run_what_nothing_called(_run_as_main(path, start.module, layout), tree, notify)
         return

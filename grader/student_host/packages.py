@@ -109,7 +109,7 @@ def package_folders(root: str) -> list[str]:
     return found
 
 
-def start_of(root: str, file: str, layout: PackageLayout, tree: ast.Module) -> StartMethod:
+def start_of(root: str, file: str, layout: PackageLayout, tree: ast.Module, executable: str = "") -> StartMethod:
     """Decide how a file is started.
 
     Args:
@@ -117,19 +117,20 @@ def start_of(root: str, file: str, layout: PackageLayout, tree: ast.Module) -> S
         file: The file, relative to `root`.
         layout: Its place in the package.
         tree: Its parsed code.
+        executable: Name of the console script to prefer; empty for one with the name of the file.
     """
     if not layout.module:
         return StartMethod(SCRIPT)
     if layout.package is not None:
-        found = _entry_point(root, file, layout)
+        found = _entry_point(root, file, layout, executable)
         if found is not None:
             return found
     way = MAIN if _offers_main(tree) else MODULE
     return StartMethod(way, layout.module, "main" if way == MAIN else "", layout.base)
 
 
-def _entry_point(root: str, file: str, layout: PackageLayout) -> StartMethod | None:
-    """Return the console script that runs a file, preferring one with the name of the file."""
+def _entry_point(root: str, file: str, layout: PackageLayout, executable: str) -> StartMethod | None:
+    """Return the console script that runs a file, preferring the named one, or else one with the name of the file."""
     folder = os.path.join(root, layout.package or "")
     has_init = _is_file(root, os.path.dirname(file), "__init__.py")
     found = []
@@ -140,7 +141,9 @@ def _entry_point(root: str, file: str, layout: PackageLayout) -> StartMethod | N
         # without an __init__.py the package name comes from setup.py; with one, the names must agree
         if module == layout.module or (not has_init and base + path == os.path.join(root, file) and inside):
             base = layout.base if module == layout.module else base
-            found.append((name == module.rpartition(".")[2], StartMethod(ENTRY_POINT, module, function, base)))
+            found.append(
+                (name == (executable or module.rpartition(".")[2]), StartMethod(ENTRY_POINT, module, function, base))
+            )
     return max(found, key=lambda pair: pair[0], default=(False, None))[1]
 
 

@@ -128,7 +128,7 @@ def play(request: dict[str, Any], describer: Describer, link: Link, install_ros:
     """Run the file and the interpreter's exit handlers; return how it ended as `code`, and `fault` if there is one."""
     ending: dict[str, Any] = {"code": 0}
     try:
-        entry.run_file(request["root"], request["file"], lambda note: link.send({"kind": "note", **note}), install_ros)
+        entry.run_file(request, lambda note: link.send({"kind": "note", **note}), install_ros)
     except SystemExit as leaving:
         ending["code"] = exit_code(leaving)
     except KeyboardInterrupt:

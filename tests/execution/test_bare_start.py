@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from grader.execution import bare_start
 from grader.execution.bare_start import bare_arguments
+from grader.execution.plan import PlannedStart
 
 NODE = "from rclpy.node import Node\nclass Talker(Node): pass\n"
 SCRIPTS = {
@@ -33,9 +35,9 @@ def test_a_file_that_starts_something_is_a_script(tmp_path: Path, text: str) -> 
     assert bare_arguments(tmp_path, "/s", "a.py") == ("-u", "/s/a.py")
 
 
-def ran(root: Path, file: str) -> str:
+def ran(root: Path, file: str, given: PlannedStart | None = None) -> str:
     """Run a file as it would be started in a place of its own; return what it printed."""
-    command = [sys.executable, *bare_arguments(root, str(root), file)]
+    command = [sys.executable, *bare_arguments(root, str(root), file, given)]
     return subprocess.run(command, capture_output=True, text=True, check=False, cwd="/").stdout.strip()
 
 
@@ -69,3 +71,31 @@ def test_interfaces_that_are_not_installed_can_be_imported(tmp_path: Path, monke
     monkeypatch.setattr(bare_start, "find_spec", lambda name: None)
     (tmp_path / "a.py").write_text("from example_interfaces.srv import AddTwoInts\nprint(AddTwoInts.__name__)\n")
     assert ran(tmp_path, "a.py") == "AddTwoInts"
+
+
+GIVEN = PlannedStart(
+    "a.py",
+    arguments=("hello",),
+    ros_arguments=("-r", "__node:=lidar", "-p", 'word:="5"'),
+    parameter_files=(("own.yaml", "/**: {ros__parameters: {rate: 2.0}}"),),
+)
+SAYS = "import sys\nprint(sys.argv[1:-1], open(sys.argv[-1]).read())\n"
+
+
+@pytest.mark.parametrize("text", [SAYS, f"def main():\n    {SAYS.replace(chr(10), chr(10) + '    ')}"])
+def test_a_program_gets_its_arguments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    """In the order of `ros2 run`; parameter files are written where the program can read them."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "a.py").write_text(text)
+    given = ["hello", "--ros-args", "-r", "__node:=lidar", "-p", 'word:="5"', "--params-file"]
+    assert ran(tmp_path, "a.py", GIVEN) == f"{given} {GIVEN.parameter_files[0][1]}"
+    without = ran(tmp_path, "a.py", replace(GIVEN, ros_arguments=()))
+    assert without == f"{['hello', '--ros-args', '--params-file']} {GIVEN.parameter_files[0][1]}"
+
+
+def test_arguments_keep_a_script_a_script(tmp_path: Path) -> None:
+    """Without parameter files nothing has to be written."""
+    (tmp_path / "a.py").write_text(SAYS)
+    plain = replace(GIVEN, parameter_files=())
+    expected = ("-u", "/s/a.py", "hello", "--ros-args", "-r", "__node:=lidar", "-p", 'word:="5"')
+    assert bare_arguments(tmp_path, "/s", "a.py", plain) == expected

@@ -84,7 +84,7 @@ def perform(request: dict[str, Any], pipe: int) -> None:
     try:
         if "file" in request:
             stand_in_for_ros(stage.say)
-            entry.run_file(request["root"], request["file"], stage.note, lambda: stage.say("ros"))
+            entry.run_file(request, stage.note, lambda: stage.say("ros"))
         else:
             exec(compile(request["code"], "program", "exec"), {"__name__": "__main__", "say": stage.say})
     except SystemExit as leaving:

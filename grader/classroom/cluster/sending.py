@@ -26,7 +26,7 @@ from grader.classroom.messages import (
 from grader.classroom.store import State, refused
 from grader.classroom.worker import PARTS
 from grader.core.errors import HarnessError, RecordingError, RubricError, SubmissionError
-from grader.rubrics.loader import own_check_files
+from grader.rubrics.loader import side_files
 from grader.rubrics.variants import First
 from grader.submissions.submission import collect_submission
 
@@ -50,7 +50,7 @@ def terms_of(task: Task) -> Terms:
 def checks_of(rubrics: Sequence[Path]) -> Iterator[tuple[bytes, bytes]]:
     """Yield the rubrics' own check files, which were validated when the rubrics were read."""
     for path in rubrics:
-        for file in own_check_files(path):
+        for file in side_files(path):
             yield travelling_name(file.path), file.content
 
 

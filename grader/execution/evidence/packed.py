@@ -117,6 +117,15 @@ def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: An
     )
 
 
+#: A start; what it was given on the command line follows in a list, which earlier recordings do not have.
+_START = _row_of(Start, "arguments", "launched_by", last=("given", tuple[str, str], ("", "")))
+
+
+def _start(row: Any) -> Start:
+    *values, given = msgspec.structs.astuple(row)
+    return Start(*values, *given)
+
+
 def _trace_row(rows: Iterable[Any]) -> Any:
     """Create the struct that validates the output of `trace_to_json`, with these structs for observations."""
     written: list[Any] = [
@@ -125,7 +134,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("stop_ns", int),
         ("notes", tuple[str, ...]),
         ("observations", list[Union[tuple(rows)]]),  # type: ignore[misc]  # noqa: UP007
-        ("starts", tuple[_row_of(Start), ...], ()),  # type: ignore[misc]
+        ("starts", tuple[_START, ...], ()),  # type: ignore[valid-type]
         ("reached", tuple[str, ...], ()),
         ("most_starved_ns", int, 0),
     ]
@@ -142,7 +151,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         clock_reason=row.clock_reason,
         notes=row.notes,
         harness_problem=row.harness_problem,
-        starts=tuple(_same(Start, start) for start in row.starts),
+        starts=tuple(map(_start, row.starts)),
         reached=row.reached,
         most_starved_ns=row.most_starved_ns,
     )
