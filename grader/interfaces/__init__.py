@@ -1,0 +1,1 @@
+"""Message packages built from their definitions, for rclpy, without compiler or CMake."""
