@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from _pytest.mark import ParameterSet
 from archive import outcomes
 from grading import grade_until_decided
+from ruamel.yaml import YAML
 
 from grader.app.request import GradeRequest
 from grader.execution.ros_installation import find_ros
@@ -30,7 +30,7 @@ def rubric(name: str) -> Path:
 @cache
 def expected(name: str) -> dict[str, dict[str, str]]:
     """Return what each wrong submission of an example loses: criteria that are not met, with their outcomes."""
-    found: Any = yaml.safe_load((ROOT / "examples" / name / "expected.yaml").read_text(encoding="utf-8"))
+    found: Any = YAML(typ="safe").load((ROOT / "examples" / name / "expected.yaml").read_text(encoding="utf-8"))
     return dict(found)
 
 

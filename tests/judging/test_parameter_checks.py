@@ -145,3 +145,25 @@ def test_crashes_and_silence_are_explained() -> None:
     early.stop_s = 6.5
     with pytest.raises(HarnessError):
         FIELD.judge(early.trace())
+
+
+def test_a_text_may_hold_the_value_among_other_words() -> None:
+    """As `Hello {}!` does; the value alone, or another one, is a mistake."""
+    check = ParameterTakesEffect("name", "/greeting", text="Hello {}!")
+
+    def greeter(write: str) -> Recording:
+        rec = setting(lambda _t, _v: {}, ("Ada", "robot 7"), "name")
+        rec.items = [o for o in rec.items if type(o).__name__ != "Message"]
+        sets = [o for o in rec.items if type(o).__name__ == "Request"]
+        for k in range(1, 90):
+            t_s = 0.1 * k
+            name = ["world", "Ada", "robot 7"][sum(o.t_ns < t_s * 1e9 for o in sets)]
+            rec.message(t_s, "/greeting", {"data": write.format(name)}, "std_msgs/msg/String")
+        return rec
+
+    assert check.judge(greeter("Hello {}!").trace()).credit == 1
+    assert "data is 'Hello world!'" in check.judge(greeter("Hello world!").trace()).reason
+    assert "data is 'Ada'" in check.judge(greeter("{}").trace()).reason
+    for wrong in ({"text": "Hello!"}, {"text": "{} {}"}, {"text": "{}", "effect": "rate"}):
+        with pytest.raises(ValueError, match="text"):
+            ParameterTakesEffect("name", "/greeting", **wrong)

@@ -123,6 +123,7 @@ class ParameterTakesEffect:
         tolerance: Largest difference; of a field in its unit, of a rate or period as a share of it.
         within: Longest delay of the effect.
         node: Fully qualified name of the node; the one whose parameter was set if left out.
+        text: What the field holds if the value is a part of it, with `{}` in its place, such as `Hello {}!`.
     """
 
     name: str
@@ -132,6 +133,11 @@ class ParameterTakesEffect:
     tolerance: float = 0.05
     within: DurationNs = NS_PER_S
     node: str | None = None
+    text: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.text is not None and (self.effect != "field" or self.text.count("{}") != 1):
+            raise ValueError("expected `text` to hold {} once, and the effect `field`")
 
     @property
     def expected(self) -> str:
@@ -178,6 +184,8 @@ class ParameterTakesEffect:
             return f"no message on {self.topic} afterwards"
         if isinstance(one.value, (list, tuple)):
             rule = FieldRule(items=tuple(one.value), tolerance=self.tolerance)
+        elif self.text is not None:
+            rule = FieldRule(equals=self.text.replace("{}", str(one.value)))
         else:
             rule = FieldRule(equals=one.value, tolerance=self.tolerance)
         wrong = next((m for m in after if not rule.allows(_held(m, self.field))), None)
