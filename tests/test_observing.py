@@ -4,12 +4,24 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from grader.core.quantities import NS_PER_MS, NS_PER_S
-from grader.core.trace import ClockKind, Endpoint, GraphSnapshot, LogRecord, Message, Observation, Offer, Trace
+from grader.core.trace import (
+    ClockKind,
+    Endpoint,
+    Fault,
+    FaultKind,
+    GraphSnapshot,
+    LogRecord,
+    Message,
+    Observation,
+    Offer,
+    Trace,
+)
 from grader.judging.judge_run import summarise
 from grader.reporting.observed import render_summary, summary_to_json
 
@@ -70,6 +82,17 @@ def test_the_text_says_what_was_seen() -> None:
         "and 8 more (--json shows them)",
     ):
         assert line in text
+
+
+def test_a_program_that_ends_in_peace_has_no_fault() -> None:
+    """A client that is done ends with exit code 0; any other end is a fault."""
+    done = Fault(NS_PER_S, "client.py", FaultKind.EXITED, "exited with code 0", exit_code=0)
+    text = render_summary(summarise(a_trace(done), ["client.py"], "none"))
+    assert "Ended:\n  t = 1.000 s client.py: exited with code 0\n" in text
+    assert "Faults" not in text
+    failed = replace(done, text="exited with code 3", exit_code=3)
+    text = render_summary(summarise(a_trace(done, failed), ["client.py"], "none"))
+    assert "Faults:\n  t = 1.000 s client.py: exited with code 3\n" in text
 
 
 def test_hostile_text_stays_text() -> None:

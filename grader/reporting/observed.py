@@ -40,7 +40,10 @@ def _lines(summary: Summary) -> Iterator[str]:
     yield from _section(
         "Other output", _cut(f"t = {seconds(o.t_ns):.3f} s {o.stream}: {shown(o.text)}" for o in summary.lines)
     )
-    yield from _section("Faults", (line for fault in summary.faults for line in _fault(fault)))
+    # A program that ends on its own, in peace, has no fault unless a rubric says so.
+    ended = [fault for fault in summary.faults if fault.exit_code == 0]
+    yield from _section("Ended", [line for fault in ended for line in _fault(fault)])
+    yield from _section("Faults", [line for fault in summary.faults if fault not in ended for line in _fault(fault)])
     yield f"isolation {shown(summary.isolation)}"
 
 

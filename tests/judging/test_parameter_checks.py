@@ -167,3 +167,31 @@ def test_a_text_may_hold_the_value_among_other_words() -> None:
     for wrong in ({"text": "Hello!"}, {"text": "{} {}"}, {"text": "{}", "effect": "rate"}):
         with pytest.raises(ValueError, match="text"):
             ParameterTakesEffect("name", "/greeting", **wrong)
+
+
+def pace(*parts: tuple[float, float, float], stop_s: float = 10.0) -> Recording:
+    """A period is set to 0.5 s at 1 s; messages come from one time to another with a gap."""
+    rec = Recording(stop_s).endpoint("publisher", "/out", "std_msgs/msg/String", node="/driver")
+    parameter = {"parameters": [{"name": "period", "value": value_of(0.5)}]}
+    rec.request(1.0, "/driver/set_parameters", 1, value=parameter, type_=SET)
+    rec.response(1.0, "/driver/set_parameters", 1, {"results": [{"successful": True, "reason": ""}]}, type_=SET)
+    for start_s, end_s, gap_s in parts:
+        for k in range(int((end_s - start_s) / gap_s)):
+            rec.message(start_s + gap_s * k, "/out", {"data": ""}, "std_msgs/msg/String")
+    return rec
+
+
+@pytest.mark.parametrize(
+    ("rec", "said"),
+    [
+        (pace((0, 10, 0.5)), ""),
+        (pace((0, 5, 0.5)), "no message on /out after t = 4.500 s, expected 2 Hz"),
+        (pace((0, 4, 0.5), (7, 10, 0.5)), "1.200 Hz on /out afterwards, expected 2 Hz"),
+        (pace((0, 1, 0.5), (1, 1.5, 0.001), stop_s=1.5), "500 messages on /out within 0.500 s, expected 2 Hz"),
+    ],
+)
+def test_a_pace_lasts_until_the_next_value(rec: Recording, said: str) -> None:
+    """A node that ends does not follow, and one that fills the recording at once is no riddle."""
+    finding = ParameterTakesEffect("period", "/out", "period").judge(rec.trace())
+    assert finding.credit == (0 if said else 1)
+    assert said in finding.reason

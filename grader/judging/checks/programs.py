@@ -107,6 +107,12 @@ def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Fi
     raise HarnessError(f"the recording does not ask for the parameter {name}")
 
 
+#: More messages than this, and twice as many as asked for, are a flood.
+_FLOOD = 100
+#: Longest time without a message before the next value, or the end, in periods.
+_LONGEST_GAP = 2.5
+
+
 @dataclass(frozen=True, slots=True)
 class ParameterTakesEffect:
     """After a parameter was set, the published messages follow it: a field, a rate or a period.
@@ -171,13 +177,26 @@ class ParameterTakesEffect:
         if not one.taken:
             return f"refused{': ' + quote(one.why, 80) if one.why else ''}", _DECLARE_HINT.format(name=self.name)
         start_ns = one.t_ns + self.within
-        if start_ns >= stop_ns:
-            raise HarnessError(f"{self.name}: the next value, or the end, comes before the effect has to show")
-        after = [m for m in messages if start_ns <= m.t_ns < stop_ns]
         hint = _READ_HINT.format(name=self.name)
+        if start_ns >= stop_ns:
+            at_once = [m for m in messages if one.t_ns <= m.t_ns < stop_ns]
+            rate = None if self.effect == "field" else self._rate(one)
+            # A recording that is full of messages ends early.
+            if rate is None or len(at_once) <= _FLOOD + 2 * rate * seconds(self.within):
+                raise HarnessError(f"{self.name}: the next value, or the end, comes before the effect has to show")
+            took_s = seconds(stop_ns - one.t_ns)
+            return f"{len(at_once)} messages on {self.topic} within {took_s:.3f} s, expected {number(rate)} Hz", hint
+        after = [m for m in messages if start_ns <= m.t_ns < stop_ns]
         if self.effect == "field":
             return self._field_flaw(one, after), hint
-        return self._pace_flaw(one, after), hint
+        return self._pace_flaw(one, after, stop_ns), hint
+
+    def _rate(self, one: ParameterSetting) -> float:
+        """Return the rate that a value asks for, in hertz."""
+        wanted = as_number(one.value)
+        if wanted is None or not wanted > 0:
+            raise HarnessError(f"{self.name}: {shown(one.value)} is no rate and no period")
+        return wanted if self.effect == "rate" else 1 / wanted
 
     def _field_flaw(self, one: ParameterSetting, after: Sequence[Message]) -> str:
         if not after:
@@ -193,17 +212,16 @@ class ParameterTakesEffect:
             return ""
         return f"{self.field} is {shown(_held(wrong, self.field))} at {moment(wrong.t_ns)}, expected {rule.wanted}"
 
-    def _pace_flaw(self, one: ParameterSetting, after: Sequence[Message]) -> str:
-        wanted = as_number(one.value)
-        if wanted is None or not wanted > 0:
-            raise HarnessError(f"{self.name}: {shown(one.value)} is no rate and no period")
-        rate = wanted if self.effect == "rate" else 1 / wanted
+    def _pace_flaw(self, one: ParameterSetting, after: Sequence[Message], stop_ns: int) -> str:
+        rate = self._rate(one)
         if len(after) < 3:
             return f"{len(after)} messages on {self.topic} afterwards, expected {number(rate)} Hz"
         measured = (len(after) - 1) / seconds(max(1, after[-1].t_ns - after[0].t_ns))
-        if within(measured, rate, self.tolerance * rate):
-            return ""
-        return f"{measured:.3f} Hz on {self.topic} afterwards, expected {number(rate)} Hz"
+        if not within(measured, rate, self.tolerance * rate):
+            return f"{measured:.3f} Hz on {self.topic} afterwards, expected {number(rate)} Hz"
+        if seconds(stop_ns - after[-1].t_ns) > _LONGEST_GAP / rate:
+            return f"no message on {self.topic} after {moment(after[-1].t_ns)}, expected {number(rate)} Hz"
+        return ""
 
 
 def _held(message: Message, path: str) -> Any:
