@@ -18,14 +18,17 @@ import click
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as MatplotlibFigure
+from ruamel.yaml import YAML
 
 from grader.app.explain import explain_checks, explain_rubrics
 from grader.cli.main import app
 from grader.core.chart import Chart, Panel
-from grader.core.exercise import Exercise
+from grader.core.exercise import Criterion, Exercise
 from grader.core.report import CheckExplanation, CriterionExplanation, Parameter, Report
+from grader.judging.checks import CHECKS
 from grader.judging.run_check import check_name
 from grader.reporting.html.render import render_html
+from grader.rubrics.loader import read_rubric
 from grader.rubrics.schema import rubric_schema
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -312,6 +315,43 @@ def _exercise(exercise: Exercise, explained: list[CriterionExplanation]) -> str:
     return "\n\n".join(lines)
 
 
+def examples() -> str:
+    """Return a section for each example exercise: what it asks, its criteria, and what typical mistakes lose."""
+    folders = sorted(page.parent for page in (ROOT / "examples").glob("*/README.md"))
+    return "\n\n".join(map(_example, sorted(folders, key=lambda folder: _rubric(folder).number)))
+
+
+@cache
+def _rubric(folder: Path) -> Exercise:
+    return read_rubric(folder / f"{folder.name}.yaml")
+
+
+def _example(folder: Path) -> str:
+    exercise = _rubric(folder)
+    title, _, rest = (folder / "README.md").read_text(encoding="utf-8").partition("\n\n")
+    about, shows = rest.partition("## Grade it")[0].strip(), rest.partition("## What it shows")[2].strip()
+    points = sum(c.points for c in exercise.criteria)
+    command = f"grade FOLDER --rubric examples/{folder.name}/{folder.name}.yaml"
+    lost = YAML(typ="safe").load((folder / "expected.yaml").read_text(encoding="utf-8"))
+    lines = [
+        f"## {title.removeprefix('# ')} {{ #{exercise.id} }}",
+        about,
+        f"{', '.join(f'`{file}`' for file in exercise.files)}; {float(points):g} points; `{command}`",
+        "\n".join(["| criterion | points | check |", "|---|---|---|", *map(_example_row, exercise.criteria)]),
+        f"[The files](../examples/{folder.name}/): rubric, reference, and submissions with a mistake:",
+        "\n".join(f"- `{wrong}` loses {', '.join(f'`{c}`' for c in found)}" for wrong, found in lost.items()),
+        "What it shows of the grammar:",
+        shows,
+    ]
+    return "\n\n".join(lines)
+
+
+def _example_row(criterion: Criterion) -> str:
+    name = check_name(criterion)
+    check = f"[`{name}`](reference/checks.md#{name})" if name in CHECKS else f"`{name}`, its own"
+    return f"| {_cell(criterion.title)} `{criterion.id}` | {float(criterion.points):g} | {check} |"
+
+
 @cache
 def exercises() -> dict[str, Exercise]:
     """Return the exercises that ship with the grader, by id."""
@@ -335,4 +375,5 @@ NAMES: Mapping[str, Callable[[], str]] = {
     "checks": checks,
     "grammar": grammar,
     "gallery": gallery,
+    "examples": examples,
 }
