@@ -169,7 +169,7 @@ def test_a_message_that_nothing_says_is_found() -> None:
 
 def test_the_site_names_every_command_option_check_and_key() -> None:
     """The pages are made from the code when the site is built; nothing of it is left out."""
-    commands, checks, grammar, gallery = (make() for make in generated.NAMES.values())
+    commands, checks, grammar, gallery, examples = (make() for make in generated.NAMES.values())
     for name, command in app.commands.items():
         options = [option for parameter in command.params for option in parameter.opts if option.startswith("--")]
         assert command.hidden or f"`grade {name}`" in commands
@@ -179,6 +179,7 @@ def test_the_site_names_every_command_option_check_and_key() -> None:
         word for word in ("just_above", "stimuli", "cancel_after", "some_of", "copies") if f"`{word}`" not in grammar
     ] == []
     assert [name for name in generated.exercises() if f"#{name} }}" not in gallery] == []
+    assert [p.parent.name for p in ROOT.glob("examples/*/README.md") if f"#{p.parent.name} }}" not in examples] == []
 
 
 def test_every_part_that_is_generated_stands_on_a_page() -> None:

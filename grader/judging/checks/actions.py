@@ -289,7 +289,7 @@ class LifecycleStates:
             "transitions": [[seconds(c.request.t_ns), _label(c), _succeeded(c)] for c in changes],
             "states": [[seconds(c.request.t_ns), _state(c)] for c in asked],
         }
-        flawed = self._transition_flaw(changes, evidence) or self._state_flaw(asked, evidence)
+        flawed = self._transition_flaw(changes, evidence) or self._state_flaw(trace, asked, evidence)
         if flawed is not None:
             fault = first_fault(trace)
             return flawed if fault is None else faulted(fault, flawed.reason, evidence)
@@ -311,11 +311,14 @@ class LifecycleStates:
                 return not_met(reason, evidence, hint=hint, problem=ProblemKind.REFUSED)
         return None
 
-    def _state_flaw(self, asked: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
+    def _state_flaw(self, trace: Trace, asked: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         if not self.states:
             return None
         if len(asked) < len(self.states):
-            raise HarnessError(f"the state was asked for {len(asked)} times, expected {len(self.states)}")
+            asked_said = f"the state was asked for {len(asked)} times, expected {len(self.states)}"
+            if crashed := explain_fault(trace, asked_said, evidence, last=True):
+                return crashed
+            raise HarnessError(asked_said)
         for call, wanted in zip(asked, self.states, strict=False):
             if _state(call) != wanted:
                 reason = f"{moment(call.request.t_ns)}: the state is {quote(_state(call))}, expected {wanted}"
