@@ -62,6 +62,8 @@ _EPILOG = (
     "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
 )
 _TIERS = ("auto", *TIERS)
+# Environment variable that chooses the sandbox of a machine, such as a container that can have one only.
+_ISOLATION = "GRADER_ISOLATION"
 # Internal name of the default command; it cannot clash, because a process argument cannot contain a NUL.
 _DEFAULT = "\0"
 
@@ -147,6 +149,8 @@ class _Default(click.Command):
     "--isolation",
     type=click.Choice(_TIERS),
     default="auto",
+    envvar=_ISOLATION,
+    show_envvar=True,
     help="auto: the strongest sandbox that holds here; none: run the student's code without one.",
 )
 @time_budget_option
@@ -310,7 +314,7 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
 @click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
 @click.option("--odom-bag", type=PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
-@click.option("--isolation", type=click.Choice(_TIERS), default="auto", help="As for grading.")
+@click.option("--isolation", type=click.Choice(_TIERS), default="auto", envvar=_ISOLATION, help="As for grading.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
 def _observe(  # noqa: PLR0913  one parameter an option
     *, files: tuple[Path, ...], duration: float, odom_bag: Path | None, clock: str, isolation: str, as_json: bool

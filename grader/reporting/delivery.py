@@ -75,7 +75,7 @@ def _beside(target: Path) -> tuple[int, Path]:
 
 
 _FILE_WIDTH = 100
-# Longer lines are hard to read, however wide the terminal is.
+# Longer lines are hard to read, however wide the terminal is; programs that read them ask for more with COLUMNS.
 _WIDEST = 120
 
 
@@ -135,7 +135,9 @@ def show(render: Callable[[PageLayout], str], *, for_people: bool) -> None:
     For people, characters that the terminal's encoding lacks are replaced; programs read UTF-8.
     """
     if sys.stdout is not None:
-        layout = PageLayout(min(shutil.get_terminal_size().columns, _WIDEST), _coloured(sys.stdout))
+        columns = shutil.get_terminal_size().columns
+        width = columns if os.environ.get("COLUMNS") == str(columns) else min(columns, _WIDEST)
+        layout = PageLayout(width, _coloured(sys.stdout))
         _print(encoded(render(layout), sys.stdout.encoding if for_people else "utf-8"))
 
 
