@@ -168,6 +168,11 @@ def find_packages(folder: Path) -> tuple[InterfacePackage, ...]:
     return tuple(found[name] for name in sorted(found))
 
 
+def shipped_packages() -> tuple[InterfacePackage, ...]:
+    """The packages that come with the grader: those that courses use and no wheel holds, as ROS 2 Jazzy has them."""
+    return find_packages(Path(__file__).with_name("shipped"))
+
+
 def _is_inside(path: Path, root: Path) -> bool:
     return path.is_file() and path.resolve().is_relative_to(root)
 
