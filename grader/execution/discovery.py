@@ -231,7 +231,11 @@ class Discovery:
         graph = self._graph_at(now_ns)
         found = self._found(graph)
         offered = {(e.kind, e.service, e.type) for e in graph.services}
-        exchanging = {(c["kind"], c["name"], c["type"]) for c in claims if c["kind"] in ("service", "client")}
+        # The end of an action outlives its node, and is then in the list of none.
+        nodes = [s.claims for s in self._students if not s.ended and any(c["kind"] == "node" for c in s.claims)]
+        exchanging = {
+            (c["kind"], c["name"], c["type"]) for own in nodes for c in own if c["kind"] in ("service", "client")
+        }
         # The middleware tells the services of one node of a name. A node lives on until it is collected, and a process
         # that left may stay in the graph for its lease.
         namesakes = any(kind == "node" and count > 1 for (kind, _, _), count in found.items())

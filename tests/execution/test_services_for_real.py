@@ -204,6 +204,7 @@ def test_the_client_of_an_action_waits_for_its_server(run: Callable[..., Trace])
         "2500 [0, 1, 2, 3]",
         "2500 result [0, 1, 2, 3]",
     ]
+    assert trace.notes == ()
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,8 @@ def main():
     result = sent.result().get_result_async()
     rclpy.spin_until_future_complete(node, result)
     log.info(f"result {list(result.result().result.sequence)}")
+    node.destroy_node()  # the client outlives it
+    rclpy.shutdown()
 
 
 if __name__ == "__main__":
