@@ -1,4 +1,4 @@
-"""What the autograders of Gradescope and Classroom 50 do with each end of the grader, without running a node."""
+"""What each platform's autograder does with each end of the grader, without running a node."""
 
 import importlib.util
 import json
@@ -79,6 +79,47 @@ def test_gradescope_tells_a_student_why_nothing_could_be_graded(tmp_path: Path, 
 def test_a_machine_that_cannot_grade_gives_no_mark_on_gradescope(tmp_path: Path, programs: Path) -> None:
     """Without a result, the platform says that the autograder failed."""
     assert gradescope(tmp_path, programs, code=2, doctor=2) == (1, None)
+
+
+def prairielearn(tmp_path: Path, programs: Path, code: int, *files: str) -> tuple[int, Any, str]:
+    root = tmp_path / "grade"
+    (root / "results").mkdir(parents=True)
+    (root / "results" / "results.json").write_text('{"score": 1}')
+    (root / "tests").mkdir()
+    for name in files:
+        (root / "tests" / name).touch()
+    program = ROOT / "integrations" / "prairielearn" / "grade_submission"
+    words: list[str | Path] = [sys.executable, "-I", program, "--exercise", "velocity_publisher"]
+    done = run(words, programs, code=code, GRADE_ROOT=str(root))
+    results = root / "results" / "results.json"
+    return done.returncode, json.loads(results.read_text()) if results.exists() else None, done.stdout
+
+
+@pytest.mark.parametrize("code", [0, 1, 3])
+def test_prairielearn_gets_whatever_was_judged(tmp_path: Path, programs: Path, code: int) -> None:
+    """A job that ends with anything but 0 is a failed one there, so that lost points are none."""
+    assert prairielearn(tmp_path, programs, code)[:2] == (0, {})
+
+
+def test_prairielearn_tells_a_student_why_nothing_could_be_graded(tmp_path: Path, programs: Path) -> None:
+    """No attempt is lost."""
+    code, result, _ = prairielearn(tmp_path, programs, 2)
+    assert code == 0
+    assert result["gradable"] is False
+    assert result["format_errors"] == ["Nothing could be graded. error: it is too large\n"]
+
+
+@pytest.mark.parametrize("given", [[], ["rubric.yaml"], ["rubric.yaml", "seed.key"]])
+def test_prairielearn_grades_by_what_the_question_keeps(tmp_path: Path, programs: Path, given: list[str]) -> None:
+    """Its rubric and its seed key, if it has them, and the words of its entry point."""
+    (programs / "grade").write_text(f"#!{sys.executable} -IS\nimport sys\nprint(*sys.argv[1:])\n")
+    code, result, said = prairielearn(tmp_path, programs, 0, *given)
+    assert (code, result) == (1, None)  # it wrote no result, and what lay there is gone
+    tests = tmp_path / "grade" / "tests"
+    options = {"rubric.yaml": f"--rubric {tests / 'rubric.yaml'} ", "seed.key": f"--seed-key {tests / 'seed.key'} "}
+    wanted = "".join(options[name] for name in given)
+    assert said.startswith(f"--no-progress {wanted}--exercise velocity_publisher --verbose")
+    assert said.endswith(f" -- {tmp_path / 'grade' / 'student'}\n")
 
 
 def classroom50(tmp_path: Path, programs: Path, code: int) -> tuple[int, list[str]]:

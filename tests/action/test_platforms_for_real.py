@@ -1,8 +1,9 @@
-"""The platforms with real nodes: the action, Gradescope's zip and Classroom 50's autograder, run as they run them."""
+"""The platforms with real nodes: each autograder is run as its platform runs it."""
 
 import base64
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -138,6 +139,69 @@ def test_gradescope_s_zip_leaves_results(autograder: Path) -> None:
     assert result["score"] == 30
     assert sum(test["max_score"] for test in result["tests"]) == 30
     assert result["stdout_visibility"] == "hidden"
+
+
+@pytest.mark.ros
+def test_prairielearn_s_question_is_graded(tmp_path: Path) -> None:
+    """By the words of its own entry point, with the share of the points as the score."""
+    folder = ROOT / "integrations" / "prairielearn"
+    question = json.loads((folder / "question" / "info.json").read_text())
+    program, *words = question["externalGradingOptions"]["entrypoint"]
+    container = (ROOT / "integrations" / "container" / "Containerfile").read_text()
+    assert f"integrations/prairielearn/grade_submission {program}\n" in container
+    (tmp_path / "student").mkdir()
+    solve(tmp_path / "student")
+    environment = job_environment(PATH=with_grader(), GRADE_ROOT=str(tmp_path))
+    script: list[str | Path] = [sys.executable, "-I", folder / "grade_submission"]
+    done = subprocess.run([*script, *words], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    result = json.loads((tmp_path / "results" / "results.json").read_text())
+    assert (result["gradable"], result["score"]) == (True, 1)
+    assert (folder / "question" / "question.html").read_text().count('file-names="velocity_publisher.py"') == 1
+
+
+#: What VPL looks for in the output of an evaluation: the last line of the first kind, and the ends of a comment.
+VPL_MARK, VPL_COMMENT = (
+    re.compile(r"^Grade :=>>(.*)$", re.MULTILINE),
+    re.compile(r"^[ \t]*(?:<\|--|--\|>)[ \t]*$", re.MULTILINE),
+)
+
+
+def run_vpl(folder: Path, grade: str, **more: str) -> str:
+    """Evaluate a submission in two steps as VPL does, and return the output of the second."""
+    shutil.copy(ROOT / "integrations" / "vpl" / "vpl_evaluate.sh", folder)
+    (folder / "vpl_environment.sh").write_text("export VPL_GRADEMIN=0\nexport VPL_GRADEMAX=10\n")
+    environment = job_environment(PATH=grade, **more)
+    for program in ("vpl_evaluate.sh", "vpl_execution"):
+        done = subprocess.run(
+            ["bash", program], cwd=folder, env=environment, capture_output=True, text=True, check=True
+        )
+    return done.stdout
+
+
+@pytest.mark.ros
+def test_no_student_gives_a_mark_on_vpl(tmp_path: Path) -> None:
+    """Whatever is printed, logged or raised, and however files are called: the only mark is the grader's."""
+    forged = "\nGrade :=>>10\r\nGrade :=>>10\x0bGrade :=>>10\u2028Grade :=>>10\n--|>\nGrade :=>>10\n<|--\n"
+    (tmp_path / "velocity_publisher.py").write_text(
+        f"import rclpy\nrclpy.init()\nnode = rclpy.create_node('n')\nprint({forged!r}, flush=True)\n"
+        f"node.get_logger().info({forged!r})\nraise RuntimeError({forged!r})\n",
+    )
+    (tmp_path / "Grade :=>>10\n.py").write_text("import rclpy\n")
+    said = run_vpl(tmp_path, with_grader())
+    assert "RuntimeError" in said
+    assert VPL_MARK.findall(said) == ["1.33"]  # it did log something: 4 of 30 points
+    assert VPL_COMMENT.findall(said) == ["<|--", "--|>"]
+
+
+def test_vpl_gets_no_mark_where_nothing_was_decided(tmp_path: Path) -> None:
+    """The comment says why."""
+    program = tmp_path / "bin" / "grade"
+    program.parent.mkdir()
+    program.write_text("#!/bin/sh\necho 'Grade :=>>10' >&2\nexit 2\n")
+    program.chmod(0o755)
+    said = run_vpl(tmp_path, f"{program.parent}{os.pathsep}{os.environ['PATH']}")
+    assert said == "<|--\n>Grade :=>>10\n--|>\n"
 
 
 @pytest.mark.ros
