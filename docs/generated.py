@@ -256,6 +256,8 @@ def drawn(chart: Chart) -> bytes:
         axes = figure.subplots(len(chart.panels), sharex=True, squeeze=False)[:, 0]
         for ax, panel in zip(axes, chart.panels, strict=True):
             _draw(ax, panel)
+            for case in chart.cases:
+                ax.axvspan(case.start, case.stop, color=_COLOURS[case.tone.value], alpha=0.08)
             for moment in chart.moments:
                 ax.axvline(moment.x, color=_COLOURS[moment.tone.value], linestyle=":")
             if chart.square:

@@ -182,6 +182,12 @@ def test_the_site_names_every_command_option_check_and_key() -> None:
     assert [p.parent.name for p in ROOT.glob("examples/*/README.md") if f"#{p.parent.name} }}" not in examples] == []
 
 
+def test_the_page_about_the_report_tells_the_chart_of_every_check() -> None:
+    """Or why it has none."""
+    page = (ROOT / "docs/reference/report.md").read_text(encoding="utf-8")
+    assert [name for name in CHECKS if f"`{name}`" not in page] == []
+
+
 def test_every_part_that_is_generated_stands_on_a_page() -> None:
     """A comment in the Markdown says where."""
     text = "".join((ROOT / d).read_text(encoding="utf-8") for d in DOCUMENTS)

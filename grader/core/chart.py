@@ -71,6 +71,16 @@ class Moment:
 
 
 @dataclass(frozen=True, slots=True)
+class Case:
+    """A stretch of the horizontal axis behind all panels: one of the cases that a check distinguishes."""
+
+    start: float
+    stop: float
+    label: str  # may quote a student
+    tone: Tone = Tone.FAINT
+
+
+@dataclass(frozen=True, slots=True)
 class Panel:
     """One coordinate system of a chart."""
 
@@ -97,6 +107,7 @@ class Chart:
     x_unit: str  # its unit
     panels: tuple[Panel, ...]  # its panels, from the top
     moments: tuple[Moment, ...] = ()  # lines through all panels
+    cases: tuple[Case, ...] = ()  # stretches behind all panels
     square: bool = False  # whether both axes have the same scale
     scenario: str = ""  # the recording that it shows; empty if it shows none
     until_s: float | None = None  # when that recording ended, in seconds; None if the horizontal axis is not time

@@ -15,8 +15,8 @@ from grader.core.report import NOT_JUDGED, ExerciseReport, Pace, Report, Reporte
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import EXPORT_NOTEBOOK, Run, Submission, is_notebook
 from grader.core.trace import ClockKind, Fault, GraphSnapshot, Message, Offer, StartWay, Trace
-from grader.judging.charts import excerpts_for, illustrated
 from grader.judging.diagnosis import diagnose, placed
+from grader.judging.figures import excerpts_for, illustrated
 from grader.judging.findings import FAULT_KEY, fault_evidence
 from grader.judging.run_check import Answer, check_name, run_check
 from grader.judging.values import leaves, on_student_topic

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 
 from grader.core.chart import Column, TopicValues
@@ -54,18 +54,32 @@ def _shortened(values: list[Value]) -> tuple[Value, ...]:
     return (values[0],) if all(value == values[0] for value in values) else tuple(values)
 
 
-def _fields(value: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, Value]]:
+def _fields(value: Mapping[str, object]) -> Iterator[tuple[str, Value]]:
     """Yield every number and text of a message by path; elements of short lists count from 0."""
+    for path, part in parts_of(value, lambda length: range(length if length <= _LONGEST_LIST else 0)):
+        if isinstance(part, (bool, str)):
+            yield path, quote(clean(str(part)), _TEXT_LENGTH)
+        elif (number := as_number(part)) is not None:
+            yield path, number
+
+
+def parts_of(
+    value: Mapping[str, object], places: Callable[[int], Iterable[int]], prefix: str = ""
+) -> Iterator[tuple[str, object]]:
+    """Yield every part of a message that has no parts itself, by path, without headers.
+
+    Args:
+        value: The fields of a message.
+        places: Gives the elements to yield of a list of a length.
+        prefix: What the paths begin with.
+    """
     for name, inner in value.items():
         path = f"{prefix}{name}"
         if path in _LEFT_OUT:
             continue
         if isinstance(inner, Mapping):
-            yield from _fields(inner, f"{path}.")
+            yield from parts_of(inner, places, f"{path}.")
         elif isinstance(inner, (list, tuple)):
-            elements = inner if len(inner) <= _LONGEST_LIST else ()
-            yield from _fields({str(n): element for n, element in enumerate(elements)}, f"{path}.")
-        elif isinstance(inner, (bool, str)):
-            yield path, quote(clean(str(inner)), _TEXT_LENGTH)
-        elif (number := as_number(inner)) is not None:
-            yield path, number
+            yield from parts_of({str(n): inner[n] for n in places(len(inner))}, places, f"{path}.")
+        else:
+            yield path, inner

@@ -37,6 +37,16 @@ def calls_of(trace: Trace, service: str, asker: str) -> tuple[Call, ...]:
     return tuple(Call(r, responses.get(r.number)) for r in asked)
 
 
+#: Numbers of action_msgs/msg/GoalStatus.
+_STATUSES = dict(enumerate(("accepted", "executing", "canceling", "succeeded", "canceled", "aborted"), 1))
+
+
+def status_of(result: Response) -> str:
+    """Return the status with which a goal ended, by the response to the request for its result."""
+    status = result.value.get("status")
+    return _STATUSES.get(status, f"status {status}") if isinstance(status, int) else "without a status"
+
+
 #: A decoded parameter.
 ParameterValue = str | float | bool | list[str | float | bool] | None
 #: Types of rcl_interfaces/msg/ParameterValue, whose numbers begin at 1; each has a field such as `bool_value`.

@@ -10,7 +10,7 @@ from grader.core.exercise import Exercise
 from grader.core.report import ExerciseReport, Report
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import FaultKind, Trace
-from grader.judging.charts import illustrated
+from grader.judging.figures import illustrated
 from grader.judging.judge_run import judge_exercise
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric

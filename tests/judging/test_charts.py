@@ -25,9 +25,10 @@ from grader.core.chart import Chart, Figure, GraphFigure, Look, Playback, Tone
 from grader.core.exercise import Exercise
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import FaultKind, Mark, Request, Response, Trace
-from grader.judging.charts import MOST_POINTS, MOST_TEXTS, expectation, figures_of, illustrated, kept_indices
+from grader.judging.charts import MOST_POINTS, MOST_TEXTS, kept_indices
 from grader.judging.checks import CHECKS
 from grader.judging.checks.rate import TopicRate
+from grader.judging.figures import expectation, figures_of, illustrated
 from grader.judging.judge_run import judge_exercise
 from grader.judging.recorded_values import MOST_SAMPLES, recorded_values
 from grader.rubrics.builtin import builtin_rubrics
@@ -73,12 +74,11 @@ def test_a_rate_that_changes_is_seen() -> None:
 def test_linear_and_angular_velocity_have_a_chart_each() -> None:
     """Each criterion shows its own fields with the values that it expects."""
     figures = figures_of(ONE, {"alone": velocity().trace()})
-    charts = [f for f in figures if isinstance(f, Chart) and f.title.startswith("Commanded")]
-    assert [c.criteria for c in charts] == [("linear_velocity",), ("angular_velocity",)]
-    panels = [panel for chart in charts for panel in chart.panels]
+    charts = {c.criteria: c for c in figures if isinstance(c, Chart)}
+    panels = [panel for id_ in ("linear_velocity", "angular_velocity") for panel in charts[(id_,)].panels]
     assert [(p.title, p.unit, len(p.series)) for p in panels] == [("linear", "m/s", 3), ("angular", "rad/s", 3)]
     assert {level.value for level in panels[0].levels} == {0.5, 0.0}
-    assert {(c.scenario, c.until_s) for c in charts} == {("alone", 10.05)}
+    assert {(c.scenario, c.until_s) for c in charts.values()} == {("alone", 10.05)}
 
 
 def test_logged_positions_lie_on_the_path() -> None:
@@ -128,12 +128,12 @@ def test_answers_stand_under_what_they_answer() -> None:
         value = held_at(0.5 + 0.2 * k) or 0.0
         rec.number(0.51 + 0.2 * k, "/fan_speed", 100.0 if value > 25 else 0.0)
     figures = figures_of(THREE, {"controller_alone": rec.trace("controller_alone")})
-    chart = titled(figures, "Answers")
-    assert len([f for f in figures if f.title.startswith("Answers")]) == 1
+    chart = titled(figures, "What came on /temperature")
+    assert len([f for f in figures if f.title == chart.title]) == 1
     upper, lower = chart.panels
     assert chart.criteria == ("fan_on_above_25", "fan_off_at_or_below_25")
-    assert (upper.title, upper.unit, upper.levels[0].value) == ("temperature", "°C", 25)
-    assert [s.name for s in lower.series] == ["expected", "fan speed"]
+    assert (upper.title, upper.unit, upper.levels[0].value) == ("/temperature", "°C", 25)
+    assert [s.name for s in lower.series] == ["expected", "/fan_speed"]
 
 
 def test_the_graph_is_shown_before_and_after() -> None:
@@ -236,13 +236,13 @@ def test_a_picture_that_fails_costs_only_itself(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(CHECKS["topic_rate"], "chart", broken)
     titles = [f.title for f in figures_of(ONE, {"alone": velocity().trace()})]
     assert not any(t.startswith("How often") for t in titles)
-    assert len(titles) == 3
+    assert len(titles) == 4
 
 
 def test_figure_ids_are_unique_and_of_their_exercise() -> None:
     """A page with several exercises can link to each."""
     ids = [f.id for f in figures_of(ONE, {"alone": velocity().trace()})]
-    assert ids == [f"velocity_publisher-{number}" for number in range(1, 5)]
+    assert ids == [f"velocity_publisher-{number}" for number in range(1, 6)]
 
 
 def test_every_check_says_what_it_expects() -> None:

@@ -49,7 +49,10 @@ from grader.core.trace import (
     ServiceEnd,
     Trace,
 )
+from grader.judging.charts import MOST_CASES
 from grader.judging.checks import CHECKS
+from grader.judging.figures import chart_for
+from grader.reporting.html.render import Columns, figure_values
 
 TRACES = {
     "velocity": velocity().log(0.0, "started"),
@@ -178,6 +181,36 @@ def test_no_recording_makes_a_check_raise(observations: list[Any], clock: ClockK
     for check in INSTANCES.values():
         finding = asked(check, trace)
         assert isinstance(finding, str) or 0 <= finding.credit <= 1
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@given(st.lists(OBSERVATIONS, max_size=25), st.integers(0, 30 * NS_PER_S))
+def test_every_recording_gives_every_check_a_chart_that_a_page_can_hold_or_none(
+    observations: list[Any], stop_ns: int
+) -> None:
+    """Whatever was observed: as JSON without NaN, of bounded size, with words for those who do not see it."""
+    trace = Trace("alone", ClockKind.VIRTUAL, stop_ns, tuple(sorted(observations, key=lambda o: o.t_ns)))
+    for check in INSTANCES.values():
+        chart = chart_for(check, trace)
+        if chart is not None:
+            columns = Columns()
+            json.dumps([figure_values(chart, columns), columns.lists], allow_nan=False)
+            assert chart.title
+            assert chart.about.endswith(".")
+            assert 1 <= len(chart.panels) <= 9
+            assert len(chart.cases) <= MOST_CASES
+            assert chart == chart_for(check, trace)
+
+
+@pytest.mark.parametrize("check", INSTANCES.values(), ids=INSTANCES)
+@pytest.mark.parametrize("rec", TRACES.values(), ids=TRACES)
+def test_charts_are_drawn_of_what_nodes_did(check: Check, rec: Recording) -> None:
+    """Each point lies in the recording, each row exists, and each series has one text for a point or none."""
+    chart = chart_for(check, rec.trace())
+    for panel in chart.panels if chart else ():
+        for series in panel.series:
+            assert len(series.texts) in (0, len(series.points))
+            assert not panel.lanes or all(0 <= y < len(panel.lanes) for _, y in series.points)
 
 
 def shifted(trace: Trace, by_ns: int) -> Trace:

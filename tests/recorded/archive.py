@@ -13,6 +13,7 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from grader.app.request import command_words, request_of
+from grader.core.chart import Chart, Panel, Series
 from grader.core.exercise import Exercise
 from grader.core.report import Report
 from grader.execution.evidence import manifest as kept
@@ -141,6 +142,60 @@ def outcomes(report: Report) -> dict[str, str]:
     """Return the outcome of every criterion that is not met."""
     verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
     return {v.id: v.outcome.value for v in verdicts if v.outcome.value != "met"}
+
+
+#: Submissions whose charts are compared: one right and one wrong for each exercise.
+CHARTED = (
+    "correct/velocity_class",
+    "wrong/velocity_swapped_fields",
+    "correct/odom_throttle",
+    "wrong/odom_swapped_xy",
+    "correct/fan_float32",
+    "wrong/fan_on_at_25",
+    "correct/joint_class",
+    "wrong/joint_amplitude",
+    "correct/angle_degrees_first",
+    "wrong/angle_pi_is_3",
+    "correct/battery_callbacks",
+    "wrong/battery_client_limit_30",
+)
+
+
+@cache
+def golden_charts() -> dict[str, Any]:
+    """Return what the charts of some submissions show, by folder."""
+    return _table("charts.yaml")
+
+
+def charted(report: Report) -> list[dict[str, Any]]:
+    """Return what each chart shows: its words, its panels with their series, and its cases."""
+    charts = [f for exercise in report.exercises for f in exercise.figures if isinstance(f, Chart)]
+    return [
+        {
+            "title": chart.title,
+            "criteria": " ".join(chart.criteria),
+            "about": chart.about,
+            "panels": [_panel(panel) for panel in chart.panels],
+        }
+        | (
+            {"cases": [f"{c.start:g} to {c.stop:g} {c.tone.value}: {c.label}" for c in chart.cases]}
+            if chart.cases
+            else {}
+        )
+        for chart in charts
+    ]
+
+
+def _panel(panel: Panel) -> str:
+    name = f"{panel.title} ({panel.unit})" if panel.unit else panel.title
+    parts = [f"{s.tone.value} {s.look.value} {s.name!r} {len(s.points)} {_ends(s)}" for s in panel.series]
+    parts += [f"band {b.low:g} to {b.high:g}" for b in panel.bands] + [f"level {v.value:g}" for v in panel.levels]
+    return f"{name}: {'; '.join(parts)}" + (f"; rows {', '.join(panel.lanes)}" if panel.lanes else "")
+
+
+def _ends(series: Series) -> str:
+    (first, low), (last, high) = series.points[0], series.points[-1]
+    return f"from ({first:.5g}, {low:.5g}) to ({last:.5g}, {high:.5g})"
 
 
 def told(report: Report) -> dict[str, dict[str, str]]:

@@ -16,9 +16,11 @@ from pathlib import Path
 
 from archive import (
     ARCHIVE,
+    CHARTED,
     SEED,
     SUBMISSIONS,
     Recorded,
+    charted,
     expected,
     judged,
     read_archive,
@@ -30,7 +32,7 @@ from ruamel.yaml import YAML
 
 from grader.reporting.json_report import dumps
 
-GOLDEN = SUBMISSIONS / "golden.yaml"
+GOLDEN, CHARTS = SUBMISSIONS / "golden.yaml", SUBMISSIONS / "charts.yaml"
 GRADE = str(Path(sys.executable).with_name("grade"))
 
 
@@ -67,6 +69,8 @@ def main() -> None:
     yaml.width = 1000
     with GOLDEN.open("w", encoding="utf-8") as out:
         yaml.dump({folder: text for folder, text in texts.items() if text}, out)
+    with CHARTS.open("w", encoding="utf-8") as out:
+        yaml.dump({folder: charted(judged(made[folder])) for folder in CHARTED if folder in made}, out)
     changed = [folder for folder, one in made.items() if folder not in before or one.report != before[folder].report]
     print(f"{len(made)} recordings, {len(changed)} reports changed: {' '.join(changed[:20])}")
 

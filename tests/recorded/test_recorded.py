@@ -5,8 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from archive import expected, golden, judged, outcomes, outdated, read_archive, told, write_archive
+from archive import (
+    CHARTED,
+    charted,
+    expected,
+    golden,
+    golden_charts,
+    judged,
+    outcomes,
+    outdated,
+    read_archive,
+    told,
+    write_archive,
+)
 
+from grader.reporting.html.render import render_html
 from grader.reporting.json_report import dumps
 
 AGAIN = "python tests/recorded/record.py"
@@ -28,6 +41,14 @@ def test_a_recording_is_judged_as_ever(folder: str) -> None:
     assert outcomes(report) == expected()[folder]["expected"]
     assert told(report) == golden().get(folder, {})
     assert dumps(report) == recorded.report.decode(), f"if the new report is the better one: {AGAIN} --judge"
+
+
+@pytest.mark.parametrize("folder", CHARTED)
+def test_a_recording_is_drawn_as_ever(folder: str) -> None:
+    """What each chart shows, and twice the same page, byte for byte."""
+    report = judged(read_archive()[folder])
+    assert charted(report) == golden_charts()[folder], f"if the new charts are the better ones: {AGAIN} --judge"
+    assert render_html(report) == render_html(judged(read_archive()[folder]))
 
 
 def test_the_archive_is_written_as_it_was_read(tmp_path: Path) -> None:

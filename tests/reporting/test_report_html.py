@@ -27,6 +27,7 @@ from report_samples import (
 )
 
 from grader.core.chart import (
+    Case,
     Chart,
     Column,
     Excerpt,
@@ -107,6 +108,7 @@ def pictured(text: str = "fine") -> Report:
         "s",
         (Panel(text, "m", (Series(text, ((0.0, 1.0), (1.0, float("nan"))), texts=(text, text)),), lanes=(text,)),),
         (Moment(0.5, text),),
+        (Case(0.0, 0.5, text),),
     )
     ends = tuple(replace(e, node=text, topic=f"/{text}", type=text) for e in both_ways().endpoints[:1])
     graph = replace(both_ways(), nodes=(text,), endpoints=ends)
@@ -149,9 +151,11 @@ def test_hostile_text_makes_no_element_and_no_attribute(text: str) -> None:
 @pytest.mark.parametrize("text", MARKUP)
 def test_the_data_of_the_charts_survives_hostile_text(text: str) -> None:
     """It is JSON that holds the text, and the script element ends where it should."""
-    figures = json.loads(Page(render_html(pictured(text))).raw["figures"])
+    data = json.loads(Page(render_html(pictured(text))).raw["figures"])
+    figures, columns = data["figures"], data["columns"]
     shown = text.replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
-    assert figures["velocity_publisher-1"]["panels"][0]["series"][0]["texts"] == [shown, shown]
+    assert columns[figures["velocity_publisher-1"]["panels"][0]["series"][0]["texts"]] == [shown, shown]
+    assert figures["velocity_publisher-1"]["cases"][0]["label"] == shown
     assert figures["velocity_publisher-2"]["stages"][0]["nodes"][0]["name"] == shown
     assert figures["velocity_publisher-3"]["topics"][0]["fields"] == [{"name": shown, "values": [shown]}]
 
@@ -290,11 +294,14 @@ def test_shared_files_keep_a_class_small() -> None:
 
 def test_a_page_that_stands_alone_is_small_enough_for_a_letter() -> None:
     """With as many figures as three exercises have, each as full as it may be, it stays under 1.5 MB."""
-    points = tuple((k / 100, (k % 17) / 3) for k in range(1200))
-    full = Series("rate", points)
-    text = Series("log", points[:400], texts=("x" * 160,) * 400)
-    panels = (Panel("rate", "Hz", (full,)), Panel("interval", "ms", (text,)))
-    figures = tuple(Chart(f"e-{n}", "title", "about", (), "time", "s", panels) for n in range(6))
+
+    def full(n: int) -> Chart:
+        points = tuple((k / 100 + n, (k % 17) / (3 + n)) for k in range(1200))
+        text = Series("log", points[:400], texts=(f"{n}" + "x" * 159,) * 400)
+        panels = (Panel("rate", "Hz", (Series("rate", points),)), Panel("interval", "ms", (text,)))
+        return Chart(f"e-{n}", "title", "about", (), "time", "s", panels)
+
+    figures = tuple(full(n) for n in range(6))
     assert len(render_html(report(replace(velocity(), figures=figures)))) < 1_500_000
 
 

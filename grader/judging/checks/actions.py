@@ -8,12 +8,15 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
+from grader.core.chart import Case, Look, Panel, Tone
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import DurationNs, FieldOf, seconds
 from grader.core.trace import Message, Trace
+from grader.judging.charts import Lanes, series
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
-from grader.judging.service_calls import LATENESS_NS, Call, calls_of, calls_of_node
+from grader.judging.plots import Drawing
+from grader.judging.service_calls import LATENESS_NS, Call, calls_of, calls_of_node, status_of
 from grader.judging.values import (
     JITTER_NS,
     NoSuchField,
@@ -29,8 +32,6 @@ from grader.judging.values import (
 )
 from grader.judging.wording import counted, listed, moment, nearest, number, quote, span
 
-#: Numbers of action_msgs/msg/GoalStatus.
-_STATUSES = dict(enumerate(("accepted", "executing", "canceling", "succeeded", "canceled", "aborted"), 1))
 _FINISH_HINTS = {
     "succeeded": "call goal_handle.succeed() before the result is returned",
     "canceled": "look at goal_handle.is_cancel_requested, then call goal_handle.canceled()",
@@ -95,8 +96,7 @@ class ActionResult:
     def _result_flaw(self, trace: Trace, goal: Call, mine: Call) -> tuple[str, str]:
         assert mine.response is not None
         took = mine.response.t_ns - goal.request.t_ns
-        status = mine.response.value.get("status")
-        ended = _STATUSES.get(status, f"status {status}") if isinstance(status, int) else "without a status"
+        ended = status_of(mine.response)
         if ended != self.status:
             return f"{ended}, expected that it {_ends(self.status)}", _FINISH_HINTS.get(self.status, "")
         result = mine.response.value.get("result")
@@ -159,6 +159,16 @@ class ActionFeedback:
         reason = f"{self.action}: {', '.join(map(str, counts[:10]))} messages of feedback"
         return met(reason, {"goals": len(accepted), "feedback": counts})
 
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return what was sent and came, and the number or length that has to grow."""
+        found = [(m, _size(m, self.grows)) for m in published(trace, f"{self.action}/_action/feedback") if self.grows]
+        points = [(seconds(m.t_ns), size) for m, size in found if size is not None]
+        if not points:
+            return Drawing(action=self.action)
+        dots = series(f"{self.grows} in the feedback", points, look=Look.DOTS)
+        panel = Panel(f"{self.grows}, or its length", "", (dots,))
+        return Drawing(action=self.action, panels=((panel, ""),))
+
     def _count_flaw(self, mine: Sequence[Message]) -> str:
         if self.at_least <= len(mine) and (self.at_most is None or len(mine) <= self.at_most):
             return ""
@@ -210,8 +220,8 @@ def _held(message: Message, path: str) -> Any:
     return value_at(_feedback(message), path)
 
 
-def _size(message: Message, path: str) -> float | None:
-    found = _held(message, path)
+def _size(message: Message, path: str | None) -> float | None:
+    found = None if path is None else _held(message, path)
     return float(len(found)) if isinstance(found, (list, tuple, str)) else as_number(found)
 
 
@@ -299,6 +309,29 @@ class LifecycleStates:
                 return silent
         told = ", ".join(_state(c) for c in asked) or "none asked for"
         return met(f"{counted(len(changes), 'transition')} made; states: {told}", evidence)
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the requests for transitions and states, the messages, and the time in which the node is active."""
+        changes, asked = (
+            sorted(calls_of_node(trace, self.node, service), key=lambda call: call.request.t_ns)
+            for service in ("change_state", "get_state")
+        )
+        if not changes and not asked:
+            return Drawing()
+        lanes = Lanes()
+        lanes.add("transition")
+        for name, tone, done in (("made", Tone.GOOD, True), ("not made", Tone.BAD, False)):
+            lanes.dots(name, ((c.request.t_ns, _label(c)) for c in changes if _succeeded(c) is done), tone)
+        lanes.add("state")
+        lanes.dots("state", ((c.request.t_ns, quote(_state(c))) for c in asked), Tone.SECOND)
+        if self.topic is not None:
+            lanes.add(self.topic)
+            lanes.dots(self.topic, ((m.t_ns, "") for m in published(trace, self.topic)), Tone.MAIN)
+        said = f"Transitions: {listed([_label(c) for c in changes], 8) or 'none'}; "
+        said += f"states: {listed([_state(c) for c in asked], 8) or 'none asked for'}."
+        cases = [Case(seconds(a), seconds(b), "active", Tone.GOOD) for a, b in _active(changes, trace.stop_ns)]
+        panels = ((lanes.panel(self.node or "the node"), said),)
+        return Drawing(panels=panels, cases=tuple(cases), title="Transitions and states")
 
     def _transition_flaw(self, changes: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         for call in changes:

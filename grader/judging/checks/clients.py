@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Annotated, Literal
 
+from grader.core.chart import Band, Case, Level, Look, Panel, Point, Tone
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, Pattern, seconds
 from grader.core.trace import OutputLine, Trace
+from grader.judging.charts import Lanes, gaps_panel, series
 from grader.judging.checks.logs import LOGGER_HINT, complained
 from grader.judging.findings import (
     explain_fault,
@@ -25,6 +27,7 @@ from grader.judging.findings import (
     waiting_for,
 )
 from grader.judging.output import Output, printed_lines, shape_of, student_records
+from grader.judging.plots import Drawing
 from grader.judging.service_calls import (
     LATENESS_NS,
     Call,
@@ -104,6 +107,19 @@ class CallsOfClient:
         hint = f"wait {span(self.period or 0)} after each answer before asking again"
         return not_met(reason, evidence, hint=hint, problem=ProblemKind.WRONG_RATE)
 
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the calls, and the time from each to the next with the period."""
+        times = [c.request.t_ns for c in calls_of(trace, self.service, "student")]
+        if len(times) < 2:
+            return Drawing(services=(self.service,))
+        bands = []
+        if self.period is not None:
+            label = f"{number(seconds(self.period))} ± {number(seconds(self.tolerance))} s"
+            bands.append(Band(seconds(self.period - self.tolerance), seconds(self.period + self.tolerance), label))
+        gaps = [seconds(b - a) for a, b in pairwise(times)]
+        said = f"{min(gaps):.3f} s to {max(gaps):.3f} s from request to request."
+        return Drawing(services=(self.service,), panels=((gaps_panel("request", times, bands=bands), said),))
+
     def _wrong_gap(self, trace: Trace, calls: Sequence[Call]) -> tuple[int, int] | None:
         """Return the number of the first call whose gap to the next is wrong, and the gap."""
         slack = LATENESS_NS[trace.clock] + self.tolerance
@@ -164,6 +180,19 @@ class WaitsForService:
         if not asked or asked[0] - appears_ns > self.within + LATENESS_NS[trace.clock]:
             return self._never_asked(trace, appears_ns, asked)
         return self._said(trace, appears_ns, asked[0])
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the calls with what the client wrote, and the time without a server."""
+        starts = trace.marks("server_starts", self.service)
+        until_s = seconds(min(starts[0].t_ns if starts else trace.stop_ns, trace.stop_ns))
+        cases = (Case(0.0, until_s, f"{self.service} is not there"),)
+        panels = []
+        if not calls_of(trace, self.service, "student"):
+            lanes = Lanes()
+            lanes.add("request")
+            panels.append((lanes.panel(self.service), f"No request on {self.service}."))
+        title = f"Calls of {self.service} and what {self.process} wrote"
+        return Drawing((), (self.service,), panels=tuple(panels), processes=(self.process,), cases=cases, title=title)
 
     def _gave_up(self, trace: Trace, appears_ns: int) -> Finding | None:
         """Return a finding if the client ended while waiting, or logged an error; None otherwise."""
@@ -279,6 +308,10 @@ class ReactsToResponses:
             if printed:
                 return only_printed(f"{self.process}: {printed}", evidence, LOGGER_HINT)
         return self._explain(trace, wrong, evidence)
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the numbers that came with the threshold, the kind of each response, and what the client wrote."""
+        return _episodes_drawing(self, trace)
 
     def _wrong(self, episode: Episode, episodes: Sequence[Episode], words: Words) -> str:
         """Describe what is wrong with the reaction to a response; empty if nothing is."""
@@ -416,6 +449,10 @@ class NoGoWithoutAnswer:
             reason += f"; it ended there: {fault_sentence(fault)}, which costs nothing here"
         return met(reason, evidence)
 
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the numbers that came with the threshold, the kind of each response, and what the client wrote."""
+        return _episodes_drawing(self, trace)
+
     def _due(self, found: Output, episode: Episode, episodes: Sequence[Episode], going: Going) -> bool:
         """Return whether output at the instant of a request still belongs to the previous good response."""
         before = episodes[episode.place - 2] if episode.place > 1 else None
@@ -441,6 +478,44 @@ def _episodes(check: ReactsToResponses | NoGoWithoutAnswer, trace: Trace) -> tup
     success = "" if check.success == "none" else check.success
     reading = ResponseReader(check.field, success, check.pattern, check.threshold)
     return episodes_of(trace, check.process, check.service, reading)
+
+
+_CASES = {
+    CallKind.GOOD: ("above", Tone.GOOD),
+    CallKind.LOW: ("not above", Tone.WARNING),
+    CallKind.FAILED: ("no success", Tone.BAD),
+    CallKind.UNREADABLE: ("no number", Tone.BAD),
+    CallKind.UNANSWERED: ("no response", Tone.BAD),
+}
+
+
+def _episodes_drawing(check: ReactsToResponses | NoGoWithoutAnswer, trace: Trace) -> Drawing:
+    """Return each response with its number and kind, and below it what the client wrote until its next request."""
+    episodes = _episodes(check, trace)
+    if not episodes:
+        return Drawing()
+    limit = number(check.threshold)
+    cases, lanes = [], Lanes()
+    points: dict[tuple[str, Tone], list[Point]] = {}
+    lanes.add("request")
+    lanes.dots("request", ((e.asked_ns, f"request {e.place}") for e in episodes), Tone.SECOND)
+    lanes.add("response")
+    told = [e for e in episodes if e.kind is not CallKind.UNANSWERED]
+    lanes.dots("response", ((e.start_ns, e.text or f"response {e.place}") for e in told), Tone.MAIN)
+    for e in episodes:
+        said, tone = _CASES[e.kind]
+        label = f"{said} {limit}" if e.kind in (CallKind.GOOD, CallKind.LOW) else said
+        stop_ns = min([e.stop_ns, *(m.t_ns for m in trace.marks("exited", check.process) if m.t_ns >= e.start_ns)])
+        cases.append(Case(seconds(e.asked_ns), seconds(stop_ns), label, tone))
+        if e.number is not None:
+            points.setdefault((f"number, {label}", tone), []).append((seconds(e.start_ns), e.number))
+    level = Level(check.threshold, limit, name="threshold")
+    dots = tuple(series(name, some, look=Look.DOTS, tone=tone) for (name, tone), some in points.items())
+    numbers_ = Panel(f"number in {check.field}", "", dots, levels=(level,))
+    said = f"{counted(len(episodes), 'request')} on {check.service}, {counted(len(told), 'response')}."
+    title = f"What came from {check.service} and what {check.process} wrote"
+    panels = ((numbers_, ""), (lanes.panel(check.service), said))
+    return Drawing(panels=panels, processes=(check.process,), cases=tuple(cases), title=title)
 
 
 def _nothing_of_its_own(check: ReactsToResponses | NoGoWithoutAnswer, words: Words) -> str:

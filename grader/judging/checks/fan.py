@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
-from grader.core.chart import Chart, Look
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Trace
-from grader.judging.charts import answer_panel, input_panel, time_chart, which_answers
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
+from grader.judging.plots import Drawing, threshold_drawing
 from grader.judging.series import lag_ns
 from grader.judging.values import (
     EXACT,
@@ -248,22 +247,11 @@ class ThresholdResponse:
             return crashed
         raise HarnessError(f"{self.input}: no value on this side of {number(self.threshold)} was published")
 
-    def chart(self, trace: Trace) -> Chart | None:
-        """Return the inputs of a controller with its answers below them, or None without inputs."""
-        sent = delivered_numbers(trace, self.input)
-        answers = published_numbers(trace, self.output)
-        if not sent:
-            return None
-        asked = held(trace, self.input)
-        expected = [Reading(h.start_ns, self._expected(h.value)) for h in asked]
-        expected += [Reading(trace.stop_ns, expected[-1].value)]
-        about = f"{counted(len(asked), 'value')} on {self.input}, each held for a while "
-        about += f"({', '.join(number(h.value) for h in asked)}{unit_of(self.input)}); "
-        about += f"{counted(len(answers), 'answer')} on {self.output}{which_answers(answers)}."
-        upper = input_panel(self.input, sent, self.threshold, Look.STEP)
-        lower = answer_panel(self.output, answers, expected)
-        title = f"Answers on {self.output} to {self.input}"
-        return time_chart(trace, f"response {self.input}", title, about, upper, lower)
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the inputs of the controller with its threshold, and its answers with the expected ones."""
+        expected = [Reading(h.start_ns, self._expected(h.value)) for h in held(trace, self.input)]
+        expected += [Reading(trace.stop_ns, r.value) for r in expected[-1:]]
+        return threshold_drawing(self.input, self.output, self.threshold, expected)
 
 
 def _deaf(subscriptions: Sequence[Endpoint]) -> str:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from grader.core.chart import Band, Chart, Look, Panel
+from grader.core.chart import Band
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern, seconds, within
 from grader.core.trace import Message, Trace
-from grader.judging.charts import plain_topic, points_of, series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, met, not_met
 from grader.judging.output import number_in
+from grader.judging.plots import Drawing, Plot, value_panels
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
 from grader.judging.values import (
     JITTER_NS,
@@ -68,6 +68,10 @@ class FieldEqual:
         known = evidence | {"field": path, "first_wrong_s": seconds(wrong[0].t_ns)}
         return not_met(reason, known, problem=ProblemKind.WRONG_VALUE, brief=f"{self.topic}: {clause}")
 
+    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
+        """Return the fields with what is expected of them."""
+        return Drawing((Plot(self.topic, rules=self.fields),))
+
 
 @dataclass(frozen=True, slots=True)
 class FieldInRange:
@@ -109,6 +113,10 @@ class FieldInRange:
         reason = f"{moment(message.t_ns)}, {self.topic}: {self.field} is {number(value)}, expected {rule.wanted}; "
         reason += f"{len(outside)} of {counted(len(values), 'value')} lie outside"
         return not_met(reason, evidence | {"first_outside_s": seconds(message.t_ns)}, problem=ProblemKind.WRONG_VALUE)
+
+    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
+        """Return the number with its range."""
+        return Drawing((Plot(self.topic, rules={self.field: FieldRule(low=self.low, high=self.high)}),))
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,6 +298,21 @@ class FieldFunction:
         problem, known = Problem(kind, start=instead.start), evidence | {"first_wrong_s": seconds(t_ns)}
         return not_met(reason, known, hint=instead.hint, problem=problem, brief=brief)
 
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the field with what the formula gives."""
+        messages = published(trace, self.topic)
+        wanted, expected = curve(self.formula), []
+        for n, message in enumerate(messages):
+            t_ns = message.t_ns - messages[0].t_ns
+            expected.append(Reading(message.t_ns, wanted.at(n, seconds(t_ns))))
+        if self.pattern is None:
+            return Drawing((Plot(self.topic, (self.field,), expected=tuple(expected)),))
+        read = [(m.t_ns, {"number": _number(m, self.field, self.pattern)}) for m in messages]
+        plot = Plot(self.topic, ("number",), expected=tuple(expected))
+        said = f"In {self.field} of {counted(len(read), 'message')} on {self.topic}"
+        panels = value_panels(plot, read, said) if read else []
+        return Drawing(panels=tuple(panels), title=f"The number in {self.field} of {self.topic}")
+
 
 #: Rounding to single precision must not push a value out of its range.
 _EDGE = 1e-5
@@ -379,18 +402,7 @@ class RandomInRange:
         reason += f"expected random ones in {number(self.low)} to {number(self.high)}{unit}"
         return met(reason, self._evidence(values))
 
-    def chart(self, trace: Trace) -> Chart | None:
-        """Return the numbers on a topic with their range, or None without numbers."""
-        values = published_numbers(trace, self.topic)
-        if not values:
-            return None
-        unit = unit_of(self.topic).strip()
-        got = [r.value for r in values]
-        outside = sum(not self.low <= v <= self.high for v in got)
-        about = f"{counted(len(got), 'value')} on {self.topic} from {number(min(got))} to {number(max(got))}"
-        about += f"{unit_of(self.topic)}, {len(set(got))} of them different; {outside or 'none'} outside "
+    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
+        """Return the numbers with their range."""
         label = f"{number(self.low)} to {number(self.high)}{unit_of(self.topic)}"
-        dots = series(plain_topic(self.topic), points_of(values), look=Look.LINE)
-        band = Band(self.low, self.high, f"{label}: accepted")
-        panel = Panel(plain_topic(self.topic), unit, (dots,), bands=(band,))
-        return time_chart(trace, f"range {self.topic}", f"Values on {self.topic}", f"{about}{label}.", panel)
+        return Drawing((Plot(self.topic, bands=(Band(self.low, self.high, f"{label}: accepted"),)),))

@@ -128,6 +128,7 @@ class Qos:
         depth: Smallest history depth; free if left out.
     """
 
+    shows_graph: ClassVar[bool] = True
     topic: str
     kind: Literal["publisher", "subscription"]
     reliability: Literal["reliable", "best_effort"] | None = None
@@ -192,6 +193,7 @@ class NodeName:
         name: Fully qualified, e.g. `/velocity_publisher`.
     """
 
+    shows_graph: ClassVar[bool] = True
     name: str
 
     @property
@@ -226,6 +228,7 @@ class TopicNames:
         node: Fully qualified name of the node; all nodes if left out.
     """
 
+    shows_graph: ClassVar[bool] = True
     publishes: tuple[str, ...] = ()
     subscribes: tuple[str, ...] = ()
     exactly: bool = False
@@ -288,6 +291,7 @@ class GraphEdges:
         between_processes: Whether the two nodes must belong to different processes.
     """
 
+    shows_graph: ClassVar[bool] = True
     edges: tuple[GraphEdge, ...]
     at_once: bool = False
     between_processes: bool = False

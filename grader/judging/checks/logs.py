@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, Literal
 
+from grader.core.chart import Band, Level, Look, Panel, Tone
 from grader.core.exercise import Finding, Location, ProblemKind
 from grader.core.quantities import DurationNs, FieldOf, Pattern, seconds, within
 from grader.core.trace import LogRecord, Message, Trace
+from grader.judging.charts import Lanes, gaps_panel, series
 from grader.judging.findings import (
     explain_fault,
     explain_no_message,
@@ -24,6 +26,7 @@ from grader.judging.findings import (
     waiting_for,
 )
 from grader.judging.output import Output, is_no_node, numbers_in, printed_lines, shape_of, student_records
+from grader.judging.plots import Drawing, Plot
 from grader.judging.values import JITTER_NS, number_at, published
 from grader.judging.wording import counted, listed, moment, number, quote, span
 
@@ -151,6 +154,30 @@ class LogsMatching:
             return faulted(fault, flaw, evidence)
         return not_met(reason + self._others(records), evidence)
 
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the records that match and the others, and the time from one match to the next."""
+        records = student_records(trace, self.process)
+        mine = [r for r in records if self._of_level(r) and self._matches(r)]
+        if not records:
+            return Drawing()
+        lanes = Lanes()
+        lanes.add("matching")
+        lanes.write("matching", mine, Tone.GOOD)
+        lanes.add("other")
+        lanes.write("other", (r for r in records if r not in mine), Tone.FAINT)
+        lines = printed_lines(trace, self.process)
+        if lines:
+            lanes.add("printed")
+            lanes.write("printed", lines, Tone.SECOND)
+        said = f"{len(mine)} of {counted(len(records), 'record')} match."
+        panels = [(lanes.panel(self.process), said)]
+        if self.period is not None and len(mine) > 1:
+            share = self.tolerance * self.period
+            label = f"{number(seconds(self.period))} s ± {number(100 * self.tolerance)} % on average"
+            band = Band(seconds(round(self.period - share)), seconds(round(self.period + share)), label)
+            panels.append((gaps_panel("match", [r.t_ns for r in mine], bands=(band,)), ""))
+        return Drawing(panels=tuple(panels), title=f"What {self.process} logged")
+
     def _of_level(self, record: LogRecord) -> bool:
         if record.severity not in _LEVELS:
             return False
@@ -245,6 +272,20 @@ class LogsEvery:
             reason = f"{self._said(shown, lines, 'printed')}, not through the logger"
             return only_printed(reason, self._evidence(shown, messages), LOGGER_HINT)
         return self._wrong(messages, logged or printed)
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the published numbers, the messages from one log to the next, and the logs."""
+        messages = published(trace, self.topic)
+        records, lines = student_records(trace, self.process), printed_lines(trace, self.process)
+        found = self._rhythms(trace, messages, records) or self._rhythms(trace, messages, lines)
+        panels: list[tuple[Panel, str]] = []
+        if found and len(found[0].places) > 1:
+            pairs = [(seconds(messages[b].t_ns), float(b - a)) for a, b in pairwise(found[0].places)]
+            level = Level(self.every, f"{self.every} messages")
+            dots = series("messages since the log before", pairs, look=Look.DOTS, tone=Tone.SECOND)
+            said = f"{counted(len(found[0].places), 'log')}, one for {number(found[0].average)} messages on average."
+            panels.append((Panel("from log to log", "messages", (dots,), levels=(level,)), said))
+        return Drawing((Plot(self.topic, (self.field,)),), panels=tuple(panels), processes=(self.process,))
 
     def _rhythms(self, trace: Trace, messages: Sequence[Message], outputs: Sequence[Output]) -> list[_Rhythm]:
         """Return the possible interpretations of the outputs, the likeliest first, including that of all outputs."""

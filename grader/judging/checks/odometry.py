@@ -7,15 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from grader.core.chart import Band, Chart, Look, Panel, Point, Series, Tone
+from grader.core.chart import Band, Case, Chart, Look, Panel, Point, Series, Tone
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import Fault, Trace
-from grader.judging.charts import series, time_chart
+from grader.judging.charts import gaps_panel, series, time_chart
 from grader.judging.checks.logs import complained
 from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, only_printed
 from grader.judging.output import printed_lines, student_records, written
+from grader.judging.plots import Drawing, Plot
 from grader.judging.position_causes import cause_of
 from grader.judging.position_logs import (
     Analysis,
@@ -252,9 +253,6 @@ class LogPeriod:
             return None
         period_s = seconds(self.period)
         dots = series("log", [(seconds(t), 0.0) for t in times], look=Look.DOTS)
-        gaps = series(
-            "since the log before", [(seconds(b), seconds(b - a)) for a, b in pairwise(times)], look=Look.DOTS
-        )
         share = self.tolerance * period_s
         label = f"{number(period_s)} s ± {number(100 * self.tolerance)} % on average"
         return time_chart(
@@ -263,7 +261,7 @@ class LogPeriod:
             "When positions were logged",
             _describe_period(times, self),
             Panel("logs", "", (dots,), lanes=("log",), grid=(seconds(times[0]), period_s)),
-            Panel("interval", "s", (gaps,), bands=(Band(period_s - share, period_s + share, label),)),
+            gaps_panel("log", times, bands=(Band(period_s - share, period_s + share, label),)),
         )
 
 
@@ -311,6 +309,13 @@ class WaitsGracefully:
         if fault.said("NoneType"):
             hint = "start with None and return early as long as no message has come"
         return not_met(f"{fault_sentence(fault)}, {when}", {"fault_s": seconds(fault.t_ns)}, hint=hint, fault=fault)
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return what came after the silence, with what the process wrote all the time."""
+        came = trace.deliveries(self.topic)
+        first_s = seconds(min(came[0].t_ns if came else trace.stop_ns, trace.stop_ns))
+        cases = (Case(0.0, first_s, f"nothing on {self.topic}"),)
+        return Drawing((Plot(self.topic, most=1),), processes=(self.process,), cases=cases)
 
     def _works(self, trace: Trace, first_ns: int) -> Finding:
         outputs = written(trace, self.process)

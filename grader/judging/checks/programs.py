@@ -5,12 +5,15 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
+from grader.core.chart import Case, Look, Panel
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Location, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, seconds, within
 from grader.core.trace import FaultKind, Message, Trace
+from grader.judging.charts import expected_series, series
 from grader.judging.findings import (
     explain_fault,
     explain_no_message,
@@ -22,6 +25,7 @@ from grader.judging.findings import (
     met,
     not_met,
 )
+from grader.judging.plots import Drawing, Plot
 from grader.judging.service_calls import (
     LATENESS_NS,
     ParameterSetting,
@@ -31,7 +35,7 @@ from grader.judging.service_calls import (
     settings,
 )
 from grader.judging.source import Source, read, subtree
-from grader.judging.values import FieldRule, as_number, published, shown, value_at
+from grader.judging.values import FieldRule, Reading, as_number, published, shown, value_at
 from grader.judging.wording import counted, listed, moment, number, quote, span
 
 _DECLARE_HINT = "declare it where the node is created: self.declare_parameter('{name}', ...)"
@@ -169,6 +173,31 @@ class ParameterTakesEffect:
                 return not_met(reason, evidence, hint=hint)
         values = ", ".join(shown(s.value) for s in tries)
         return met(f"{self.topic}: follows {self.name} ({values}) within {span(self.within)}", evidence)
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return what the parameter changes, with its value from the time on when it has to show."""
+        tries = settings(trace, self.name, self.node)
+        stops = [*(s.t_ns for s in tries), trace.stop_ns][1:]
+        times = [m.t_ns for m in published(trace, self.topic)]
+        cases = tuple(
+            Case(seconds(s.t_ns), seconds(stop_ns), f"{self.name} = {shown(s.value)}{'' if s.taken else ', refused'}")
+            for s, stop_ns in zip(tries, stops, strict=True)
+        )
+        known = [(s, as_number(s.value)) for s in tries]
+        wanted = tuple(Reading(s.t_ns + self.within, value) for s, value in known if value is not None)
+        wanted += tuple(Reading(trace.stop_ns, r.value) for r in wanted[-1:] if r.t_ns < trace.stop_ns)
+        title = f"{self.topic} after {self.name} was set"
+        if self.effect == "field":
+            return Drawing((Plot(self.topic, (self.field,), expected=wanted),), cases=cases, title=title)
+        if len(times) < 2:
+            return Drawing((Plot(self.topic),), cases=cases, title=title)
+        lengths = [seconds(b - a) for a, b in pairwise(times)]
+        period = self.effect == "period"
+        points = [(seconds(t), d if period or not d else 1 / d) for t, d in zip(times[1:], lengths, strict=True)]
+        line = series(f"{self.effect} of {self.topic}", points, look=Look.DOTS)
+        panel = Panel(self.effect, "s" if period else "Hz", (expected_series(wanted), line))
+        said = f"{counted(len(times), 'message')}, {min(lengths):.3f} s to {max(lengths):.3f} s apart."
+        return Drawing(panels=((panel, said),), cases=cases, title=title)
 
     def _flaw(self, one: ParameterSetting, stop_ns: int, messages: Sequence[Message]) -> tuple[str, str]:
         """Describe what is wrong after a value was set, and a hint; empty if nothing is."""

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from grader.core.chart import Band, Chart, Level, Look, Panel, Point, Tone
+from grader.core.chart import Band, Chart, Level, Panel, Point, Tone
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
-from grader.judging.charts import series, time_chart
+from grader.judging.charts import gaps_panel, series, time_chart
 from grader.judging.findings import explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met, partly
 from grader.judging.values import published
 from grader.judging.wording import counted, moment, number, quote, span
@@ -244,10 +244,8 @@ def _rate_panel(check: TopicRate, times: Sequence[int]) -> Panel:
 
 
 def _interval_panel(check: TopicRate, times: Sequence[int]) -> Panel:
-    points = [(seconds(b), (b - a) / NS_PER_MS) for a, b in pairwise(times)]
     expected = Level(1000 / check.rate, f"{number(1000 / check.rate)} ms")
-    dots = series("interval since the message before", points, look=Look.DOTS, tone=Tone.SECOND)
-    return Panel("interval", "ms", (dots,), levels=(expected,))
+    return gaps_panel("message", times, levels=(expected,), unit="ms")
 
 
 def _band(rate: float, tolerance: float, label: str, tone: Tone) -> Band:

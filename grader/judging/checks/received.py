@@ -10,12 +10,12 @@ from functools import partial
 from itertools import pairwise
 from typing import Annotated
 
-from grader.core.chart import Chart, Look, Panel, Tone
+from grader.core.chart import Look, Panel, Tone
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S, FieldOf, seconds
-from grader.core.trace import ClockKind, Endpoint, Message, Trace
-from grader.judging.charts import plain_topic, points_of, series, time_chart, written_in_lane
+from grader.core.trace import ClockKind, Endpoint, LogRecord, Message, Trace
+from grader.judging.charts import expected_series, series
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.findings import (
     explain_fault,
@@ -42,10 +42,12 @@ from grader.judging.output import (
     times,
     wrong_conversion,
 )
-from grader.judging.texts import Printed
+from grader.judging.plots import Drawing, Plot
+from grader.judging.texts import Printed, clean
 from grader.judging.values import (
     JITTER_NS,
     Held,
+    Reading,
     carries_number,
     delivered_numbers,
     heard_from_ns,
@@ -53,7 +55,7 @@ from grader.judging.values import (
     number_at,
     student_endpoints,
 )
-from grader.judging.wording import counted, moment, number, numbers, quote, unit_of
+from grader.judging.wording import counted, moment, number, numbers, quote
 
 #: How long after a message its log may come, if there are enough numbers in total.
 _LATE_NS = NS_PER_S
@@ -160,6 +162,50 @@ class LogsValues:
             for o in in_window(outputs, one.t_ns, one.stop_ns)
             for n in numbers_in(o.text)
         )
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return what came, and below it the numbers that had to be logged with the nearest that were."""
+        received = self._received(trace)
+        records, lines = student_records(trace, self.process), printed_lines(trace, self.process)
+        panels = [self._logged_panel(received, factor, records, lines) for factor in self.unit_factors[:4]]
+        title = f"What came on {self.topic} and what {self.process} logged"
+        return Drawing((Plot(self.topic, (self.field,)),), panels=tuple(panels), processes=(self.process,), title=title)
+
+    def _logged_panel(
+        self, received: Sequence[_Received], factor: float, *written: Sequence[Output]
+    ) -> tuple[Panel, str]:
+        """Return a product of each message with the number that was logged or printed for it, right or wrong."""
+        largest = max((abs(r.value) for r in received), default=0.0)
+        kinds: dict[tuple[str, Tone], list[tuple[int, float, str]]] = {}
+        for one in received:
+            answer = next((a for outputs in written if (a := self._answer(one, factor, largest, outputs))), None)
+            if answer is not None:
+                output, value, right = answer
+                verb = "logged" if isinstance(output, LogRecord) else "printed"
+                kind = (f"{verb}, right", Tone.GOOD) if right else (f"{verb}, wrong", Tone.BAD)
+                kinds.setdefault(kind, []).append((output.t_ns, value, clean(output.text)))
+        rows = [expected_series([Reading(r.t_ns, factor * r.value) for r in received])]
+        for (name, tone), some in kinds.items():
+            points, texts = [(seconds(t_ns), value) for t_ns, value, _ in some], [text for *_, text in some]
+            rows.append(series(name, points, look=Look.DOTS, tone=tone, texts=texts))
+        said = ", ".join(f"{len(some)} {name}" for (name, _), some in kinds.items()) or "none found"
+        panel = Panel(f"logged: {times(factor)}", "", tuple(rows))
+        return panel, f"For {times(factor)}, {counted(len(received), 'number')} expected: {said}."
+
+    def _answer(
+        self, one: _Received, factor: float, largest: float, outputs: Sequence[Output]
+    ) -> tuple[Output, float, bool] | None:
+        """Return the text with a product of a message, or else the first one with a number, and whether it is right."""
+        wanted = factor * one.value
+        for output in in_window(outputs, one.t_ns, max(one.stop_ns, one.t_ns + _LATE_NS)):
+            shown = next((n for n in numbers_in(output.text) if _shows(wanted, abs(factor) * largest, n)), None)
+            if shown is not None:
+                return output, shown.value, True
+        for output in in_window(outputs, one.t_ns, one.stop_ns):
+            values = [n.value for n in numbers_in(output.text) if math.isfinite(n.value)]
+            if values:
+                return output, min(values, key=lambda value: abs(value - wanted)), False
+        return None
 
     def _received(self, trace: Trace) -> list[_Received]:
         jitter_ns = JITTER_NS[trace.clock]
@@ -409,24 +455,6 @@ class LogsReceived:
         hint = "log msg.data in the callback of the subscription to " + self.topic
         brief = f"{self.topic}: {number(first.value)} is never logged"
         return not_met(reason, evidence, hint=hint, problem=ProblemKind.NOT_LOGGED, brief=brief)
-
-    def chart(self, trace: Trace) -> Chart | None:
-        """Return the numbers published to a node and what it wrote meanwhile, or None without numbers."""
-        sent = delivered_numbers(trace, self.topic)
-        if not sent:
-            return None
-        records, lines = student_records(trace, self.process), printed_lines(trace, self.process)
-        lanes = ["logged"] + (["printed"] if lines else [])
-        rows = [written_in_lane("log record", records, 0, Tone.SECOND)]
-        rows += [written_in_lane("printed line", lines, 1, Tone.WARNING)] if lines else []
-        given = series(f"published on {self.topic}", points_of(sent), look=Look.STEP)
-        distinct = list(dict.fromkeys(number(r.value) for r in sent))
-        about = f"{counted(len(sent), 'message')} on {self.topic} ({', '.join(distinct[:8])}); meanwhile "
-        about += f"{counted(len(records), 'log record')} and {counted(len(lines), 'printed line')}."
-        came = Panel(plain_topic(self.topic), unit_of(self.topic).strip(), (given,))
-        wrote = Panel("written", "", tuple(rows), lanes=tuple(lanes))
-        title = f"What came on {self.topic} and what was logged"
-        return time_chart(trace, f"received {self.topic}", title, about, came, wrote)
 
 
 def _missing(values: Sequence[Held], logged: frozenset[int], trace: Trace) -> list[Held]:

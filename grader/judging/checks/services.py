@@ -8,16 +8,19 @@ from dataclasses import dataclass
 from itertools import groupby, pairwise
 from typing import Annotated
 
+from grader.core.chart import Look, Panel, Tone
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, Pattern, ServiceType, seconds, within
 from grader.core.trace import Response, Trace
+from grader.judging.charts import expected_series, series
 from grader.judging.findings import explain_fault, explain_no_server, first_fault, met, not_met, waiting_for
 from grader.judging.output import number_in
+from grader.judging.plots import Drawing
 from grader.judging.series import curve
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of
-from grader.judging.values import RuleOrValue, breach, broken_rules, number_at, rules_text, text_at
-from grader.judging.wording import counted, moment, number, numbers, quote, span
+from grader.judging.values import Reading, RuleOrValue, breach, broken_rules, number_at, rules_text, text_at
+from grader.judging.wording import counted, listed, moment, number, numbers, quote, span
 
 _RETURN_HINT = "a service callback takes (self, request, response) and ends with return response"
 
@@ -97,6 +100,10 @@ class ServiceAnswersAll:
         problem = ProblemKind.NO_ANSWER if first.response is None else ProblemKind.TOO_LATE
         return explain_fault(trace, reason, known, last=True) or not_met(reason, known, hint=hint, problem=problem)
 
+    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
+        """Return the calls with the time that each took."""
+        return Drawing(services=(self.service,), within_ns=self.within)
+
 
 def _due(call: Call, trace: Trace, late_ns: int) -> bool:
     return call.response is not None or call.request.t_ns + late_ns < trace.stop_ns
@@ -136,6 +143,10 @@ class ServiceResponse:
         reason += f"{place}; wrong in {len(wrong)} of {counted(len(found), 'response')}"
         known = evidence | {"field": path, "first_wrong_s": seconds(first.t_ns)}
         return not_met(reason, known, hint=_hint(first, path), problem=ProblemKind.WRONG_VALUE)
+
+    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
+        """Return the calls and the fields of the responses."""
+        return Drawing(services=(self.service,), rules=self.fields)
 
 
 def _hint(response: Response, path: str) -> str:
@@ -215,6 +226,10 @@ class ServiceFunction:
         hint = f"set response.{self.field} before the response is returned" if not any(a.got for a in answers) else ""
         known = evidence | {"first_wrong_s": seconds(first.response.t_ns)}
         return not_met(reason, known, hint=hint, problem=ProblemKind.WRONG_VALUE, brief=brief)
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the calls, and the number in each response with the expected one."""
+        return _answers_drawing(self, self._answers(calls_of(trace, self.service, "grader")))
 
     def _answers(self, calls: Sequence[Call]) -> list[_Answer]:
         wanted = curve(self.formula, of_fields=True)
@@ -301,6 +316,11 @@ class ServiceSequence:
         reason = f"{self.service}: {counted(len(answers), 'response')} in the right order: {shown}"
         return met(f"{reason}, ... {number(answers[-1].wanted)}", evidence)
 
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the calls, and the number in each response with the expected one."""
+        calls = [c for c in calls_of(trace, self.service, "grader") if c.response is not None]
+        return _answers_drawing(self, self._answers(calls, _answered_ns))
+
     def _wrong(self, answers: Sequence[_Answer]) -> list[int]:
         return [k for k, a in enumerate(answers) if a.got is None or not within(a.got, a.wanted, self.tolerance)]
 
@@ -385,3 +405,19 @@ class ServiceSequence:
 
 def _answered_ns(call: Call) -> int:
     return call.request.t_ns if call.response is None else call.response.t_ns
+
+
+def _answers_drawing(check: ServiceFunction | ServiceSequence, answers: Sequence[_Answer]) -> Drawing:
+    """Return the calls, and the number in each response with the expected one."""
+    if not answers:
+        return Drawing(services=(check.service,))
+    rows = [expected_series([Reading(a.response.t_ns, a.wanted) for a in answers])]
+    read = [(a, a.got) for a in answers if a.got is not None]
+    wrong = len(answers) - len(read)
+    for name, tone, right in (("right", Tone.GOOD, True), ("wrong", Tone.BAD, False)):
+        some = [(seconds(a.response.t_ns), got) for a, got in read if within(got, a.wanted, check.tolerance) is right]
+        rows += [series(name, some, look=Look.DOTS, tone=tone)] if some else []
+        wrong += 0 if right else len(some)
+    said = f"Numbers told: {listed([number(got) for _, got in read], 6)}; {wrong} of {len(answers)} wrong."
+    panel = Panel(f"{check.field} of the response", "", tuple(rows))
+    return Drawing(services=(check.service,), panels=((panel, said),))

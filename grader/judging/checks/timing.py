@@ -10,10 +10,12 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Annotated, Literal
 
+from grader.core.chart import Band, Case, Level, Tone
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, seconds, within
 from grader.core.trace import Delivery, Message, Trace
+from grader.judging.charts import Lanes, gaps_panel
 from grader.judging.checks.fields import too_few_messages
 from grader.judging.findings import (
     explain_fault,
@@ -25,12 +27,15 @@ from grader.judging.findings import (
     not_met,
     waiting_for,
 )
+from grader.judging.plots import Drawing, Plot, delay_panel
 from grader.judging.series import curve
 from grader.judging.values import (
     JITTER_NS,
     FieldRule,
     NoSuchField,
+    Reading,
     RuleOrValue,
+    as_number,
     as_rule,
     at_path,
     breach,
@@ -104,6 +109,23 @@ class Period:
             return not_met(f"{text}; expected {self.expected}", evidence)
         return met(text, evidence)
 
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the time from each message to the next, with what is allowed."""
+        times = [m.t_ns for m in published(trace, self.topic)]
+        if len(times) < 2:
+            return Drawing((Plot(self.topic),))
+        ends = {"at least": self.least, "at most": self.largest}
+        levels = [Level(seconds(ns), f"{word} {_ms(ns)}", name=word) for word, ns in ends.items() if ns]
+        bands = []
+        if self.average is not None:
+            share, mean = self.tolerance * seconds(self.average), seconds(self.average)
+            label = f"{_ms(self.average)} ± {number(100 * self.tolerance)} % on average"
+            bands.append(Band(mean - share, mean + share, label))
+        gaps = [seconds(b - a) for a, b in pairwise(times)]
+        said = f"{counted(len(times), 'message')}, {min(gaps):.3f} s to {max(gaps):.3f} s apart."
+        panel = gaps_panel("message", times, bands=bands, levels=levels)
+        return Drawing(panels=((panel, said),), title=f"How often {self.topic} came")
+
     def _wrong(self, trace: Trace, gaps: Sequence[tuple[int, int]]) -> tuple[int, int] | None:
         jitter = JITTER_NS[trace.clock]
         least, largest = (self.least or 0) - jitter, self.largest
@@ -162,6 +184,22 @@ class Latency:
         problem = ProblemKind.NO_ANSWER if delay is None else ProblemKind.TOO_LATE
         return not_met(reason, evidence | {"first_late_s": seconds(t_ns)}, problem=problem)
 
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return inputs and outputs as marks, and the time from each input to the next output."""
+        jitter = JITTER_NS[trace.clock]
+        inputs = [given.t_ns for given in _inputs(trace, self.input) if given.t_ns < trace.stop_ns]
+        outputs = [m.t_ns for m in published(trace, self.output)]
+        delays = [(t, d) for t in inputs if (d := self._delay(t, outputs, jitter)) is not None]
+        if not inputs and not outputs:
+            return Drawing()
+        lanes = Lanes()
+        for name, times, tone in ((self.input, inputs, Tone.MAIN), (self.output, outputs, Tone.SECOND)):
+            lanes.add(name)
+            lanes.dots(name, ((t_ns, "") for t_ns in times), tone)
+        said = f"{counted(len(inputs), 'input')} on {self.input}, {counted(len(outputs), 'message')} on {self.output}."
+        panels = ((lanes.panel("messages"), said), delay_panel("next message", delays, self.within))
+        return Drawing(panels=panels, title=f"From {self.input} to {self.output}")
+
     def _delay(self, t_ns: int, outputs: Sequence[int], jitter: int) -> int | None:
         place = bisect_left(outputs, t_ns - jitter)
         return max(0, outputs[place] - t_ns) if place < len(outputs) else None
@@ -204,14 +242,11 @@ class Silence:
 
     def judge(self, trace: Trace) -> Finding:
         fault = first_fault(trace)
-        start_ns = self._moment(trace, self.after, 0)
-        stop_ns = self._moment(trace, self.before, trace.stop_ns)
+        start_ns, stop_ns = self._window(trace)
         if start_ns is None or stop_ns is None:
             if fault is not None:
                 return faulted(fault, "it came to no silence")
             raise HarnessError(f"{self.topic}: the recording has no moment {self.after or self.before}")
-        start_ns += self.grace + (JITTER_NS[trace.clock] if self.after else 0)
-        stop_ns = min(stop_ns - (JITTER_NS[trace.clock] if self.before else 0), start_ns + (self.duration or stop_ns))
         if stop_ns <= start_ns and fault is None:
             raise HarnessError(f"{self.topic}: the window of silence has no length")
         found = [m.t_ns for m in published(trace, self.topic) if start_ns <= m.t_ns < stop_ns]
@@ -223,6 +258,29 @@ class Silence:
         if fault is not None and fault.t_ns < stop_ns:
             return faulted(fault, f"its silence {window} is no merit", evidence)
         return met(f"{self.topic}: no message {window}", evidence)
+
+    def _window(self, trace: Trace) -> tuple[int, int] | tuple[None, None]:
+        """Return when the window of silence begins and ends; None if the recording has no such moment."""
+        start_ns = self._moment(trace, self.after, 0)
+        stop_ns = self._moment(trace, self.before, trace.stop_ns)
+        if start_ns is None or stop_ns is None:
+            return None, None
+        start_ns += self.grace + (JITTER_NS[trace.clock] if self.after else 0)
+        stop_ns -= JITTER_NS[trace.clock] if self.before else 0
+        return start_ns, min(stop_ns, start_ns + self.duration) if self.duration else stop_ns
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the messages on the topic, with the window in which none may come."""
+        start_ns, stop_ns = self._window(trace)
+        cases: tuple[Case, ...] = ()
+        if start_ns is not None and stop_ns is not None and start_ns < stop_ns:
+            cases = (Case(seconds(start_ns), seconds(stop_ns), "no message expected"),)
+        lanes = Lanes()
+        lanes.add(self.topic)
+        found = published(trace, self.topic)
+        lanes.dots("message", ((m.t_ns, "") for m in found), Tone.MAIN)
+        said = f"{counted(len(found), 'message')} on {self.topic}."
+        return Drawing(panels=((lanes.panel("messages"), said),), cases=cases, title=f"Silence on {self.topic}")
 
     def _moment(self, trace: Trace, name: str | None, otherwise: int) -> int | None:
         if name is None:
@@ -353,6 +411,34 @@ class Reaction:
             during = tuple(o for o in outputs if one.t_ns - jitter_ns <= o.t_ns < stop_ns - jitter_ns)
             found.append(_Asked(one, case, during))
         return found
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return inputs above outputs, with the numbers expected, and each input as a case."""
+        asked = self._asked(trace)
+        whens = dict.fromkeys(path for case in self.cases for path in case.when)
+        thens = dict.fromkeys(path for case in self.cases for path in (*case.then, *case.copies))
+        wanted: dict[str, list[Reading]] = {}
+        for one in asked:
+            for path, rule in one.case.rules(one.given.value).items():
+                if (equal := as_number(as_rule(rule).equals)) is not None:
+                    wanted.setdefault(path, []).append(Reading(one.given.t_ns, equal))
+        # the first field is the one that is drawn with what was expected
+        first = next((path for path in thens if path in wanted), "")
+        fields = tuple(sorted(thens, key=lambda path: path != first))
+        expected = wanted.get(first, [])
+        expected += [Reading(trace.stop_ns, r.value) for r in expected[-1:]]
+        stops = [*(a.given.t_ns for a in asked), trace.stop_ns][1:]
+        cases = [
+            Case(
+                seconds(a.given.t_ns),
+                seconds(stop_ns),
+                listed([f"{path} = {_short(a.given.value, path)}" for path in a.case.when], 2),
+                Tone.BAD if self._wrong(trace, a) else Tone.GOOD,
+            )
+            for a, stop_ns in zip(asked, stops, strict=False)
+        ]
+        plots = (Plot(self.input, tuple(whens)), Plot(self.output, fields, expected=tuple(expected)))
+        return Drawing(plots, cases=tuple(cases))
 
     def _wrong(self, trace: Trace, asked: _Asked) -> str:
         """Describe what is wrong with the outputs after an input; empty if nothing is."""

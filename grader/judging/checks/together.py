@@ -9,12 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from grader.core.chart import Chart, Look
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace
-from grader.judging.charts import answer_panel, input_panel, plain_topic, time_chart, which_answers
 from grader.judging.findings import FAULT_KEY, explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met
+from grader.judging.plots import Drawing, threshold_drawing
 from grader.judging.series import steps_behind
 from grader.judging.values import (
     EXACT,
@@ -257,20 +256,10 @@ class AnswersTogether:
         )
         return met(f"{reason}all right; the answer changed {counted(evidence['answer_changes'], 'time')}", evidence)
 
-    def chart(self, trace: Trace) -> Chart | None:
-        """Return the messages between the student's two nodes, or None if the first was silent."""
-        inputs = published_numbers(trace, self.input)
-        answers = published_numbers(trace, self.output)
-        if not inputs:
-            return None
-        above = sum(r.value > self.threshold for r in inputs)
-        wanted = [Reading(r.t_ns, self._expected(r.value)) for r in inputs]
-        about = f"{counted(len(inputs), 'value')} on {self.input}, {above} above {number(self.threshold)}"
-        about += f"{unit_of(self.input)}; {counted(len(answers), 'answer')} on {self.output}{which_answers(answers)}."
-        upper = input_panel(self.input, inputs, self.threshold, Look.LINE)
-        lower = answer_panel(self.output, answers, wanted)
-        title = f"{plain_topic(self.input).capitalize()} and {plain_topic(self.output)}, both nodes together"
-        return time_chart(trace, f"together {self.input}", title, about, upper, lower)
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the messages between the student's two nodes, with the threshold and the expected answers."""
+        expected = [Reading(r.t_ns, self._expected(r.value)) for r in published_numbers(trace, self.input)]
+        return threshold_drawing(self.input, self.output, self.threshold, expected)
 
 
 def _usual_gap(answers: Sequence[Reading]) -> int:

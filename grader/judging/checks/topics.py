@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
-from grader.core.chart import Chart, Level, Look, Panel, Point, Tone
+from grader.core.chart import Level
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import SLACK, FieldNumber, FieldOf, Hertz, seconds, within
 from grader.core.trace import Endpoint, Message, Trace
-from grader.judging.charts import series, time_chart
+from grader.judging.charts import gaps_panel
 from grader.judging.findings import explain_fault, explain_no_message, explain_no_subscription, met, not_met
-from grader.judging.values import equals, leaves, number_at, published, student_endpoints, text_at
+from grader.judging.plots import Drawing, Plot, value_panels
+from grader.judging.values import FieldRule, equals, leaves, number_at, published, student_endpoints, text_at
 from grader.judging.wording import counted, listed, moment, number, numbers, quote
 
 
@@ -52,6 +53,7 @@ class Subscribes:
         type: Message type, e.g. `nav_msgs/msg/Odometry`.
     """
 
+    shows_graph: ClassVar[bool] = True
     topic: str
     type: str
 
@@ -183,15 +185,9 @@ class FieldValues:
                 return f"{number(want)} is in {quote(other)}; it belongs in {path}"
         return ""
 
-    def chart(self, trace: Trace) -> Chart | None:
-        """Return the chart of the fields that the check names, or None without messages."""
-        messages = published(trace, self.topic)
-        if not messages:
-            return None
-        group = next(iter(self.values)).partition(".")[0]
-        title = "Commanded velocities" if group in _UNITS else "Values"
-        title, about = f"{title} on {self.topic}", _describe_fields(self, messages)
-        return time_chart(trace, f"fields {self.topic}", title, about, _field_panel(self, messages, group))
+    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
+        """Return the fields that the check names, with the numbers that it expects."""
+        return Drawing((Plot(self.topic, rules={path: FieldRule(equals=want) for path, want in self.values.items()}),))
 
 
 def _sign_or_unit(path: str, got: float, want: float) -> str:
@@ -211,39 +207,9 @@ def _sign_or_unit(path: str, got: float, want: float) -> str:
     return f"{path} is in m/s; {number(got)} looks like {unit}" if unit and not angular else ""
 
 
-_TONES = (Tone.MAIN, Tone.SECOND, Tone.THIRD)
-_UNITS = {"linear": "m/s", "angular": "rad/s"}
-_NAN = float("nan")
-
-
-def _field_panel(check: FieldValues, messages: tuple[Message, ...], group: str) -> Panel:
-    lines = []
-    for place, path in enumerate(check.values):
-        points: list[Point] = []
-        for message in messages:
-            got = number_at(message.value, path)
-            points.append((seconds(message.t_ns), _NAN if got is None else got))
-        look = Look.LINE if len(points) > 1 else Look.DOTS
-        lines.append(series(path, points, look=look, tone=_TONES[place % len(_TONES)]))
-    wanted = {w: [p for p, v in check.values.items() if v == w] for w in dict.fromkeys(check.values.values())}
-    finite = {w: paths for w, paths in wanted.items() if math.isfinite(w)}
-    levels = tuple(Level(w, f"{', '.join(paths)} = {number(w)}") for w, paths in finite.items())
-    same = all("." in path and path.startswith(f"{group}.") for path in check.values)
-    return Panel(group if same else "value", _UNITS.get(group, "") if same else "", tuple(lines), levels=levels)
-
-
-def _describe_fields(check: FieldValues, messages: tuple[Message, ...]) -> str:
-    parts = []
-    for path, want in check.values.items():
-        got = [g for g in (number_at(m.value, path) for m in messages) if g is not None]
-        right = sum(equals(g, want, check.tolerance) for g in got)
-        spread = f", from {number(min(got))} to {number(max(got))}" if got and right < len(messages) else ""
-        parts.append(f"{path} is {number(want)} in {right} of {counted(len(messages), 'message')}{spread}")
-    return "; ".join(parts) + "."
-
-
 _AXES = ("x", "y", "z")
 _QUATERNION = ("x", "y", "z", "w")
+_PARTS = (("translation", _AXES), ("rotation", _QUATERNION))
 
 
 @dataclass(frozen=True, slots=True)
@@ -352,6 +318,31 @@ class Transform:
         swapped = any(f.frames == (self.child.lstrip("/"), self.parent.lstrip("/")) for f in found)
         hint = f"header.frame_id is the parent, {self.parent}, and child_frame_id is {self.child}" if swapped else ""
         return not_met(reason, {"found": pairs[:20]}, hint=hint, problem=ProblemKind.OTHER_NAME)
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the numbers of the transform, and the time from each to the next if a rate is expected."""
+        pair = (self.parent.lstrip("/"), self.child.lstrip("/"))
+        topics = [t for t in self._topics if published(trace, t)]
+        found = [_Found(m.t_ns, t) for topic in topics for m in published(trace, topic) for t in _transforms(m)]
+        mine = sorted((f for f in found if f.frames == pair), key=lambda f: f.t_ns)
+        if not mine:
+            return Drawing(tuple(map(Plot, topics)))
+        rules = {f"translation.{name}": FieldRule(equals=v) for name, v in (self.translation or {}).items()}
+        if self.rotation is not None:
+            rules |= {f"rotation.{name}": FieldRule(equals=self.rotation.get(name, 0.0)) for name in _QUATERNION}
+        fields = tuple(f"{part}.{n}" for part, names in _PARTS for n in names)
+        timed = [(f.t_ns, _part(f.value)) for f in mine]
+        said = f"{counted(len(mine), 'transform')} {self.parent} → {self.child}"
+        panels = value_panels(Plot(" and ".join(topics), fields, rules), timed, said)
+        if self.rate is not None:
+            level = Level(1 / self.rate, f"{number(1 / self.rate)} s")
+            panels.append((gaps_panel("transform", [f.t_ns for f in mine], levels=(level,)), ""))
+        return Drawing(panels=tuple(panels), title=f"The transform {self.parent} → {self.child}")
+
+
+def _part(value: Mapping[str, object]) -> Mapping[str, object]:
+    found = value.get("transform")
+    return found if isinstance(found, Mapping) else {}
 
 
 def _transforms(message: Message) -> list[Mapping[str, object]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -26,18 +26,41 @@ _NAME_LIMIT = 60
 _MOST_BOXES = 60
 
 
-def figure_values(figure: Figure) -> JsonObject:
-    """Return a figure as JSON values; numbers that JSON cannot represent become None."""
+class Columns:
+    """The times, numbers and texts of all series of a page, each list of them once: many charts share them."""
+
+    def __init__(self) -> None:
+        self._places: dict[tuple[object, ...], int] = {}
+        self.lists: list[list[JsonValue]] = []
+
+    def numbers(self, values: tuple[float, ...]) -> int:
+        """Return the index of a list of numbers; a single one stands for equal ones."""
+        same = len(values) > 1 and all(value == values[0] for value in values)
+        return self._kept(("numbers", *(values[:1] if same else values)), _number)
+
+    def texts(self, values: tuple[str, ...]) -> int:
+        """Return the index of a list of texts."""
+        return self._kept(("texts", *values), lambda text: shown(text, limit=_TEXT_LIMIT))
+
+    def _kept(self, key: tuple[object, ...], showable: Callable[[Any], JsonValue]) -> int:
+        if key not in self._places:
+            self._places[key] = len(self.lists)
+            self.lists.append([showable(value) for value in key[1:]])
+        return self._places[key]
+
+
+def figure_values(figure: Figure, columns: Columns) -> JsonObject:
+    """Return a figure as JSON values, with its points in columns; numbers that JSON cannot represent become None."""
     if isinstance(figure, GraphFigure):
         return {"kind": "graph", "title": shown(figure.title), "stages": [_stage(stage) for stage in figure.stages]}
     if isinstance(figure, Playback):
         return {
             "kind": "run",
-            "timeline": _chart(figure.timeline),
+            "timeline": _chart(figure.timeline, columns),
             "topics": [_topic(topic) for topic in figure.topics],
             "graph": _living_graph(figure),
         }
-    return _chart(figure)
+    return _chart(figure, columns)
 
 
 def _topic(topic: TopicValues) -> JsonObject:
@@ -74,7 +97,7 @@ def _living_graph(figure: Playback) -> JsonObject:
     return {"title": "", "times": [round(t, 3) for t, _ in figure.graphs], **boxes, "edges": arrows}
 
 
-def _chart(figure: Chart) -> JsonObject:
+def _chart(figure: Chart, columns: Columns) -> JsonObject:
     return {
         "kind": "chart",
         "title": shown(figure.title),
@@ -82,7 +105,12 @@ def _chart(figure: Chart) -> JsonObject:
         "square": figure.square,
         "run": figure.scenario,
         "until": figure.until_s,
-        "panels": [_panel(panel) for panel in figure.panels],
+        "panels": [_panel(panel, columns) for panel in figure.panels],
+        "cases": [
+            {"start": _number(c.start), "stop": _number(c.stop), "label": shown(c.label, limit=_NAME_LIMIT)}
+            | {"tone": c.tone.value}
+            for c in figure.cases
+        ],
         "moments": [
             {"x": _number(m.x), "label": shown(m.label, limit=_NAME_LIMIT), "tone": m.tone.value}
             for m in figure.moments
@@ -90,11 +118,11 @@ def _chart(figure: Chart) -> JsonObject:
     }
 
 
-def _panel(panel: Panel) -> JsonObject:
+def _panel(panel: Panel, columns: Columns) -> JsonObject:
     return {
         "title": shown(panel.title, limit=_NAME_LIMIT),
         "unit": panel.unit,
-        "series": [_series(series) for series in panel.series],
+        "series": [_series(series, columns) for series in panel.series],
         "bands": [
             {"low": _number(b.low), "high": _number(b.high), "label": shown(b.label), "tone": b.tone.value}
             for b in panel.bands
@@ -105,13 +133,15 @@ def _panel(panel: Panel) -> JsonObject:
     }
 
 
-def _series(series: Series) -> JsonObject:
+def _series(series: Series, columns: Columns) -> JsonObject:
     return {
         "name": shown(series.name, limit=_NAME_LIMIT),
         "look": series.look.value,
         "tone": series.tone.value,
-        "points": [[_number(x), _number(y)] for x, y in series.points],
-        "texts": [shown(text, limit=_TEXT_LIMIT) for text in series.texts],
+        "count": len(series.points),
+        "x": columns.numbers(tuple(x for x, _ in series.points)),
+        "y": columns.numbers(tuple(y for _, y in series.points)),
+        "texts": columns.texts(series.texts),
     }
 
 
@@ -164,13 +194,14 @@ def render_html(report: Report, *, assets: str | None = None, recordings: str = 
     its readers have none.
     """
     page = _templates().get_template("report.html")
-    figures = {figure.id: figure_values(figure) for e in report.exercises for figure in e.figures}
+    columns = Columns()
+    figures = {figure.id: figure_values(figure, columns) for e in report.exercises for figure in e.figures}
     return page.render(
         report=report,
         bundle=bundle(),
         assets=assets,
         recordings=recordings,
-        figures=Markup(script_json(figures)),  # noqa: S704  the function exists to make it safe in a script element
+        figures=Markup(script_json({"figures": figures, "columns": columns.lists})),  # noqa: S704  the function exists to make it safe in a script element
         embedded=Markup,
         clock_wall=ClockKind.WALL,
         command=" ".join(wording.command(report)),
@@ -255,9 +286,14 @@ class _Placed:
 
 
 def _placed_in(exercise: ExerciseReport) -> _Placed:
-    """Place each figure in the first of its criteria that starts unfolded, else in the first."""
-    verdicts = sorted(exercise.verdicts, key=lambda verdict: not _open_at_first(verdict))
-    homes = [next((v.id for v in verdicts if v.id in figure.criteria), "") for figure in exercise.figures]
+    """Place each figure in the first of its criteria that starts unfolded, else in the first; no run stands in one."""
+    unfolded = {verdict.id: _open_at_first(verdict) for verdict in exercise.verdicts}
+    homes = [
+        ""
+        if isinstance(f, Playback)
+        else next(iter(sorted(f.criteria, key=lambda id_: not unfolded.get(id_, False))), "")
+        for f in exercise.figures
+    ]
     return _Placed(tuple(zip(homes, exercise.figures, strict=True)))
 
 

@@ -89,17 +89,25 @@ const Charts = (() => {
     return wanted.map((place, index) => place - top[index]);
   }
 
-  // The row of each moment's label above the chart, so that none lies on another: faults first; null where both are full.
-  function momentRows(figure, ends, width) {
+  // What has a label above the chart: moments, then the first of neighbouring cases with the same label.
+  function labelled(figure) {
+    const first = figure.cases.filter(({ label, start }, k) => !k || figure.cases[k - 1].label !== label || figure.cases[k - 1].stop < start);
+    return [...figure.moments, ...first.map(({ start, stop, label }) => ({ x: start, stop, label, tone: "" }))];
+  }
+
+  // The row of each label above the chart, so that none lies on another: faults first; null where both are full.
+  function labelRows(figure, ends, width) {
     const inner = width - SIDE - 14;
     const taken = [[], []];
-    const rows = figure.moments.map(() => null);
-    const order = [...rows.keys()].sort((a, b) => (figure.moments[b].tone === "bad") - (figure.moments[a].tone === "bad"));
+    const all = labelled(figure);
+    const rows = all.map(() => null);
+    const rank = ({ tone, stop }) => (tone === "bad" ? 0 : stop === undefined ? 2 : 1);
+    const order = [...rows.keys()].sort((a, b) => rank(all[a]) - rank(all[b]));
     for (const index of order) {
-      const { x, label } = figure.moments[index];
+      const { x, label } = all[index];
       const long = label.length * GLYPH + 6;
       const at = ((x - ends[0]) / (ends[1] - ends[0])) * inner;
-      const left = at - long * { left: 0, center: 0.5, right: 1 }[alignment(x, ends, label, inner)];
+      const left = at - long * { left: 0, center: 0.5, right: 1 }[alignment(all[index], ends, inner)];
       const row = taken.findIndex((row) => row.every(([from, to]) => left >= to || left + long <= from));
       if (row < 0) continue;
       taken[row].push([left, left + long]);
@@ -110,7 +118,7 @@ const Charts = (() => {
 
   // Where each panel lies, from the top; heights in pixels.
   function places(figure, width, { slider, share }) {
-    const rowsAbove = momentRows(figure, extentX(figure), width).filter((row) => row !== null);
+    const rowsAbove = labelRows(figure, extentX(figure), width).filter((row) => row !== null);
     let top = rowsAbove.length ? 6 + LABEL * (1 + Math.max(...rowsAbove)) : 0;
     const rows = figure.panels.map((panel) => {
       const lone = figure.panels.length === 1;
@@ -224,9 +232,10 @@ const Charts = (() => {
     return lines;
   }
 
-  // Words at the edge of a chart stay inside it.
-  function alignment(x, ends, label, inner) {
+  // Words at the edge of a chart stay inside it; those of a case begin with it.
+  function alignment({ x, stop, label }, ends, inner) {
     const at = ((x - ends[0]) / (ends[1] - ends[0])) * inner;
+    if (stop !== undefined) return at + label.length * GLYPH > inner ? "right" : "left";
     const half = (label.length * GLYPH) / 2;
     return at + half > inner ? "right" : at - half < 0 ? "left" : "center";
   }
@@ -240,14 +249,18 @@ const Charts = (() => {
       lineStyle: { color: colour("faint"), type: "dashed", width: 2 },
       label: { ...label, show: true, position: "insideEndTop", offset: [0, moved[at]], formatter: () => level.label },
     }));
-    const rows = momentRows(figure, ends, width);
-    const moments = figure.moments.map((moment, at) => ({
+    const rows = labelRows(figure, ends, width);
+    const moments = labelled(figure).map((moment, at) => ({
       xAxis: moment.x,
-      lineStyle: { color: colour(moment.tone), type: "dotted", width: 1.5 },
+      lineStyle: { color: colour(moment.tone || "axis"), type: "dotted", width: moment.tone ? 1.5 : 0.5 },
       label: { ...label, show: index === 0 && rows[at] !== null, position: "end",
         distance: (panel.title ? 28 : 2) + LABEL * rows[at], formatter: () => moment.label,
-        align: alignment(moment.x, ends, moment.label, width - SIDE - 14) },
+        align: alignment(moment, ends, width - SIDE - 14) },
     }));
+    const cases = figure.cases.map(({ start, stop, tone }, at) => [
+      { xAxis: start, itemStyle: { color: colour(tone), opacity: at % 2 ? 0.07 : 0.15 } },
+      { xAxis: stop },
+    ]);
     const grid = panel.grid ? gridLines(panel, ends) : [];
     const bands = panel.bands.map((band) => [
       { yAxis: band.low, itemStyle: { color: colour("faint"), opacity: BANDS[band.tone] || 0.2 } },
@@ -263,7 +276,7 @@ const Charts = (() => {
       silent: true,
       animation: false,
       markLine: { silent: true, symbol: "none", animation: false, data: [...grid, ...levels, ...moments] },
-      markArea: { silent: true, animation: false, data: bands },
+      markArea: { silent: true, animation: false, data: [...cases, ...bands] },
     };
   }
 
@@ -291,7 +304,9 @@ const Charts = (() => {
         if (name) element.className = name;
         return element;
       };
-      const head = figure.square ? "" : `${figure.x.title} ${withUnit(list[0].data[0], figure.x.unit)}`;
+      const x = list[0].data[0];
+      const during = figure.cases.filter(({ start, stop }) => start <= x && x < stop).map(({ label }) => `, ${label}`).join("");
+      const head = figure.square ? "" : `${figure.x.title} ${withUnit(x, figure.x.unit)}${during}`;
       if (head) add(box, "b", head);
       const words = [head];
       for (const one of list.slice(0, 8)) {

@@ -2,9 +2,21 @@
 (() => {
   const holder = document.getElementById("figures");
   if (!holder) return; // another page, which only wants the charts
-  const figures = JSON.parse(holder.textContent);
+  const { figures, columns } = JSON.parse(holder.textContent);
+  Object.values(figures).forEach(unpack);
   const PRINTED_WIDTH = 720;
   const drawn = new Map();
+
+  // Charts share lists of times, numbers and texts; a single number stands for equal ones.
+  function unpack(figure) {
+    const panels = (figure.timeline || figure).panels || [];
+    for (const series of panels.flatMap((panel) => panel.series)) {
+      const [x, y] = [columns[series.x], columns[series.y]];
+      const at = (list, index) => list[list.length === 1 ? 0 : index];
+      series.points = Array.from({ length: series.count }, (_, index) => [at(x, index), at(y, index)]);
+      series.texts = columns[series.texts];
+    }
+  }
 
   function button(parent, label, text, act) {
     const element = parent.appendChild(document.createElement("button"));
@@ -82,6 +94,10 @@
   }
 
   function chartTables(parent, figure) {
+    if (figure.cases.length) {
+      const rows = figure.cases.map(({ start, stop, label }) => [Charts.number(start), Charts.number(stop), label]);
+      table(parent, "Cases", [`from (${figure.x.unit})`, `to (${figure.x.unit})`, "case"], rows);
+    }
     for (const panel of figure.panels) {
       for (const series of panel.series) {
         const text = series.texts.length > 0;

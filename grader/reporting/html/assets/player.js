@@ -46,7 +46,7 @@ const Player = (() => {
     const points = robot.topic.times.map((_, index) => robot.at(index)).filter(Boolean).map(({ x, y }) => [x, y]);
     const series = [{ name: `path on ${robot.topic.name}`, points, look: "line", tone: "faint", texts: [] }];
     const panel = { title: "y", unit: "m", series, bands: [], levels: [], lanes: [], grid: null };
-    const figure = { square: true, panels: [panel], moments: [], x: { title: "x", unit: "m" } };
+    const figure = { square: true, panels: [panel], moments: [], cases: [], x: { title: "x", unit: "m" } };
     return Charts.draw(add(element, "div", "", "drawing"), figure, () => {});
   }
 
