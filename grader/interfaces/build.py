@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
+import json
 import os
 import resource
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -14,7 +15,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from grader.core.errors import EnvironmentFault
-from grader.interfaces.definitions import InterfacePackage, digest, read
+from grader.interfaces.definitions import KINDS, DefinitionError, InterfacePackage, digest, read
 
 _PROCESSOR_S = 120
 _MEMORY = 2 * 1024**3
@@ -86,6 +87,8 @@ def build(packages: Collection[InterfacePackage], cache: Path, share: Sequence[P
     built = BuiltInterfaces(prefix, tuple(sorted(package.name for package in wanted)))
     if prefix.is_dir():
         return built
+    for package in wanted:
+        _check_name(package.name)
     read(wanted, installed_messages(share))
     cache.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="building-", dir=cache) as staging:
@@ -101,10 +104,21 @@ def build(packages: Collection[InterfacePackage], cache: Path, share: Sequence[P
     return built
 
 
+def _check_name(package: str) -> None:
+    """Refuse a package that would hide an installed Python module other than one of definitions."""
+    found = importlib.util.find_spec(package)
+    if found is None or found.origin is None:
+        return
+    if not any((Path(found.origin).parent / kind).is_dir() for kind in KINDS):
+        raise DefinitionError(package, "", 0, "an installed Python module has this name", "choose another name")
+
+
 def _key(packages: Collection[InterfacePackage], share: Sequence[Path]) -> str:
     """The digest of everything that the result depends on: definitions, generators, runtime and Python's version."""
     made = sha256(digest(packages).encode())
     for path in _SOURCES:
+        made.update(path.read_bytes())
+    for path in (found for folder in share for found in (folder / "rosidl_generator_py").glob("**/*.*")):
         made.update(path.read_bytes())
     made.update(repr((sys.version_info[:2], tuple(map(str, share)))).encode())
     return made.hexdigest()[:32]
@@ -136,8 +150,9 @@ def _generate(prefix: Path, share: Sequence[Path]) -> None:
         check=False,
         preexec_fn=_limit,
     )
+    if done.returncode == 0 and done.stdout:
+        raise DefinitionError(*json.loads(done.stdout))
     if done.returncode:
-        shutil.rmtree(prefix, ignore_errors=True)
         last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
         raise EnvironmentFault(f"building interfaces: expected ROS's generators to work, found {last}", "grade doctor")
 

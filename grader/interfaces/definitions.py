@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import difflib
 import hashlib
+import keyword
 import math
 import re
+import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -27,6 +29,7 @@ MAXIMUM_DEFINITIONS = 300
 MAXIMUM_BYTES = 64 * 1024
 MAXIMUM_FIELDS = 500
 MAXIMUM_ELEMENTS = 1_000_000
+MAXIMUM_DEPTH = 40
 
 _PACKAGE_NAME = re.compile(r"(?!.*__)(?!.*_\Z)[a-z][a-z0-9_]*", re.ASCII)
 _TYPE_NAME = re.compile(r"[A-Z][A-Za-z0-9]*", re.ASCII)
@@ -155,7 +158,7 @@ def find_packages(folder: Path) -> tuple[InterfacePackage, ...]:
     """
     root = folder.resolve()
     homes = sorted(
-        {path.parent.parent for kind in KINDS for path in root.rglob(f"{kind}/*.{kind}") if _is_inside(path, root)}
+        {path.parent.parent for kind in KINDS for path in root.rglob(f"{kind}/*.{kind}") if _counts(path, root)}
     )
     found: dict[str, InterfacePackage] = {}
     for home in homes:
@@ -171,6 +174,16 @@ def find_packages(folder: Path) -> tuple[InterfacePackage, ...]:
 def shipped_packages() -> tuple[InterfacePackage, ...]:
     """The packages that come with the grader: those that courses use and no wheel holds, as ROS 2 Jazzy has them."""
     return find_packages(Path(__file__).with_name("shipped"))
+
+
+def _counts(path: Path, root: Path) -> bool:
+    """Whether a file is a source: not hidden, and not in a folder that colcon made or ignores."""
+    inner = path.relative_to(root)
+    return (
+        _is_inside(path, root)
+        and not any(part.startswith(".") for part in inner.parts)
+        and not any((root / folder / "COLCON_IGNORE").exists() for folder in inner.parents)
+    )
 
 
 def _is_inside(path: Path, root: Path) -> bool:
@@ -191,6 +204,8 @@ def _package_name(home: Path) -> str:
     if not _PACKAGE_NAME.fullmatch(name):
         problem = f"{name!r} is no name of a ROS package"
         raise DefinitionError(name, "", 0, problem, "use small letters, digits and single underscores")
+    if name in sys.stdlib_module_names or keyword.iskeyword(name):
+        raise DefinitionError(name, "", 0, "Python has a module or word of this name", "choose another name")
     return name
 
 
@@ -238,6 +253,12 @@ def read(packages: Collection[InterfacePackage], installed: Collection[str]) -> 
         raise DefinitionError(definitions[0][0], "", 0, problem, "leave out those that are not needed")
     interfaces = tuple(read_definition(package, definition) for package, definition in definitions)
     own = {interface.name: interface for interface in interfaces}
+    files: dict[str, str] = {}
+    for name, interface in own.items():
+        other = files.setdefault(name.lower(), name)
+        if other != name:
+            problem = f"its name differs from that of {other.rpartition('/')[2]} in capitals only"
+            raise DefinitionError(interface.package, interface.file, 0, problem, "rename one of them")
     for interface in interfaces:
         for member in interface.members():
             if not member.type.primitive and member.type.base not in own and member.type.base not in installed:
@@ -270,6 +291,9 @@ def _check_sizes(own: dict[str, Interface]) -> None:
             raise DefinitionError(interface.package, interface.file, 0, "it contains itself", "refer to it by a number")
         if name not in sizes:
             path.append(name)
+            if len(path) > MAXIMUM_DEPTH:
+                problem = f"messages are nested more than {MAXIMUM_DEPTH} deep"
+                raise DefinitionError(interface.package, interface.file, 0, problem, "nest them less")
             total = 1
             for member in interface.members():
                 inner = own.get(member.type.base)
@@ -368,6 +392,8 @@ class _Reader:
         name, _, default = rest.partition(" ")
         if not _PACKAGE_NAME.fullmatch(name):
             raise self._error(f"{name!r} is no name of a field", "use small letters, digits and single underscores")
+        if keyword.iskeyword(name):
+            raise self._error(f"{name!r} is a word of Python", "choose another name")
         return Member(type_, name, self._default(type_, default.strip()) if default.strip() else None, self._line)
 
     def _constant(self, type_: FieldType, rest: str) -> Member:

@@ -6,6 +6,8 @@ SHARE are the share folders of the installed packages that they may refer to.
 
 from __future__ import annotations
 
+import compileall
+import importlib
 import json
 import pathlib
 import shutil
@@ -19,7 +21,7 @@ from rosidl_parser import definition as idl
 from rosidl_pycommon import convert_camel_case_to_lower_case_underscore as snake_case
 from rosidl_pycommon import expand_template
 
-from grader.interfaces.definitions import SECTIONS, FieldType, Interface, Section, find_packages, read
+from grader.interfaces.definitions import SECTIONS, DefinitionError, FieldType, Interface, Section, find_packages, read
 
 RUNTIME = "_grader_interfaces"
 _BASIC = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
@@ -71,6 +73,24 @@ def generate(prefix: Path, installed: InstalledTypes) -> None:
         _write_package(prefix / "python" / package.name, package.name, own, elements, installed.templates())
     runtime = Path(__file__).with_name("runtime")
     shutil.copytree(runtime, prefix / "python" / RUNTIME, ignore=shutil.ignore_patterns("__pycache__"))
+    compileall.compile_dir(prefix / "python", quiet=2)
+    sys.path.insert(0, str(prefix / "python"))
+    for interface in interfaces:
+        _try(interface)
+
+
+def _try(interface: Interface) -> None:
+    """Load the classes of an interface, and encode a message of each. Raises DefinitionError if that does not work."""
+    definition = interface.definition
+    try:
+        module = importlib.import_module(f"{interface.package}.{definition.kind}._{snake_case(definition.name)}")
+        codec = importlib.import_module(f"{RUNTIME}.codec")
+        for made in list(vars(module).values()):
+            if hasattr(made, "SLOT_TYPES"):
+                codec.codec_of(made).to_bytes(made())
+    except Exception as error:
+        problem = f"Python cannot load it ({type(error).__name__}: {error})"
+        raise DefinitionError(interface.package, interface.file, 0, problem, "choose other names") from error
 
 
 def _element(interface: Interface) -> Any:
@@ -204,4 +224,7 @@ def _write_package(
 
 
 if __name__ == "__main__":
-    generate(Path(sys.argv[1]), InstalledTypes(map(Path, sys.argv[2:])))
+    try:
+        generate(Path(sys.argv[1]), InstalledTypes(map(Path, sys.argv[2:])))
+    except DefinitionError as wrong:
+        sys.stdout.write(json.dumps([wrong.package, wrong.file, wrong.line, wrong.problem, wrong.fix]))

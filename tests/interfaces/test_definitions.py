@@ -59,6 +59,28 @@ def test_links_out_of_the_folder_are_left_alone(tmp_path: Path) -> None:
     assert find_packages(tmp_path / "handed_in") == ()
 
 
+def test_what_colcon_made_or_ignores_is_no_source(tmp_path: Path) -> None:
+    write(tmp_path, "src/a_msgs/msg/Foo.msg", "int32 a\n")
+    write(tmp_path, "install/COLCON_IGNORE")
+    write(tmp_path, "install/a_msgs/share/a_msgs/msg/Foo.msg", "int32 older\n")
+    write(tmp_path, ".cache/b_msgs/msg/Foo.msg", "int32 a\n")
+    assert [each.name for each in find_packages(tmp_path)] == ["a_msgs"]
+
+
+def test_two_folders_that_define_a_package_differently_are_refused(tmp_path: Path) -> None:
+    write(tmp_path, "one/a_msgs/msg/Foo.msg", "int32 a\n")
+    write(tmp_path, "two/a_msgs/msg/Foo.msg", "int32 b\n")
+    with pytest.raises(DefinitionError, match="two folders"):
+        find_packages(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["json", "Robot_msgs", "a__b"])
+def test_names_that_no_package_can_have_are_refused(tmp_path: Path, name: str) -> None:
+    write(tmp_path, f"{name}/msg/Foo.msg")
+    with pytest.raises(DefinitionError):
+        find_packages(tmp_path)
+
+
 def test_package_xml_with_entities_is_refused(tmp_path: Path) -> None:
     write(tmp_path, "a/package.xml", '<!DOCTYPE a [<!ENTITY b "c">]><package><name>&b;</name></package>')
     write(tmp_path, "a/msg/Foo.msg")
@@ -114,6 +136,7 @@ def test_reads_types_values_and_comments() -> None:
         ("std_msgs/Header H=1", 1, "constant cannot have this type", "number"),
         ('string A="a', 1, "quotes", "close"),
         ("string A=a\\nb", 1, "control characters", "leave"),
+        ("int32 lambda", 1, "word of Python", "another"),
         ("@{import os}", 1, "is no type", "such as float64"),
         ("int32 a');import_os", 1, "no name of a field", "small letters"),
     ],
@@ -141,6 +164,18 @@ def test_nested_arrays_that_no_program_can_create_are_refused() -> None:
         tuple(Definition("msg", f"L{n}", f"L{n + 1}[100] a\n" if n < 8 else "int32 a\n") for n in range(9)),
     )
     assert "more than 1000000 values" in refusal(package).problem
+
+
+def test_messages_nested_too_deeply_are_refused() -> None:
+    package = InterfacePackage(
+        "deep", tuple(Definition("msg", f"L{n}", f"L{n + 1} a\n" if n < 99 else "int32 a\n") for n in range(100))
+    )
+    assert "nested more than" in refusal(package).problem
+
+
+def test_types_of_one_file_name_are_refused() -> None:
+    package = InterfacePackage("twice", (Definition("msg", "Foo", ""), Definition("msg", "FOO", "")))
+    assert "capitals only" in refusal(package).problem
 
 
 def test_too_many_definitions_are_refused() -> None:

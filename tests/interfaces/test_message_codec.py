@@ -3,6 +3,8 @@
 import contextlib
 import random
 import struct
+import sys
+import types
 from typing import Any
 
 import pytest
@@ -138,6 +140,29 @@ def test_random_bytes_are_refused_or_give_a_message(message_class: Any, body: by
 def test_a_count_beyond_the_bytes_reserves_no_memory() -> None:
     with pytest.raises(MalformedMessageError):
         codec_of(msg.UnboundedSequences).from_bytes(b"\xff" * 64)
+
+
+def test_the_bound_of_long_arrays_is_that_of_its_elements_one_by_one() -> None:
+    element = type(
+        "Element", (), {"__slots__": [], "SLOT_TYPES": (definition.BasicType("int64"), definition.BasicType("int8"))}
+    )
+    element.get_fields_and_field_types = lambda: {"a": "int64", "b": "int8"}  # type: ignore[attr-defined]
+    module = types.ModuleType("bounds_of_arrays.msg")
+    module.Element = element  # type: ignore[attr-defined]
+    sys.modules["bounds_of_arrays.msg"] = module
+    nested = definition.NamespacedType(["bounds_of_arrays", "msg"], "Element")
+    for count in (1, 15, 16, 17, 1000):
+        whole = type(
+            "Whole",
+            (),
+            {"__slots__": [], "SLOT_TYPES": (definition.BasicType("int8"), definition.Array(nested, count))},
+        )
+        whole.get_fields_and_field_types = lambda: {"a": "int8", "b": "Element[]"}  # type: ignore[attr-defined]
+
+        end = 1
+        for _ in range(count):
+            end += -end % 8 + 9
+        assert codec_of(whole).maximum_size == end
 
 
 def test_the_other_byte_order_is_read() -> None:

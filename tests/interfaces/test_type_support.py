@@ -11,7 +11,7 @@ import test_msgs
 from samples import SHARE, installed_packages, share_without
 
 from grader.interfaces.build import BuiltInterfaces, build
-from grader.interfaces.definitions import Definition, InterfacePackage, find_packages, shipped_packages
+from grader.interfaces.definitions import Definition, DefinitionError, InterfacePackage, find_packages, shipped_packages
 
 HERE = Path(__file__).parent
 PYTHON_PACKAGES = Path(test_msgs.__file__).parents[1]
@@ -21,7 +21,7 @@ def definitions_of(*names: str) -> tuple[InterfacePackage, ...]:
     return tuple(package for name in names for package in find_packages(SHARE / name))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def built(tmp_path_factory: pytest.TempPathFactory) -> BuiltInterfaces:
     """test_msgs, built as if it were not installed."""
     folder = tmp_path_factory.mktemp("built")
@@ -261,6 +261,21 @@ print(build(find_packages(Path({str(tmp_path / "mine")!r})), Path({str(tmp_path 
     printed = {process.communicate(timeout=100)[0] for process in processes}
     assert len(printed) == 1
     assert len(list((tmp_path / "cache").iterdir())) == 1
+
+
+@pytest.mark.parametrize(
+    ("package", "definition", "problem"),
+    [
+        ("numpy", Definition("msg", "Foo", ""), "an installed Python module"),
+        ("mine", Definition("msg", "Foo", "int32 builtins\nint32 b\n"), "Python cannot load it"),
+    ],
+)
+def test_what_python_could_not_load_is_refused(
+    tmp_path: Path, package: str, definition: Definition, problem: str
+) -> None:
+    with pytest.raises(DefinitionError, match=problem):
+        build([InterfacePackage(package, (definition,))], tmp_path, [SHARE])
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_installed_package_is_left_to_the_installation(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ structure without fields is one zero byte.
 from __future__ import annotations
 
 import array
+import functools
 import os
 import re
 import struct
@@ -27,6 +28,8 @@ _CODES = {
 }  # fmt: skip
 # A message of more primitives than this is encoded by a function of its own where others hold it.
 _INLINE = 48
+# Fast DDS reserves memory for the longest message of a type with a bound; from here on it does so for each message.
+_LONGEST = 2**20
 
 
 class MalformedMessageError(ValueError):
@@ -42,7 +45,7 @@ class Codec:
         encode: Appends a message to a bytearray whose start is that of the body; raises what is wrong with a value.
         decode: Takes a body and an offset; gives the message and the offset of its end. Raises MalformedMessageError.
         decode_swapped: The same for a body in the other byte order.
-        maximum_size: Bytes of the longest body, or None if it has no bound.
+        maximum_size: Bytes of the longest body, or None if it has no bound or one above a mebibyte.
     """
 
     message_class: Any
@@ -76,8 +79,13 @@ def codec_of(message_class: Any) -> Codec:
         native, other = ("<", ">") if sys.byteorder == "little" else (">", "<")
         encode, decode = _Compiler(message_class, native).compile()
         _, swapped = _Compiler(message_class, other).compile()
-        _codecs[message_class] = Codec(message_class, encode, decode, swapped, _end(message_class, 0))
+        _codecs[message_class] = Codec(message_class, encode, decode, swapped, _bound(message_class))
     return _codecs[message_class]
+
+
+def _bound(message_class: Any) -> int | None:
+    length = _length(message_class, 0)
+    return length if length is not None and length <= _LONGEST else None
 
 
 def class_of(type_: definition.NamespacedType) -> Any:
@@ -101,37 +109,39 @@ def _weight(type_: Any) -> int:
     if isinstance(type_, definition.AbstractNestedType):
         return 1 + _weight(type_.value_type)
     if isinstance(type_, definition.NamespacedType):
-        return sum(_weight(inner) for _, inner in fields_of(class_of(type_))) or 1
+        return _weight_of(class_of(type_))
     return 1
+
+
+@functools.cache
+def _weight_of(message_class: Any) -> int:
+    return sum(_weight(type_) for _, type_ in fields_of(message_class)) or 1
 
 
 def _aligned(offset: int, size: int) -> int:
     return offset + -offset % size
 
 
-def _end(message_class: Any, offset: int) -> int | None:
-    """Where the longest message ends that begins at an offset; None if there is no longest one."""
-    end: int | None = offset if message_class.SLOT_TYPES else offset + 1
+@functools.cache
+def _length(message_class: Any, residue: int) -> int | None:
+    """The greatest length of a message that begins at a residue modulo 8; None if there is no limit."""
+    end: int | None = residue if fields_of(message_class) else residue + 1
     for _, type_ in fields_of(message_class):
         end = _field_end(type_, end)
-        if end is None:
-            return None
-    return end
+    return None if end is None else end - residue
 
 
 def _field_end(type_: Any, end: int | None) -> int | None:
+    """Where the longest field ends that begins at an offset."""
     if end is None or isinstance(type_, definition.UnboundedSequence):
         return None
     if isinstance(type_, definition.AbstractNestedType):
-        if isinstance(type_, definition.BoundedSequence):
-            end, count = _aligned(end, 4) + 4, type_.maximum_size
-        else:
-            count = type_.size
-        for _ in range(count):
-            end = _field_end(type_.value_type, end)
-        return end
+        bounded = isinstance(type_, definition.BoundedSequence)
+        start, count = (_aligned(end, 4) + 4, type_.maximum_size) if bounded else (end, type_.size)
+        return _repeated_end(type_.value_type, start, count)
     if isinstance(type_, definition.NamespacedType):
-        return _end(class_of(type_), end)
+        length = _length(class_of(type_), end % 8)
+        return None if length is None else end + length
     if isinstance(type_, definition.AbstractGenericString):
         if not type_.has_maximum_size():
             return None
@@ -139,6 +149,22 @@ def _field_end(type_: Any, end: int | None) -> int | None:
         return _aligned(end, 4) + 4 + int(type_.maximum_size * 4 if wide else type_.maximum_size + 1)
     size = struct.calcsize("=" + _CODES[type_.typename])
     return _aligned(end, size) + size
+
+
+def _repeated_end(type_: Any, end: int, count: int) -> int | None:
+    """Where the last of some elements ends. Eight of them begin as all others do, modulo 8."""
+    ends = [end]
+    for _ in range(min(count, 16)):
+        following = _field_end(type_, ends[-1])
+        if following is None:
+            return None
+        ends.append(following)
+    if count <= 16:
+        return ends[-1]
+    start = 16 - next(period for period in range(1, 17) if (ends[16] - ends[16 - period]) % 8 == 0)
+    period, gain = 16 - start, ends[16] - ends[start]
+    rounds, left = divmod(count - start, period)
+    return ends[start + left] + rounds * gain
 
 
 def _bad(what: str) -> None:
@@ -329,7 +355,7 @@ class _Compiler:
             self._pack(_CODES[type_.typename], value)
 
     def _encode_message(self, value: str, message_class: Any) -> None:
-        if sum(_weight(type_) for _, type_ in fields_of(message_class)) <= _INLINE:
+        if _weight_of(message_class) <= _INLINE:
             self._encode_fields(value, message_class)
         else:
             self._flush_packed()
@@ -422,7 +448,7 @@ class _Compiler:
         return self._unpack(_CODES[type_.typename])
 
     def _decode_message(self, message_class: Any) -> str:
-        if sum(_weight(type_) for _, type_ in fields_of(message_class)) <= _INLINE:
+        if _weight_of(message_class) <= _INLINE:
             return self._decode_class(message_class)
         self._flush_unpacked()
         codec, message = codec_of(message_class), self._name()
