@@ -129,6 +129,9 @@ def _write(packages: Collection[InterfacePackage], prefix: Path) -> None:
     index.mkdir(parents=True)
     for package in packages:
         (index / package.name).touch()
+        described = f'<package format="3"><name>{package.name}</name><version>0.0.0</version></package>\n'
+        (prefix / "share" / package.name).mkdir()
+        (prefix / "share" / package.name / "package.xml").write_text(described, encoding="utf-8")
         for definition in package.definitions:
             folder = prefix / "share" / package.name / definition.kind
             folder.mkdir(parents=True, exist_ok=True)

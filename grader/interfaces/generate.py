@@ -57,6 +57,10 @@ class InstalledTypes:
         content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         return content
 
+    def built(self) -> tuple[Path, ...]:
+        """The folders of Python packages of those that were built like these."""
+        return tuple(path for share in self._shares if ((path := share.parent / "python") / RUNTIME).is_dir())
+
     def templates(self) -> Path:
         """The folder of the templates that make Python classes."""
         return next(path for share in self._shares if (path := share / "rosidl_generator_py" / "resource").is_dir())
@@ -74,7 +78,7 @@ def generate(prefix: Path, installed: InstalledTypes) -> None:
     runtime = Path(__file__).with_name("runtime")
     shutil.copytree(runtime, prefix / "python" / RUNTIME, ignore=shutil.ignore_patterns("__pycache__"))
     compileall.compile_dir(prefix / "python", quiet=2)
-    sys.path.insert(0, str(prefix / "python"))
+    sys.path[:0] = map(str, (prefix / "python", *installed.built()))
     for interface in interfaces:
         _try(interface)
 

@@ -28,22 +28,21 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> BuiltInterfaces:
     return build(definitions_of("test_msgs"), folder / "cache", [share_without(folder / "share", "test_msgs")])
 
 
-def environment(built: BuiltInterfaces | None, domain: int = 0) -> dict[str, str]:
-    paths = [str(built.python)] if built else []
+def environment(domain: int, *built: BuiltInterfaces) -> dict[str, str]:
     return {
         **os.environ,
-        "PYTHONPATH": os.pathsep.join(paths),
+        "PYTHONPATH": os.pathsep.join(str(each.python) for each in built),
         "ROS_DOMAIN_ID": str(domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_PYTHON_CHECK_FIELDS": "1",
     }
 
 
-def run(built: BuiltInterfaces | None, text: str) -> str:
+def run(text: str, *built: BuiltInterfaces) -> str:
     """What a program prints; it has to end well."""
     done = subprocess.run(
         [sys.executable, "-c", text],
-        env=environment(built, 77),
+        env=environment(77, *built),
         capture_output=True,
         text=True,
         timeout=100,
@@ -91,7 +90,7 @@ def test_shipped_packages_have_the_hashes_of_the_releases(tmp_path: Path) -> Non
         for each in json.loads(path.read_text())["type_hashes"]
     }
     assert {name: hashes[name] for name in PUBLISHED} == {name: f"RIHS01_{text}" for name, text in PUBLISHED.items()}
-    printed = run(made, "from turtlesim.msg import Pose; from tf2_msgs.msg import TFMessage; print(Pose(x=1.0))")
+    printed = run("from turtlesim.msg import Pose; from tf2_msgs.msg import TFMessage; print(Pose(x=1.0))", made)
     assert printed.startswith("turtlesim.msg.Pose(x=1.0,")
 
 
@@ -99,11 +98,11 @@ def test_shipped_packages_have_the_hashes_of_the_releases(tmp_path: Path) -> Non
 @pytest.mark.parametrize("both", [False, True])
 def test_exchanges_with_the_compiled_type_support(built: BuiltInterfaces, *, both: bool) -> None:
     domain = 78 + both
-    sides = (("ours", "theirs", built), ("theirs", "ours", built if both else None))
+    sides = (("ours", "theirs", [built]), ("theirs", "ours", [built] if both else []))
     processes = [
         subprocess.Popen(
             [sys.executable, str(HERE / "exchange.py"), own, other],
-            env=environment(packages, domain),
+            env=environment(domain, *packages),
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -166,7 +165,7 @@ executor.shutdown()
 
 @pytest.mark.ros
 def test_threads_that_publish_take_and_call_at_once_do_not_block_each_other(built: BuiltInterfaces) -> None:
-    assert run(built, THREADS).split() == ["160", "True"]
+    assert run(THREADS, built).split() == ["160", "True"]
 
 
 HOSTILE = """
@@ -212,7 +211,7 @@ print(refused > 100, heard[0].string_value, faults)
 
 @pytest.mark.ros
 def test_hostile_bytes_and_wrong_values_raise_in_python_and_kill_nothing(built: BuiltInterfaces) -> None:
-    assert run(built, HOSTILE).split() == ["True", "after", "11"]
+    assert run(HOSTILE, built).split() == ["True", "after", "11"]
 
 
 FORKED = """
@@ -233,7 +232,7 @@ print([os.waitpid(child, 0)[1] for child in children])
 
 
 def test_works_in_processes_forked_after_its_first_use(built: BuiltInterfaces) -> None:
-    assert run(built, FORKED).strip() == "[0, 0]"
+    assert run(FORKED, built).strip() == "[0, 0]"
 
 
 def test_a_package_is_built_once_and_no_half_built_one_is_left(tmp_path: Path) -> None:
@@ -261,6 +260,16 @@ print(build(find_packages(Path({str(tmp_path / "mine")!r})), Path({str(tmp_path 
     printed = {process.communicate(timeout=100)[0] for process in processes}
     assert len(printed) == 1
     assert len(list((tmp_path / "cache").iterdir())) == 1
+
+
+def test_packages_can_build_on_built_ones(tmp_path: Path) -> None:
+    first = build([InterfacePackage("base", (Definition("msg", "Foo", "int32 a\n"),))], tmp_path, [SHARE])
+    upper = InterfacePackage("upper", (Definition("msg", "Bar", "base/Foo[2] foos\n"),))
+    copied = InterfacePackage("base", (Definition("msg", "Foo", "int64 other\n"),))
+    second = build([upper, copied], tmp_path, [SHARE, first.share])
+    assert second.names == ("upper",)
+    printed = run("from upper.msg import Bar; print(Bar())", second, first)
+    assert "foos=[base.msg.Foo(a=0), base.msg.Foo(a=0)]" in printed
 
 
 @pytest.mark.parametrize(
