@@ -165,6 +165,7 @@ def drawn(drawing: Drawing, trace: Trace) -> Chart | None:
     if drawing.action:
         panels, goals = _action_panels(trace, drawing.action)
         above, cases = [*above, *panels], [*cases, *goals]
+    cases = _joined(cases)
     found = [*above, *below, *drawing.panels][:_MOST_PANELS]
     if not found:
         return None
@@ -188,6 +189,18 @@ def _title(came: Sequence[str], went: Sequence[str], asked: Sequence[str], proce
     parts += [f"what {listed(processes)} wrote"] if processes else []
     text = f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else "".join(parts)
     return text[:1].upper() + text[1:]
+
+
+def _joined(cases: Sequence[Case]) -> list[Case]:
+    """Return the cases with neighbours of the same kind as one."""
+    joined: list[Case] = []
+    for case in cases:
+        last = joined[-1] if joined else None
+        if last and (last.label, last.tone) == (case.label, case.tone) and last.stop >= case.start:
+            joined[-1] = replace(last, stop=case.stop)
+        else:
+            joined.append(case)
+    return joined
 
 
 def _cases_said(cases: Sequence[Case]) -> str:
@@ -445,7 +458,8 @@ def _call_panels(trace: Trace, service: str, drawing: Drawing) -> _Panels:
     if drawing.within_ns is not None or (asker == "grader" and any(ns >= _PROMPT_NS for _, ns in lasted)):
         panels.append(delay_panel("response", lasted, drawing.within_ns))
     inputs = _only_values(Plot(service), asked, "request")
-    outputs = _only_values(Plot(service, rules=drawing.rules), told, "response")
+    # a check with a panel of its own draws there what matters in the responses
+    outputs = [] if drawing.panels else _only_values(Plot(service, rules=drawing.rules), told, "response")
     return [*inputs, *panels, *outputs]
 
 

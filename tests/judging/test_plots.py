@@ -133,14 +133,14 @@ def test_what_came_stands_above_what_was_published_with_the_cases_marked() -> No
     chart = made(check, rec)
     assert [p.title for p in chart.panels] == ["/in", "/out"]
     assert [(c.start, c.stop, c.label, c.tone) for c in chart.cases] == [
-        (1, 2, "data = 1", Tone.GOOD),
-        (2, 3, "data = 2", Tone.BAD),
-        (3, 6, "data = 1", Tone.GOOD),
+        (1, 2, "data 1", Tone.GOOD),
+        (2, 3, "data 2", Tone.BAD),
+        (3, 6, "data 1", Tone.GOOD),
     ]
     expected, got = chart.panels[1].series
     assert (expected.tone, expected.points) == (Tone.FAINT, ((1, 10), (2, 20), (3, 10), (6, 10)))
     assert [y for _, y in got.points] == [10, 99, 10]
-    assert "Cases: data = 1 from 1.0 s to 2.0 s" in chart.about
+    assert "Cases: data 1 from 1.0 s to 2.0 s" in chart.about
 
 
 def test_calls_are_marks_with_their_content_and_what_they_took() -> None:

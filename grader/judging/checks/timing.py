@@ -432,7 +432,7 @@ class Reaction:
             Case(
                 seconds(a.given.t_ns),
                 seconds(stop_ns),
-                listed([f"{path} = {_short(a.given.value, path)}" for path in a.case.when], 2),
+                quote(rules_text(a.case.when), 40) or "otherwise",
                 Tone.BAD if self._wrong(trace, a) else Tone.GOOD,
             )
             for a, stop_ns in zip(asked, stops, strict=False)

@@ -326,7 +326,8 @@ class Transform:
         found = [_Found(m.t_ns, t) for topic in topics for m in published(trace, topic) for t in _transforms(m)]
         mine = sorted((f for f in found if f.frames == pair), key=lambda f: f.t_ns)
         if not mine:
-            return Drawing(tuple(map(Plot, topics)))
+            frames = ("transforms[0].header.frame_id", "transforms[0].child_frame_id")
+            return Drawing(tuple(Plot(topic, frames) for topic in topics))
         rules = {f"translation.{name}": FieldRule(equals=v) for name, v in (self.translation or {}).items()}
         if self.rotation is not None:
             rules |= {f"rotation.{name}": FieldRule(equals=self.rotation.get(name, 0.0)) for name in _QUATERNION}

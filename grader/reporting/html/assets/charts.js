@@ -90,16 +90,20 @@ const Charts = (() => {
   }
 
   // What has a label above the chart: moments, then the first of neighbouring cases with the same label.
-  function labelled(figure) {
+  // What is longer than the chart is cut; the words below it and the table have all of it.
+  function labelled(figure, inner) {
+    const most = Math.max(8, Math.floor(inner / GLYPH) - 2);
+    const cut = (label) => (label.length > most ? `${label.slice(0, most - 1)}\u2026` : label);
     const first = figure.cases.filter(({ label, start }, k) => !k || figure.cases[k - 1].label !== label || figure.cases[k - 1].stop < start);
-    return [...figure.moments, ...first.map(({ start, stop, label }) => ({ x: start, stop, label, tone: "" }))];
+    const all = [...figure.moments, ...first.map(({ start, stop, label }) => ({ x: start, stop, label, tone: "" }))];
+    return all.map((one) => ({ ...one, label: cut(one.label) }));
   }
 
   // The row of each label above the chart, so that none lies on another: faults first; null where both are full.
   function labelRows(figure, ends, width) {
     const inner = width - SIDE - 14;
     const taken = [[], []];
-    const all = labelled(figure);
+    const all = labelled(figure, inner);
     const rows = all.map(() => null);
     const rank = ({ tone, stop }) => (tone === "bad" ? 0 : stop === undefined ? 2 : 1);
     const order = [...rows.keys()].sort((a, b) => rank(all[a]) - rank(all[b]));
@@ -235,9 +239,10 @@ const Charts = (() => {
   // Words at the edge of a chart stay inside it; those of a case begin with it.
   function alignment({ x, stop, label }, ends, inner) {
     const at = ((x - ends[0]) / (ends[1] - ends[0])) * inner;
-    if (stop !== undefined) return at + label.length * GLYPH > inner ? "right" : "left";
-    const half = (label.length * GLYPH) / 2;
-    return at + half > inner ? "right" : at - half < 0 ? "left" : "center";
+    const long = label.length * GLYPH;
+    const fits = { left: at + long <= inner, center: at >= long / 2 && at + long / 2 <= inner, right: at >= long };
+    const wanted = stop === undefined ? ["center", "left", "right"] : ["left", "right", "center"];
+    return wanted.find((one) => fits[one]) || "center";
   }
 
   // Bands, thresholds and moments: what is drawn behind the points.
@@ -250,7 +255,7 @@ const Charts = (() => {
       label: { ...label, show: true, position: "insideEndTop", offset: [0, moved[at]], formatter: () => level.label },
     }));
     const rows = labelRows(figure, ends, width);
-    const moments = labelled(figure).map((moment, at) => ({
+    const moments = labelled(figure, width - SIDE - 14).map((moment, at) => ({
       xAxis: moment.x,
       lineStyle: { color: colour(moment.tone || "axis"), type: "dotted", width: moment.tone ? 1.5 : 0.5 },
       label: { ...label, show: index === 0 && rows[at] !== null, position: "end",
