@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.app.observe import ObserveRequest, observe
 from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.core.trace import (
     ClockKind,
@@ -115,6 +116,24 @@ def test_nodes_are_observed_for_real() -> None:
     assert told["faults"] == []
     text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     assert "/temperature_sensor ──/temperature──▶ /fan_controller" in text
+
+
+@pytest.mark.ros
+def test_a_file_of_a_package_may_import_the_package(tmp_path: Path) -> None:
+    """As `ros2 run` lets it: by the name of the package, from wherever in it the file is."""
+    inner = tmp_path / "ws" / "src" / "two" / "two"
+    inner.mkdir(parents=True)
+    (inner.parent / "package.xml").write_text("<package><name>two</name></package>")
+    (inner / "__init__.py").touch()
+    (inner / "words.py").write_text("TEXT = 'from the package'\n")
+    node = inner / "speaker.py"
+    node.write_text(
+        "import rclpy\nfrom two.words import TEXT\n\n\ndef main():\n"
+        "    rclpy.init()\n    node = rclpy.create_node('speaker')\n    node.get_logger().info(TEXT)\n"
+        "    rclpy.spin(node)\n\n\nif __name__ == '__main__':\n    main()\n"
+    )
+    summary = observe(ObserveRequest((node,), NS_PER_S, clock="virtual"), lambda _: None)
+    assert ([r.text for r in summary.records], summary.faults) == (["from the package"], ())
 
 
 def test_a_file_that_is_none_is_one_line() -> None:

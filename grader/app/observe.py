@@ -88,15 +88,22 @@ def _names(files: tuple[Path, ...]) -> list[str]:
 
 
 def _stage(files: tuple[Path, ...], names: list[str], into: Path) -> Submission:
-    """Stage the common folder of the files, which has their helper modules; a single file may be staged alone."""
-    root = into / "submission"
-    root.mkdir()
-    folder = os.path.commonpath([file.resolve().parent for file in files])
-    try:
-        return stage_submission(folder, names, root)
-    except SubmissionError:
-        if len(files) > 1:
-            raise
+    """Stage what the files may import: their package, or else their common folder; a single file may be alone."""
+    folder = Path(os.path.commonpath([file.resolve().parent for file in files]))
+    package = next((up for up in (folder, *folder.parents) if (up / "package.xml").is_file()), folder)
+    for place, root in enumerate(dict.fromkeys((package, folder))):
+        staged = into / f"submission_{place}"
+        staged.mkdir()
+        try:
+            submission = stage_submission(str(root), names, staged)
+        except SubmissionError:
+            if root == folder and len(files) > 1:
+                raise
+            continue
+        # A package may have several files of a name.
+        meant = [file.resolve().relative_to(root).as_posix() for file in files]
+        if root == folder or [submission.files[name].found for name in names] == meant:
+            return submission
     alone = into / "alone"
     alone.mkdir()
     return stage_submission(str(files[0]), names, alone)
