@@ -22,6 +22,7 @@ class StudentFile:
     candidates: tuple[str, ...] = ()
     likely: bool = False  # whether the first candidate resembles it, by its name or its text
     executable: str = ""  # name of the entry point that runs the file, if it was found by one
+    problem: str = ""  # why there is none, if more is known than that
 
 
 @dataclass(frozen=True, slots=True)

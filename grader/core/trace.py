@@ -256,6 +256,8 @@ class Trace:
     reached: tuple[str, ...] = ()
     # On the wall clock, how long the thread of the nodes that waited most waited for processors that others used
     most_starved_ns: int = 0
+    # What a launch file asks for and the grader cannot do, as sentences: what is not met may be due to it
+    left_out: tuple[str, ...] = ()
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

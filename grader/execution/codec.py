@@ -62,6 +62,7 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
         "harness_problem": trace.harness_problem,
         **({"starts": [_start_to_json(start) for start in trace.starts]} if trace.starts else {}),
         **({"most_starved_ns": trace.most_starved_ns} if trace.most_starved_ns else {}),
+        **({"left_out": list(trace.left_out)} if trace.left_out else {}),
         "observations": [observation_to_json(o) for o in trace.observations],
     }
 

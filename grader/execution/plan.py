@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import random
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from shlex import quote
 from typing import Any
@@ -82,6 +82,8 @@ class PlannedStart:
         parameter_files: Name and text of parameter files.
         launch_arguments: Name and value of each argument, for a launch file.
         provided: Name and text of files that the launch file may need.
+        known: Name of each handed-in file by its path in the submission, and by its path and executable.
+        launched_by: The launch file that the process comes from, with its line.
     """
 
     process: str
@@ -91,6 +93,8 @@ class PlannedStart:
     parameter_files: tuple[tuple[str, str], ...] = ()
     launch_arguments: tuple[tuple[str, str], ...] = ()
     provided: tuple[tuple[str, str], ...] = ()
+    known: tuple[tuple[str, str], ...] = ()
+    launched_by: str = ""
 
     @property
     def words(self) -> str:
@@ -229,8 +233,15 @@ def _start(process: str, scenario: Scenario, submission: Submission) -> PlannedS
         ),
         launch_arguments=options.launch_arguments,
         provided=scenario.provided if is_launch_file(process) else (),
+        known=tuple(_known(submission)) if is_launch_file(process) else (),
     )
     return start if start != PlannedStart(process) else None
+
+
+def _known(submission: Submission) -> Iterator[tuple[str, str]]:
+    for name, file in submission.files.items():
+        if file.found is not None:
+            yield (f"{file.found} {file.executable}" if file.executable else file.found), name
 
 
 def _parameters(name: str, provided: Mapping[str, str], submission: Submission) -> str:

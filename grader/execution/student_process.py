@@ -78,6 +78,7 @@ class NodeProcess:
         log_token: The token that its log records begin with; empty if it has none, and then no log records.
         file: The file that it runs, relative to the submission.
         arguments: What its program is given on the command line.
+        launched_by: The launch file that it comes from, with its line; empty if it comes from none.
         places: The files of the submission.
         start_told: How its file is started, as it reported before it ran any of the student's code.
         reached: Names of audit events that its program raised, as it reports.
@@ -110,6 +111,7 @@ class NodeProcess:
     log_token: str = ""
     file: str = ""
     arguments: str = ""
+    launched_by: str = ""
     places: Places = field(default_factory=lambda: Places(None))
     start_told: Start | None = None
     reached: list[str] = field(default_factory=list)
@@ -190,7 +192,7 @@ class NodeProcess:
         """Record a note: how the file is started, which comes first, or something that readers must know."""
         if report.get("code") == "started":
             if self.start_told is None and (start := start_of(self.name, self.file, report, self.places)):
-                self.start_told = replace(start, arguments=self.arguments)
+                self.start_told = replace(start, arguments=self.arguments, launched_by=self.launched_by)
                 self.notes += hidden_notes(start)
         elif len(self.notes) < NOTES and (text := note_of(self.file, report, self.places)):
             self.notes.append(text[:NOTE_CHARACTERS])

@@ -20,10 +20,12 @@ from typing import TYPE_CHECKING, Any
 from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.core.quantities import GIB, MIB, NS_PER_S, duration
+from grader.core.scenario import is_launch_file
 from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Trace
 from grader.execution.bare_start import BareProcess, bare_arguments
 from grader.execution.codec import from_json, trace_to_json
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
+from grader.execution.launching import Launched, evaluated, expanded, renamed, unstarted
 from grader.execution.notes import Places
 from grader.execution.plan import Plan
 from grader.execution.resource_monitor import Budget, ResourceMonitor
@@ -140,6 +142,26 @@ class Worker:
         return {"trace": {**trace_to_json(trace), "reached": list(trace.reached)}, **cost, "worn": is_worn(trace)}
 
     def _record(self, plan: Plan, domain: int, budget: Budget) -> Trace:
+        launched = {
+            name: self._evaluate(plan, name, file, domain) for name, file in plan.processes if is_launch_file(name)
+        }
+        if any(made.fault is not None or not made.processes for made in launched.values()):
+            return unstarted(plan, launched)
+        return renamed(self._record_processes(expanded(plan, launched), domain, budget), launched)
+
+    def _evaluate(self, plan: Plan, name: str, file: str, domain: int) -> Launched:
+        """Return what a launch file describes, which a process in a sandbox of its own evaluates."""
+        start = plan.start_of(name)
+        told = {"launch": {"arguments": start.launch_arguments, "provided": start.provided}}
+        students: list[NodeProcess] = []
+        with ExitStack() as stack:
+            stack.callback(stop, students)
+            students.append(self._execute(plan, name, file, domain, told))
+            stack.enter_context(ResourceMonitor(students, plan.limits))
+            _await_ready(students[0])
+            return evaluated(students[0], plan)
+
+    def _record_processes(self, plan: Plan, domain: int, budget: Budget) -> Trace:
         students: list[NodeProcess] = []
         with ExitStack() as stack:
             stack.callback(stop, students)
@@ -164,6 +186,10 @@ class Worker:
         self._starved_ns += monitor.starved_ns
 
     def _start(self, plan: Plan, name: str, file: str, domain: int) -> NodeProcess:
+        return self._execute(plan, name, file, domain, {})
+
+    def _execute(self, plan: Plan, name: str, file: str, domain: int, told: Mapping[str, Any]) -> NodeProcess:
+        """Start a process of the host with a request; one that evaluates a launch file is told so."""
         ours, theirs = socket.socketpair()
         root = self._isolation.submission_seen_at or plan.root
         start = plan.start_of(name)
@@ -179,6 +205,7 @@ class Worker:
             "log_format": LOG_FORMAT,
             "python_paths": [str(p) for p in self._runtime.python_paths],
             "limits": {"start_cpu_s": START_CPU_S, "wake_up_cpu_s": WAKE_UP_CPU_S, "blocked_s": BLOCKED_S},
+            **told,
         }
         launcher = f"{self._isolation.host_seen_at}/launcher.py"
         arguments = ("-s", "-u", "-B", "-X", "utf8", launcher, json.dumps({**request, "fd": theirs.fileno()}))
@@ -196,7 +223,7 @@ class Worker:
             pass_fds=(theirs.fileno(),),
         )
         try:
-            if not self._isolation.can_enter:
+            if told or not self._isolation.can_enter:  # a fork of the starter has imported rclpy, which takes no part
                 command = self._isolation.student_command(process, plan.limits)
                 student = NodeProcess.start(name, root, command, ours, plan.limits)
             else:
@@ -210,6 +237,7 @@ class Worker:
         finally:
             theirs.close()
         student.file, student.places, student.arguments = file, Places(Path(plan.root)), start.words
+        student.launched_by = start.launched_by
         return student
 
     def _starter(self, clock: str) -> Starter:

@@ -250,7 +250,12 @@ class VerdictBuilder:
         elif looked_for.likely:
             hint = f"if {quote(others[0], 80)} is your solution, rename it to {unnamed}"
             evidence["likely"] = others[0]
-        found, reason = (*similar, *others), f"{unnamed}: not in the submission"
+        if "/" in unnamed:  # an executable
+            package, name = unnamed.replace("*", "my_package").split("/")
+            hint = f'add it to console_scripts in setup.py, such as "{name} = {package}.{name}:main"'
+            evidence.pop("likely", None)
+        reason = f"{unnamed}: {looked_for.problem or 'not in the submission'}"
+        found = () if looked_for.problem else (*similar, *others)
         reason += f"; found {listed(found, len(found))}{' instead' if similar else ''}" if found else ""
         return _without_points(criterion, Outcome.NOT_MET, reason, hint=hint, evidence=evidence)
 

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Check, Criterion, Exercise, Finding, Location, Problem, SourceCheck
-from grader.core.scenario import Scenario
+from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import Submission
 from grader.core.trace import Fault, FaultKind, Request, Response, Trace
 from grader.judging.checks import CHECKS
@@ -22,6 +22,10 @@ from grader.judging.wording import quote, span
 #: for more than this share of the time, what is not met is judged again at so many higher speeds, up to that of a
 #: program that did not wait. Longer waits count as the longest.
 _ORDINARY_WAIT, _LONGEST_WAIT, _SPEEDS = 0.03, 0.5, 8
+
+
+#: What to do about a launch file that the grader can only run in part.
+_LEFT_OUT_HINT = "look at this criterion by hand, or leave that out of the launch file and grade again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,13 +84,18 @@ def run_check(
                 problem=f"the machine was too busy: the nodes waited {waited} for a processor, which can be why"
             )
     if not isinstance(criterion.check, SourceCheck):
-        return _for_lack_of_package(answer, scenario, trace, sources or {})
+        return _for_what_is_lacking(answer, scenario, trace, sources or {})
     return answer if answer.finding is None else replace(answer, finding=_placed(answer.finding, submission))
 
 
-def _for_lack_of_package(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
-    """Return the answer; no answer if points are lost because this installation lacks a package of ROS."""
+def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
+    """Return the answer; no answer if points are lost where this installation lacks a package of ROS.
+
+    Nor is there one where a launch file asks for something that the grader cannot do.
+    """
     lost = answer.finding is not None and answer.finding.credit < 1
+    if lost and trace.left_out:
+        return Answer(problem=f"{trace.left_out[0]}, which can be why this is not met", hint=_LEFT_OUT_HINT)
     lack = lacking_package(trace, scenario.processes, sources) if lost else None
     if lack is None:
         return answer
@@ -162,7 +171,9 @@ def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> 
 
 def start_failure(scenario: Scenario, trace: Trace) -> Fault | None:
     """Return the fault that prevented a file from creating any endpoint, or None if all files started."""
-    faults = [fault for process in scenario.processes if (fault := first_fault(trace, process)) is not None]
+    named = {fault.process for fault in trace.faults()} if any(map(is_launch_file, scenario.processes)) else ()
+    processes = dict.fromkeys((*scenario.processes, *sorted(named)))  # a launch file's nodes have names of their own
+    faults = [fault for process in processes if (fault := first_fault(trace, process)) is not None]
     if not faults:
         return None
     few = _started(trace) < len(scenario.processes)

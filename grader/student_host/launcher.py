@@ -29,4 +29,5 @@ def load_package() -> Any:
 if __name__ == "__main__":
     request = json.loads(sys.argv[1])
     sys.path[:1] = request.get("python_paths", [])  # in place of this file's own folder
-    load_package().run(request)
+    program = load_package()
+    (program.evaluate if "launch" in request else program.run)(request)

@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import ast
 import configparser
+import contextlib
+import importlib
 import os
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -19,6 +22,8 @@ MARKERS = ("setup.py", "package.xml")
 CMAKE = "CMakeLists.txt"
 #: The name given to a package if the submission is the package's own folder.
 NAMELESS = "submission"
+#: How much of a package.xml is searched for its name.
+NAME_BYTES = 1 << 16
 #: The most folders of a submission that are searched for packages.
 FOLDERS = 500
 
@@ -147,14 +152,36 @@ def _entry_point(root: str, file: str, layout: PackageLayout, executable: str) -
     return max(found, key=lambda pair: pair[0], default=(False, None))[1]
 
 
-def console_scripts(folder: str) -> list[tuple[str, str, str]]:
-    """Return name, module and function of each console script in the setup.py and setup.cfg of a folder."""
-    lines: list[str] = []
+def package_name(folder: str) -> str:
+    """Return the name of a ROS package: what package.xml says, or else setup.py, or else the name of its folder."""
+    with contextlib.suppress(OSError), open(os.path.join(folder, "package.xml"), "rb") as source:
+        found = re.search(rb"<name>\s*([A-Za-z0-9_-]+)\s*</name>", source.read(NAME_BYTES))
+        if found is not None:
+            return found[1].decode()
+    name = _given(folder).get("name")
+    return name if isinstance(name, str) else os.path.basename(folder.rstrip("/"))
+
+
+def packages_of(root: str) -> dict[str, str]:
+    """Return the name and absolute folder of each ROS package in a submission, outermost first."""
+    found: dict[str, str] = {}
+    for folder in package_folders(root):
+        found.setdefault(package_name(folder), folder)
+    return found
+
+
+def _given(folder: str) -> dict[str, Any]:
+    """Return the keyword arguments of setup() in the setup.py of a folder; none if it is unreadable."""
     try:
         with open(os.path.join(folder, "setup.py"), "rb") as source:
-            lines += _scripts_of_setup(ast.parse(source.read()))
+            return given_to_setup(ast.parse(source.read()))
     except (OSError, SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
-        pass  # an unreadable setup.py has no console scripts
+        return {}
+
+
+def console_scripts(folder: str) -> list[tuple[str, str, str]]:
+    """Return name, module and function of each console script in setup.py, setup.cfg and pyproject.toml."""
+    lines = [*_scripts_of_setup(_given(folder)), *_scripts_of_pyproject(folder)]
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read(os.path.join(folder, "setup.cfg"), encoding="utf-8")
@@ -172,8 +199,19 @@ def _script(line: str) -> tuple[str, str, str] | None:
     return (name, module, function) if equals and colon and all(part.isidentifier() for part in parts) else None
 
 
-def _scripts_of_setup(tree: ast.Module) -> list[str]:
-    given = given_to_setup(tree).get("entry_points")
+def _scripts_of_pyproject(folder: str) -> list[str]:
+    """Return the scripts of a pyproject.toml; none before Python 3.11, which cannot read it."""
+    try:
+        tomllib = importlib.import_module("tomllib")
+        with open(os.path.join(folder, "pyproject.toml"), "rb") as source:
+            scripts = tomllib.load(source)["project"]["scripts"]
+        return [f"{name} = {target}" for name, target in scripts.items() if isinstance(target, str)]
+    except (ImportError, OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return []
+
+
+def _scripts_of_setup(values: dict[str, Any]) -> list[str]:
+    given = values.get("entry_points")
     scripts = given.get("console_scripts") if isinstance(given, dict) else _ini_scripts(given)
     scripts = scripts.splitlines() if isinstance(scripts, str) else scripts
     return [s for s in scripts if isinstance(s, str)] if isinstance(scripts, list) else []

@@ -11,14 +11,16 @@ import os
 import random
 import signal
 import sys
+import tempfile
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from . import entry, originals
+from . import entry, launch_files, originals
 from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_processes
+from .packages import packages_of
 from .shadows import install_stand_ins
 from .virtual import VirtualTime
 from .watch import Watch
@@ -96,6 +98,36 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     left = time.end()
     flush()
     link.send({"kind": "exited", "left": left, **ending, **time.summary()})
+    originals.exit_now(0)
+
+
+def evaluate(request: dict[str, Any]) -> None:
+    """Evaluate the launch file that a request names, and report what it describes; never returns.
+
+    Args:
+        request: As for `run`, with `launch`: its `arguments`, and the `provided` files of the rubric.
+    """
+    link, describer = Link(), Describer()
+    link.open(request["fd"])
+    describer.set_root(request["root"])
+    die_with_parent()
+    link.ask({"kind": "ready"})
+    root, told = request["root"], request["launch"]
+    own = os.path.join(os.environ.get("HOME") or tempfile.gettempdir(), "provided")
+    os.makedirs(own, exist_ok=True)
+    for name, text in told["provided"]:
+        with open(os.path.join(own, name), "w", encoding="utf-8") as file:
+            file.write(text)
+    here = own if request["file"] in dict(told["provided"]) else root
+    found: dict[str, Any] = {}
+    try:
+        path = os.path.join(here, request["file"])
+        sys.argv = [path]
+        nodes, left_out = launch_files.describe((root, own), path, packages_of(root), dict(told["arguments"]))
+        found = {"nodes": nodes, "left_out": left_out}
+    except BaseException as error:  # whatever the launch file raises becomes a fault
+        found = {"fault": describer.exception(error)}
+    link.send({"kind": "launched", **found})
     originals.exit_now(0)
 
 

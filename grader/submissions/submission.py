@@ -7,11 +7,12 @@ import os
 import re
 import stat
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
 from grader.core.errors import SubmissionError
 from grader.core.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
+from grader.execution.executables import Executable, executables
 from grader.submissions.archives import ARCHIVE_SUFFIXES, HEAD_BYTES, MAX_ARCHIVE_BYTES, archive_kind, collect_archive
 from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, shown
 from grader.submissions.staging import collect_folder, read_start, write_files
@@ -63,8 +64,14 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
 def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into: Path) -> Submission:
     """Write files that were read, here or on another machine, and find the wanted ones; raises HarnessError."""
     digest = write_files(collected, into)
-    files = {name: _look_for(name, collected.files, wanted) for name in wanted}
-    several = tuple(_several(file) for file in files.values() if file.others)
+    programs = executables(into) if any("/" in name for name in wanted) or _lacks(wanted, collected) else []
+    files = {
+        name: _look_for_executable(name, programs, collected.files, wanted)
+        if "/" in name
+        else _look_for(name, collected.files, wanted, programs)
+        for name in wanted
+    }
+    several = tuple(note for file in files.values() for note in _notes_on(file))
     return Submission(
         name=_name(Path(path)),
         path=path,
@@ -147,11 +154,47 @@ def _name(source: Path) -> str:
     return source.name if source.name not in ("", "..") else source.resolve().name or "/"
 
 
-def _look_for(wanted: str, files: Sequence[tuple[str, bytes]], all_wanted: Sequence[str]) -> StudentFile:
+def _lacks(wanted: Sequence[str], collected: Collected) -> bool:
+    """Return whether a program is missing that an entry point may stand for."""
+    names = {PurePosixPath(name).name for name, _ in collected.files}
+    return any(name.endswith(".py") and name not in names for name in wanted)
+
+
+def _look_for_executable(
+    wanted: str, programs: Sequence[Executable], files: Sequence[tuple[str, bytes]], all_wanted: Sequence[str]
+) -> StudentFile:
+    """Find `PACKAGE/NAME` among the entry points of a submission; `*` stands for any package."""
+    package, _, name = wanted.partition("/")
+    named = [one for one in programs if one.name == name and package in ("*", one.package)]
+    found = [one for one in named if one.file is not None]
+    if found:
+        others = tuple(dict.fromkeys(one.file or "" for one in found[1:] if one.file != found[0].file))
+        return StudentFile(wanted, found[0].file, others=others, executable=name)
+    problem = f"the entry point {named[0].words} is {named[0].target}, which is not in the submission" if named else ""
+    similar = difflib.get_close_matches(wanted, [one.words for one in programs], MAX_SIMILAR, SIMILARITY)
+    rest = [one.words for one in programs if one.words not in similar]
+    rest = rest or sorted((path for path, _ in files if _may_be_node(path, all_wanted)), key=_nearest_the_top)
+    return StudentFile(wanted, None, tuple(similar), candidates=tuple(rest[:MAX_CANDIDATES]), problem=problem)
+
+
+def _notes_on(file: StudentFile) -> Iterator[str]:
+    """Yield what readers must know about how a file was found."""
+    if file.others:
+        yield _several(file)
+    if file.executable and "/" not in file.wanted:
+        yield f"{file.wanted}: graded is the executable {file.executable}, which is in {shown(file.found or '')}"
+
+
+def _look_for(
+    wanted: str, files: Sequence[tuple[str, bytes]], all_wanted: Sequence[str], programs: Sequence[Executable]
+) -> StudentFile:
     names = [name for name, _ in files]
     exact = sorted((name for name in names if PurePosixPath(name).name == wanted), key=_nearest_the_top)
     if exact:
         return StudentFile(wanted, exact[0], others=tuple(exact[1:]))
+    installed = [one for one in programs if f"{one.name}.py" == wanted and one.file is not None]
+    if len(installed) == 1:
+        return StudentFile(wanted, installed[0].file, executable=installed[0].name)
     similar = tuple(_similar(wanted, names, all_wanted))
     others = {name: content for name, content in files if name not in similar and _may_be_node(name, all_wanted)}
     ranked = sorted((-_resemblance(name, others[name], wanted), _nearest_the_top(name), name) for name in others)

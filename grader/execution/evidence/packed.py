@@ -137,6 +137,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("starts", tuple[_START, ...], ()),  # type: ignore[valid-type]
         ("reached", tuple[str, ...], ()),
         ("most_starved_ns", int, 0),
+        ("left_out", tuple[str, ...], ()),
     ]
     return msgspec.defstruct("Trace", written)
 
@@ -154,6 +155,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         starts=tuple(map(_start, row.starts)),
         reached=row.reached,
         most_starved_ns=row.most_starved_ns,
+        left_out=row.left_out,
     )
 
 

@@ -1,0 +1,235 @@
+"""Launch files: what one describes becomes ordinary processes of the plan, and the trace names what was left out.
+
+The description comes from a student's process, so every field of it is checked; it can only name programs of the
+submission.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from grader.core.quantities import NS_PER_S
+from grader.core.trace import ClockKind, Fault, FaultKind, LogRecord, Mark, Observation, Offer, OutputLine, Trace
+from grader.execution.ending import START_CPU_S, reported_fault
+from grader.execution.executables import Executable, executables, find_executable, has_package
+from grader.execution.notes import Places
+from grader.execution.plan import Plan, PlannedStart
+from grader.execution.student_process import NodeProcess
+from grader.execution.usage import families, usage
+
+#: The most real time that a launch file may take, and how often it is looked at, in seconds.
+LONGEST_S, LOOK_S = 60.0, 0.02
+#: The most nodes, things left out, arguments of a node and characters of a text that are taken from a description.
+NODES, LEFT_OUT, ARGUMENTS, CHARACTERS, FILE_CHARACTERS = 16, 50, 200, 1_000, 1 << 20
+#: Packages with programs that only show what happens; leaving them out changes nothing for the nodes.
+ONLY_LOOKING = frozenset({"rviz2", "rqt", "rqt_gui", "rqt_graph", "rqt_plot", "rqt_console", "plotjuggler"})
+
+
+@dataclass(frozen=True, slots=True)
+class Launched:
+    """What a launch file describes.
+
+    Attributes:
+        processes: Name and file of each process.
+        starts: What each is started with.
+        labels: The name of each process in the trace.
+        starts_ns: Name and start time of those that start late.
+        left_out: Sentences about what the grader cannot do, which may matter.
+        notes: Sentences about what it left out and does not matter.
+        fault: Why nothing can be started; None if something can.
+    """
+
+    processes: tuple[tuple[str, str], ...] = ()
+    starts: tuple[PlannedStart, ...] = ()
+    labels: tuple[tuple[str, str], ...] = ()
+    starts_ns: tuple[tuple[str, int], ...] = ()
+    left_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    fault: Fault | None = None
+
+
+def evaluated(student: NodeProcess, plan: Plan) -> Launched:
+    """Wait until a process has evaluated a launch file, and return what it describes."""
+    report, why = _description(student)
+    if report is None:
+        return Launched(fault=Fault(0, student.name, FaultKind.HUNG if why else FaultKind.EXITED, why or _ENDED))
+    if "fault" in report:
+        return Launched(fault=reported_fault(student.name, 0, report["fault"], plan.limits, student.places))
+    return _launched(student.name, report, plan, student.places)
+
+
+_ENDED = "ended while it was evaluated, before it described anything"
+
+
+def _description(student: NodeProcess) -> tuple[dict[str, Any] | None, str]:
+    """Return the report, or None and why there is none."""
+    student.tell({})
+    started = time.monotonic()
+    while True:
+        for report in student.reports():
+            if report is None:
+                return None, ""
+            if report.get("kind") == "launched":
+                return report, ""
+        student.drain()
+        found = families(list(student.roots))
+        used = usage(set().union(*found.values()))
+        if used.processor_ns > START_CPU_S * NS_PER_S:
+            return None, f"did not return within {START_CPU_S:g} s of processor time"
+        if time.monotonic() - started > LONGEST_S:
+            return None, f"did not return within {LONGEST_S:g} s"
+        if student.stopped:
+            return None, student.stopped
+        time.sleep(LOOK_S)
+
+
+def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) -> Launched:
+    root, known = Path(plan.root), dict(plan.start_of(name).known)
+    left_out = [_left_out(name, one, places) for one in _dicts(report.get("left_out"), LEFT_OUT)]
+    notes: list[str] = []
+    made = Launched()
+    for node in _dicts(report.get("nodes"), NODES):
+        package, wanted = _text(node.get("package")), _text(node.get("executable"))
+        found = find_executable(root, package, wanted)
+        where = _place(name, node, places)
+        if found is None or found.file is None:
+            if has_package(root, package):
+                text = _not_found(package, wanted, found, executables(root))
+                file, _, line = where.rpartition(":")
+                return Launched(
+                    fault=Fault(0, name, FaultKind.EXCEPTION, text, file if line else "", int(line or 0)),
+                    left_out=tuple(left_out),
+                )
+            sentence = f"{where}: {package}/{wanted} was not started: the submission has no package {package}"
+            (notes if package in ONLY_LOOKING else left_out).append(sentence)
+            continue
+        if not found.target and not has_package(root, package):
+            notes.append(f"{where}: the submission has no package {package}; {found.file} was started")
+        made = _added(made, name, node, found, where, known)
+    if not made.processes and not left_out:
+        text = "describes no node"
+        return Launched(fault=Fault(0, name, FaultKind.EXITED, text), notes=tuple(notes))
+    return replace(made, left_out=tuple(left_out), notes=tuple(notes))
+
+
+def _added(  # noqa: PLR0913  what one node consists of
+    made: Launched, launch: str, node: Mapping[str, Any], found: Executable, where: str, known: Mapping[str, str]
+) -> Launched:
+    """Return the processes with one more."""
+    assert found.file is not None
+    label = known.get(f"{found.file} {found.name}") or known.get(found.file) or launch
+    number = sum(1 for _, other in made.labels if other == label)
+    process = f"{label} ({number + 1})" if number or label == launch else label
+    files = [(_text(f[0]), _text(f[1], FILE_CHARACTERS)) for f in _lists(node.get("parameter_files"), 2)]
+    start = PlannedStart(
+        process,
+        executable=found.name if found.target else "",
+        arguments=_texts(node.get("arguments")),
+        ros_arguments=_texts(node.get("ros_arguments")),
+        parameter_files=tuple(files),
+        launched_by=where,
+    )
+    delay = node.get("delay_s")
+    late = isinstance(delay, (int, float)) and 0 < delay < 1e6
+    delay_ns = round(delay * NS_PER_S) if isinstance(delay, (int, float)) and late else 0
+    return replace(
+        made,
+        processes=(*made.processes, (process, found.file)),
+        starts=(*made.starts, start),
+        labels=(*made.labels, (process, label)),
+        starts_ns=(*made.starts_ns, (process, delay_ns)),
+    )
+
+
+def _not_found(package: str, wanted: str, found: Executable | None, known: Sequence[Executable]) -> str:
+    if found is not None:
+        return f"SubstitutionFailure: the entry point {wanted} of {package} is {found.target}, which is not there"
+    names = ", ".join(one.name for one in known if one.package == package)
+    text = f"SubstitutionFailure: package '{package}' found, but executable '{wanted}' not found"
+    return f"{text}; its entry points are {names}" if names else f"{text}; it has no entry points"
+
+
+def _left_out(name: str, one: Mapping[str, Any], places: Places) -> str:
+    return f"{_place(name, one, places)}: {_text(one.get('what'), 200)} is not supported and was left out"
+
+
+def _place(name: str, one: Mapping[str, Any], places: Places) -> str:
+    file, line = one.get("file"), one.get("line")
+    if isinstance(file, str) and places.has(file, line):
+        return f"{file}:{line}"
+    own = file == name and type(line) is int and 0 < line < 100_000  # the rubric's own launch file
+    return f"{name}:{line}" if own else name
+
+
+def _dicts(value: Any, most: int) -> Iterator[Mapping[str, Any]]:
+    yield from (one for one in (value[:most] if isinstance(value, list) else ()) if isinstance(one, dict))
+
+
+def _lists(value: Any, length: int) -> Iterator[Sequence[Any]]:
+    lists = value[:ARGUMENTS] if isinstance(value, list) else ()
+    yield from (one for one in lists if isinstance(one, list) and len(one) == length)
+
+
+def _text(value: Any, most: int = CHARACTERS) -> str:
+    return value[:most].replace("\0", "") if isinstance(value, str) else ""
+
+
+def _texts(value: Any) -> tuple[str, ...]:
+    return tuple(_text(one) for one in value[:ARGUMENTS]) if isinstance(value, list) else ()
+
+
+def expanded(plan: Plan, launched: Mapping[str, Launched]) -> Plan:
+    """Return a plan with the processes of launch files in the place of these."""
+    processes: list[tuple[str, str]] = []
+    starts = [start for start in plan.starts if start.process not in launched]
+    late, may_exit = dict(plan.starts_ns), list(plan.may_exit)
+    for name, file in plan.processes:
+        made = launched.get(name)
+        if made is None:
+            processes.append((name, file))
+            continue
+        processes += made.processes
+        starts += made.starts
+        begins = late.pop(name, 0)
+        late |= {process: begins + delay for process, delay in made.starts_ns if begins + delay}
+        may_exit += [process for process, _ in made.processes if name in plan.may_exit]
+    return replace(
+        plan,
+        processes=tuple(processes),
+        starts=tuple(starts),
+        starts_ns=tuple(late.items()),
+        may_exit=tuple(may_exit),
+    )
+
+
+def unstarted(plan: Plan, launched: Mapping[str, Launched]) -> Trace:
+    """Return the trace of a scenario with a launch file from which nothing can be started."""
+    faults = tuple(made.fault for made in launched.values() if made.fault is not None)
+    trace = Trace(plan.scenario, ClockKind(plan.clock), stop_ns=plan.duration_ns, observations=faults)
+    return renamed(trace, launched)
+
+
+def renamed(trace: Trace, launched: Mapping[str, Launched]) -> Trace:
+    """Return a trace in which processes go by the names that a rubric uses, and which tells what was left out."""
+    labels = {process: label for made in launched.values() for process, label in made.labels}
+    left_out = tuple(one for made in launched.values() for one in made.left_out)
+    notes = tuple(one for made in launched.values() for one in made.notes)
+    return replace(
+        trace,
+        observations=tuple(_renamed(one, labels) for one in trace.observations),
+        starts=tuple(replace(start, process=labels.get(start.process, start.process)) for start in trace.starts),
+        notes=(*left_out, *notes, *trace.notes),
+        left_out=left_out,
+    )
+
+
+def _renamed(observation: Observation, labels: Mapping[str, str]) -> Observation:
+    if isinstance(observation, Mark) and observation.detail in labels:
+        return replace(observation, detail=labels[observation.detail])
+    if isinstance(observation, (LogRecord, OutputLine, Fault, Offer)) and observation.process in labels:
+        return replace(observation, process=labels[observation.process])
+    return observation

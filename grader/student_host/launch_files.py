@@ -1,0 +1,861 @@
+"""Evaluates a Python launch file: modules in place of `launch` and `launch_ros` describe nodes and start nothing.
+
+The names and their meaning are those of `launch` and `launch_ros` of ROS 2 Jazzy, which no wheel holds and which start
+processes themselves. What is not described here is left out, with its name and line.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+import os
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from types import FrameType, ModuleType
+from typing import Any
+
+#: The deepest nesting of included launch files, and the most nodes and things left out that are described.
+DEEPEST, MOST_NODES, MOST_LEFT_OUT = 20, 16, 50
+#: Names this similar to a package of the submission are taken for a misspelling of it.
+SIMILARITY = 0.8
+_TRUE, _FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
+
+
+class LeftOutError(Exception):
+    """Something that only ROS itself can do; the action that needs it is left out."""
+
+
+class Context:
+    """What a launch file is evaluated with: its arguments, namespaces, and what it sets for all nodes."""
+
+    def __init__(self, packages: Mapping[str, str], arguments: Mapping[str, str]) -> None:
+        self.launch_configurations = dict(arguments)
+        self.environment = dict(os.environ)
+        self.packages = packages
+        self.namespaces: list[str] = []
+        self.remappings: list[tuple[str, str]] = []
+        self.parameters: list[tuple[str, Any]] = []
+        self.parameter_files: list[str] = []
+        self.files: list[str] = []
+        self.delay_s = 0.0
+        self.nodes: list[dict[str, Any]] = []
+        self.left_out: list[dict[str, Any]] = []
+
+    def perform_substitution(self, value: Any) -> str:
+        """Return the text of a substitution."""
+        return text_of(value, self)
+
+    def scope(self) -> tuple[Any, ...]:
+        """Return a copy of everything that a group restores at its end."""
+        kept = (self.launch_configurations, self.namespaces, self.remappings, self.parameters, self.parameter_files)
+        return tuple(part.copy() for part in kept)
+
+    def restore(self, kept: tuple[Any, ...]) -> None:
+        """Restore what `scope` has returned."""
+        self.launch_configurations, self.namespaces, self.remappings, self.parameters, self.parameter_files = kept
+
+    def leave_out(self, action: Action, what: str) -> None:
+        """Note something that is not evaluated."""
+        if len(self.left_out) < MOST_LEFT_OUT:
+            self.left_out.append({"file": action.file, "line": action.line, "what": what})
+
+    def share_of(self, package: str) -> str:
+        """Return the folder of a package of the submission, which holds what its setup.py installs to share."""
+        if package in self.packages:
+            return self.packages[package]
+        if difflib.get_close_matches(package, self.packages, n=1, cutoff=SIMILARITY):
+            raise PackageNotFoundError(f"package '{package}' not found, searching: {sorted(self.packages)}")
+        raise LeftOutError(f"the package {package[:80]}, which is not in the submission")
+
+
+class PackageNotFoundError(KeyError):
+    """A package that is neither in the submission nor installed."""
+
+
+class Action:
+    """One entry of a launch description, and where it was written."""
+
+    def __init__(self, *, condition: Any = None, **_: Any) -> None:
+        self.condition = condition
+        self.file, self.line = _written_at()
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Do what the action does, and return the actions to visit next."""
+        raise NotImplementedError
+
+
+#: The folders whose files are named as places: that of the submission, and that of the rubric's own files.
+_folders: tuple[str, ...] = ()
+
+
+def _written_at() -> tuple[str, int]:
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None:
+        name = frame.f_code.co_filename
+        for folder in _folders:
+            if name.startswith(folder):
+                return os.path.relpath(name, folder), frame.f_lineno
+        frame = frame.f_back
+    return "", 0
+
+
+def text_of(value: Any, context: Context) -> str:
+    """Return a text, a substitution, or a sequence of these as one text."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Substitution):
+        return value.perform(context)
+    if isinstance(value, os.PathLike):
+        return str(os.fspath(value))
+    if isinstance(value, (list, tuple)):
+        return "".join(text_of(part, context) for part in value)
+    raise TypeError(f"expected a text or a substitution, found {type(value).__name__}: {value!r}")
+
+
+class Substitution:
+    """A text that is known only when the launch file is evaluated."""
+
+    def perform(self, context: Context) -> str:
+        """Return the text."""
+        raise NotImplementedError
+
+
+class TextSubstitution(Substitution):
+    """A fixed text."""
+
+    def __init__(self, *, text: str) -> None:
+        if not isinstance(text, str):
+            raise TypeError(f"TextSubstitution expected Text object got '{type(text)}' instead.")
+        self.text = text
+
+    def perform(self, context: Context) -> str:
+        """Return the text."""
+        return self.text
+
+
+class SubstitutionFailure(RuntimeError):  # noqa: N818  the name in launch
+    """A substitution has no text."""
+
+
+class LaunchConfiguration(Substitution):
+    """The value of a launch argument."""
+
+    def __init__(self, variable_name: Any, *, default: Any = None) -> None:
+        self.name, self.default = variable_name, default
+
+    def perform(self, context: Context) -> str:
+        """Return the value or the default."""
+        name = text_of(self.name, context)
+        if name in context.launch_configurations:
+            return context.launch_configurations[name]
+        if self.default is None:
+            raise SubstitutionFailure(f"launch configuration '{name}' does not exist")
+        return text_of(self.default, context)
+
+
+class EnvironmentVariable(Substitution):
+    """The value of an environment variable."""
+
+    def __init__(self, name: Any, *, default_value: Any = None) -> None:
+        self.name, self.default = name, default_value
+
+    def perform(self, context: Context) -> str:
+        """Return the value or the default."""
+        name = text_of(self.name, context)
+        if name in context.environment:
+            return context.environment[name]
+        if self.default is None:
+            raise SubstitutionFailure(f"environment variable '{name}' does not exist")
+        return text_of(self.default, context)
+
+
+class _Made(Substitution):
+    """A substitution whose text a function makes from the texts of its parts."""
+
+    def __init__(self, *parts: Any, **_: Any) -> None:
+        self.parts = parts
+
+    def perform(self, context: Context) -> str:
+        """Return the text."""
+        text: str = self.make(context, *self.parts)
+        return text
+
+    @staticmethod
+    def make(context: Context, *parts: Any) -> str:
+        """Return the text from the parts."""
+        raise NotImplementedError
+
+
+def _made(name: str, make: Callable[..., str]) -> type[Substitution]:
+    return type(name, (_Made,), {"make": staticmethod(make), "__doc__": f"The substitution {name} of launch."})
+
+
+def _joined(context: Context, parts: Iterable[Any]) -> str:
+    return os.path.join(*[text_of(part, context) for part in parts])
+
+
+def _python(context: Context, expression: Any, *_: Any) -> str:
+    names = {**vars(math), "math": math}
+    return str(eval(text_of(expression, context), names))  # noqa: S307  what the substitution does, in the sandbox
+
+
+def _truth(value: Any, context: Context) -> bool:
+    text = text_of(value, context) if not isinstance(value, bool) else str(value)
+    if text.strip().casefold() not in (*_TRUE, *_FALSE):
+        raise ValueError(f"invalid condition expression: expected true or false, found '{text[:80]}'")
+    return text.strip().casefold() in _TRUE
+
+
+def _word(value: bool) -> str:
+    return "true" if value else "false"
+
+
+def _chosen(context: Context, condition: Any, yes: Any = "", no: Any = "") -> str:
+    return text_of(yes if _truth(condition, context) else no, context)
+
+
+def _same(context: Context, left: Any, right: Any) -> str:
+    return _word(text_of(left, context) == text_of(right, context))
+
+
+def _content(context: Context, path: Any) -> str:
+    with open(text_of(path, context), encoding="utf-8") as file:
+        return file.read()
+
+
+def _impossible(what: str) -> Callable[..., str]:
+    def make(context: Context, *parts: Any) -> str:
+        raise LeftOutError(f"{what}({', '.join(text_of(part, context)[:80] for part in parts)})")
+
+    return make
+
+
+SUBSTITUTIONS: dict[str, Any] = {
+    "TextSubstitution": TextSubstitution,
+    "LaunchConfiguration": LaunchConfiguration,
+    "EnvironmentVariable": EnvironmentVariable,
+    "PathJoinSubstitution": _made("PathJoinSubstitution", _joined),
+    "PathSubstitution": _made("PathSubstitution", lambda context, path: text_of(path, context)),
+    "PythonExpression": _made("PythonExpression", _python),
+    "ThisLaunchFile": _made("ThisLaunchFile", lambda context: context.files[-1]),
+    "ThisLaunchFileDir": _made("ThisLaunchFileDir", lambda context: os.path.dirname(context.files[-1])),
+    "EqualsSubstitution": _made("EqualsSubstitution", _same),
+    "NotEqualsSubstitution": _made("NotEqualsSubstitution", lambda c, a, b: _word(text_of(a, c) != text_of(b, c))),
+    "NotSubstitution": _made("NotSubstitution", lambda c, a: _word(not _truth(a, c))),
+    "AndSubstitution": _made("AndSubstitution", lambda c, a, b: _word(_truth(a, c) and _truth(b, c))),
+    "OrSubstitution": _made("OrSubstitution", lambda c, a, b: _word(_truth(a, c) or _truth(b, c))),
+    "AnySubstitution": _made("AnySubstitution", lambda c, *all_: _word(any(_truth(a, c) for a in all_))),
+    "AllSubstitution": _made("AllSubstitution", lambda c, *all_: _word(all(_truth(a, c) for a in all_))),
+    "IfElseSubstitution": _made("IfElseSubstitution", _chosen),
+    "FileContent": _made("FileContent", _content),
+    "AnonName": _made("AnonName", lambda context, name: f"{text_of(name, context)}_1"),
+    "LaunchLogDir": _made("LaunchLogDir", lambda context: context.environment.get("ROS_LOG_DIR", "/tmp")),  # noqa: S108
+    "Command": _made("Command", _impossible("Command")),
+    "FindExecutable": _made("FindExecutable", _impossible("FindExecutable")),
+}
+FindPackageShare = _made("FindPackageShare", lambda context, name: context.share_of(text_of(name, context)))
+ROS_SUBSTITUTIONS: dict[str, Any] = {
+    "FindPackageShare": FindPackageShare,
+    "FindPackage": FindPackageShare,
+    "FindPackagePrefix": FindPackageShare,
+    "ExecutableInPackage": _made("ExecutableInPackage", _impossible("ExecutableInPackage")),
+    "Parameter": _made("Parameter", _impossible("Parameter")),
+}
+
+
+class Condition:
+    """A condition of an action."""
+
+    def __init__(self, *parts: Any) -> None:
+        self.parts = parts
+
+    def evaluate(self, context: Context) -> bool:
+        """Return whether the action is done."""
+        return _truth(self.parts[0], context)
+
+
+class IfCondition(Condition):
+    """The action is done if the expression is true."""
+
+
+class UnlessCondition(Condition):
+    """The action is done if the expression is false."""
+
+    def evaluate(self, context: Context) -> bool:
+        """Return whether the action is done."""
+        return not super().evaluate(context)
+
+
+class LaunchConfigurationEquals(Condition):
+    """The action is done if a launch argument has a value."""
+
+    def evaluate(self, context: Context) -> bool:
+        """Return whether the action is done."""
+        name, expected = self.parts
+        found = context.launch_configurations.get(name)
+        return found is None if expected is None else found == text_of(expected, context)
+
+
+class LaunchConfigurationNotEquals(LaunchConfigurationEquals):
+    """The action is done unless a launch argument has a value."""
+
+    def evaluate(self, context: Context) -> bool:
+        """Return whether the action is done."""
+        return not super().evaluate(context)
+
+
+class LaunchDescription:
+    """The actions of a launch file, in order."""
+
+    def __init__(self, initial_entities: Iterable[Any] | None = None, **_: Any) -> None:
+        self.entities = list(initial_entities or ())
+
+    def add_action(self, action: Any) -> None:
+        """Add an action at the end."""
+        self.entities.append(action)
+
+    add_entity = add_action
+
+
+class DeclareLaunchArgument(Action):
+    """An argument of the launch file."""
+
+    def __init__(
+        self, name: str, *, default_value: Any = None, description: str = "", choices: Any = None, **more: Any
+    ) -> None:
+        super().__init__(**more)
+        self.name, self.default, self.choices = name, default_value, choices
+        if default_value is not None and not isinstance(default_value, (str, Substitution, list, tuple, os.PathLike)):
+            raise TypeError(f"default_value: expected a text or a substitution, found {type(default_value).__name__}")
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Set the default, unless the argument is given."""
+        if self.name not in context.launch_configurations:
+            if self.default is None:
+                raise RuntimeError(f"Required launch argument '{self.name}' was not provided")
+            context.launch_configurations[self.name] = text_of(self.default, context)
+        value = context.launch_configurations[self.name]
+        if self.choices and value not in self.choices:
+            raise RuntimeError(f"Argument '{self.name}' provided value '{value}' is not valid: {list(self.choices)}")
+        return ()
+
+
+class SetLaunchConfiguration(Action):
+    """A launch argument is set."""
+
+    def __init__(self, name: Any, value: Any, **more: Any) -> None:
+        super().__init__(**more)
+        self.name, self.value = name, value
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Set it."""
+        context.launch_configurations[text_of(self.name, context)] = text_of(self.value, context)
+        return ()
+
+
+class GroupAction(Action):
+    """Several actions with a scope of their own."""
+
+    def __init__(
+        self,
+        actions: Iterable[Any],
+        *,
+        scoped: bool = True,
+        forwarding: bool = True,
+        launch_configurations: Mapping[Any, Any] | None = None,
+        **more: Any,
+    ) -> None:
+        super().__init__(**more)
+        self.actions, self.scoped, self.values = list(actions), scoped, dict(launch_configurations or {})
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Visit the actions in their scope."""
+        kept = context.scope()
+        given = {text_of(name, context): text_of(value, context) for name, value in self.values.items()}
+        context.launch_configurations.update(given)
+        walk(self.actions, context)
+        if self.scoped:
+            context.restore(kept)
+        return ()
+
+
+class TimerAction(Action):
+    """Actions that are done later."""
+
+    def __init__(self, *, period: Any, actions: Iterable[Any], **more: Any) -> None:
+        super().__init__(**more)
+        self.period, self.actions = period, list(actions)
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Visit the actions with the delay."""
+        period = self.period if isinstance(self.period, (int, float)) else float(text_of(self.period, context))
+        context.delay_s += float(period)
+        walk(self.actions, context)
+        context.delay_s -= float(period)
+        return ()
+
+
+class OpaqueFunction(Action):
+    """A function that returns actions."""
+
+    def __init__(self, *, function: Callable[..., Any], args: Any = None, kwargs: Any = None, **more: Any) -> None:
+        super().__init__(**more)
+        self.function, self.args, self.kwargs = function, args or (), kwargs or {}
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Call it."""
+        return self.function(context, *self.args, **self.kwargs) or ()
+
+
+class PythonLaunchDescriptionSource:
+    """A launch file by its path."""
+
+    def __init__(self, launch_file_path: Any, **_: Any) -> None:
+        self.path = launch_file_path
+
+
+class IncludeLaunchDescription(Action):
+    """Another launch file, with arguments."""
+
+    def __init__(self, launch_description_source: Any, *, launch_arguments: Any = None, **more: Any) -> None:
+        super().__init__(**more)
+        self.source, self.given = launch_description_source, launch_arguments or ()
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Set the arguments and visit what the file describes."""
+        for name, value in list(self.given):
+            context.launch_configurations[text_of(name, context)] = text_of(value, context)
+        if isinstance(self.source, LaunchDescription):
+            return self.source.entities
+        path = text_of(getattr(self.source, "path", self.source), context)
+        if not path.endswith(".py"):
+            raise LeftOutError(f"the launch file {os.path.basename(path)[:80]}: only Python launch files are evaluated")
+        if len(context.files) >= DEEPEST:
+            raise RecursionError(f"launch files include each other more than {DEEPEST} times")
+        context.files.append(path)
+        walk(described_by(path).entities, context)
+        context.files.pop()
+        return ()
+
+
+class ParameterValue:
+    """The value of a parameter with its type."""
+
+    def __init__(self, value: Any, *, value_type: Any = None) -> None:
+        self.value, self.type = value, value_type
+
+
+class ParameterFile:
+    """A parameter file."""
+
+    def __init__(self, param_file: Any, *, allow_substs: Any = False) -> None:
+        self.path, self.allow_substs = param_file, allow_substs
+
+
+class Parameter:
+    """One parameter by name and value."""
+
+    def __init__(self, name: Any, value: Any, *, value_type: Any = None, **_: Any) -> None:
+        self.name, self.value = name, ParameterValue(value, value_type=value_type) if value_type else value
+
+
+#: What a process is given that has no meaning for its node.
+_IGNORED = {
+    *("output", "output_format", "emulate_tty", "log_cmd", "exec_name", "respawn_delay", "respawn_max_retries"),
+    *("sigterm_timeout", "sigkill_timeout", "cached_output", "cwd", "shell"),
+}
+_NOT_SUPPORTED = ("prefix", "env", "additional_env", "on_exit", "respawn")
+
+
+class Node(Action):
+    """A program of a package, with what it is started with."""
+
+    def __init__(  # noqa: PLR0913  as in launch_ros
+        self,
+        *,
+        executable: Any,
+        package: Any = None,
+        name: Any = None,
+        namespace: Any = None,
+        parameters: Any = None,
+        remappings: Any = None,
+        arguments: Any = None,
+        ros_arguments: Any = None,
+        condition: Any = None,
+        **more: Any,
+    ) -> None:
+        super().__init__(condition=condition)
+        unknown = [name for name in more if name not in (*_IGNORED, *_NOT_SUPPORTED)]
+        if unknown:
+            raise TypeError(f"{type(self).__name__}() got an unexpected keyword argument '{unknown[0]}'")
+        self.package, self.executable, self.name, self.namespace = package, executable, name, namespace
+        self.parameters, self.remappings = list(parameters or ()), list(remappings or ())
+        self.arguments, self.ros_arguments, self.more = list(arguments or ()), list(ros_arguments or ()), more
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Describe the node."""
+        if len(context.nodes) >= MOST_NODES:
+            raise LeftOutError(f"more than {MOST_NODES} nodes")
+        for name in _NOT_SUPPORTED:
+            if self.more.get(name):
+                context.leave_out(self, f"{name}= of a node")
+        name = text_of(self.name, context) if self.name is not None else ""
+        namespace = _namespace(context, text_of(self.namespace, context) if self.namespace is not None else "")
+        rules = [*([f"__node:={name}"] if name else []), *([f"__ns:={namespace}"] if namespace else [])]
+        own = [(text_of(old, context), text_of(new, context)) for old, new in self.remappings]
+        rules += [f"{old}:={new}" for old, new in (*context.remappings, *own)]
+        given = [f"{one}:={_yaml(value)}" for one, value in context.parameters]
+        files = [*context.parameter_files]
+        texts = [[os.path.basename(path), _read(path)] for path in files]
+        target = f"{namespace.rstrip('/')}/{name}" if name else "/**"
+        for entry in self.parameters:
+            texts += self._parameters(entry, target, context)
+        ros = [part for rule in rules for part in ("-r", rule)] + [part for one in given for part in ("-p", one)]
+        context.nodes.append(
+            {
+                "package": text_of(self.package, context) if self.package is not None else "",
+                "executable": text_of(self.executable, context),
+                "arguments": [text_of(one, context) for one in self.arguments],
+                "ros_arguments": [*ros, *(text_of(one, context) for one in self.ros_arguments)],
+                "parameter_files": texts,
+                "delay_s": context.delay_s,
+                "file": self.file,
+                "line": self.line,
+            }
+        )
+        return ()
+
+    def _parameters(self, entry: Any, target: str, context: Context) -> list[list[str]]:
+        """Return the name and text of the parameter file for an entry of `parameters`."""
+        if isinstance(entry, Mapping):
+            values = dict(_flat(entry, context))
+        elif isinstance(entry, Parameter):
+            values = {text_of(entry.name, context): _evaluated(entry.value, context)}
+        else:
+            path = text_of(entry.path if isinstance(entry, ParameterFile) else entry, context)
+            if not os.path.isfile(path):  # as launch_ros does, with a warning
+                context.leave_out(self, f"the parameter file {os.path.basename(path)[:80]}, which is not there")
+                return []
+            return [[os.path.basename(path), _read(path)]]
+        body = ", ".join(f"{json.dumps(name)}: {_yaml(value)}" for name, value in values.items())
+        return [["parameters", f"{json.dumps(target)}: {{ros__parameters: {{{body}}}}}\n"]]
+
+
+class LifecycleNode(Node):
+    """A lifecycle node, which stays unconfigured."""
+
+    def __init__(self, *, name: Any, namespace: Any, **more: Any) -> None:
+        super().__init__(name=name, namespace=namespace, **more)
+
+
+def _read(path: str) -> str:
+    with open(path, encoding="utf-8", errors="replace") as file:
+        return file.read(1 << 20)
+
+
+def _namespace(context: Context, own: str) -> str:
+    """Return the namespace of a node: its own below those that were pushed; empty if there is none."""
+    whole = ""
+    for part in (*context.namespaces, own):
+        if part:
+            whole = part if part.startswith("/") else f"{whole.rstrip('/')}/{part}"
+    return whole
+
+
+def _flat(parameters: Mapping[Any, Any], context: Context, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in parameters.items():
+        name = prefix + text_of(key, context)
+        if isinstance(value, Mapping):
+            yield from _flat(value, context, f"{name}.")
+        else:
+            yield name, _evaluated(value, context)
+
+
+def _evaluated(value: Any, context: Context) -> Any:  # noqa: PLR0911 - one for each kind of value
+    """Return the value of a parameter; the text of a substitution is read as YAML, as launch_ros does."""
+    if isinstance(value, ParameterValue):
+        inner = value.value
+        text = text_of(inner, context) if isinstance(inner, (str, Substitution)) else None
+        if text is None or value.type is None:
+            return _evaluated(inner, context)
+        return text if value.type is str else value.type(_loaded(text)) if value.type in (int, float) else _loaded(text)
+    if isinstance(value, Substitution):
+        return _loaded(value.perform(context))
+    if isinstance(value, (list, tuple)) and any(isinstance(item, Substitution) for item in value):
+        if all(isinstance(item, (str, Substitution)) for item in value):
+            return _loaded(text_of(value, context))
+        return [_evaluated(item, context) for item in value]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _loaded(text: str) -> Any:
+    import yaml  # type: ignore[import-untyped]  # comes with rclpy
+
+    return yaml.safe_load(text)
+
+
+def _yaml(value: Any) -> str:
+    """Return a value as YAML that rcl reads with the same type."""
+    if isinstance(value, bool):
+        return _word(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, list):
+        if {type(item) for item in value} == {int, float}:
+            value = [float(item) for item in value]
+        return f"[{', '.join(_yaml(item) for item in value)}]"
+    raise TypeError(f"expected the value of a parameter, found {type(value).__name__}")
+
+
+class _Setting(Action):
+    """An action that sets something for the actions after it, in the same scope."""
+
+    def __init__(self, *parts: Any, **more: Any) -> None:
+        known = {name: value for name, value in more.items() if name != "condition"}
+        super().__init__(condition=more.get("condition"))
+        self.parts = (*parts, *known.values())
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Set it."""
+        self.put(context, *self.parts)
+        return ()
+
+    @staticmethod
+    def put(context: Context, *parts: Any) -> None:
+        """Set it."""
+        raise NotImplementedError
+
+
+def _setting(name: str, put: Callable[..., Any]) -> type[Action]:
+    return type(name, (_Setting,), {"put": staticmethod(put), "__doc__": f"The action {name}."})
+
+
+def _push_namespace(context: Context, namespace: Any) -> None:
+    context.namespaces.append(text_of(namespace, context))
+
+
+def _set_parameters(context: Context, path: Any, *_: Any) -> None:
+    context.parameter_files.append(text_of(path, context))
+
+
+def _set_environment(context: Context, name: Any, value: Any = "", *_: Any) -> None:
+    variable = text_of(name, context)
+    context.environment[variable] = text_of(value, context)
+    if not variable.startswith(("RCUTILS_", "PYTHONUNBUFFERED")):  # these only change how logs look
+        raise LeftOutError(f"the environment variable {variable[:80]}")
+
+
+class ExecuteProcess(Action):
+    """A command; only `ros2 run` is understood."""
+
+    def __init__(self, *, cmd: Any, condition: Any = None, **_: Any) -> None:
+        super().__init__(condition=condition)
+        self.command = list(cmd)
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Describe the node of `ros2 run`, or leave the command out."""
+        words = [text_of(part, context) for part in self.command]
+        words = words[0].split() + words[1:] if words else []
+        if words[:2] != ["ros2", "run"] or len(words) < 4:
+            raise LeftOutError(f"ExecuteProcess: {' '.join(words)[:80]}")
+        split = words.index("--ros-args") if "--ros-args" in words else len(words)
+        node = Node(package=words[2], executable=words[3], arguments=words[4:split], ros_arguments=words[split + 1 :])
+        node.file, node.line = self.file, self.line
+        return [node]
+
+
+class Unknown(Action):
+    """Something of launch that is not evaluated."""
+
+    def __init__(self, *parts: Any, **more: Any) -> None:
+        super().__init__(condition=more.get("condition"))
+        self.parts, self.more = parts, more
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Leave it out."""
+        raise LeftOutError(type(self).__name__)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return self
+
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        """Return the same."""
+        return self
+
+
+def unknown(name: str) -> type[Unknown]:
+    """Return a class of this name that is not evaluated."""
+    return type(name, (Unknown,), {"__doc__": "Not evaluated."})
+
+
+def walk(entities: Iterable[Any], context: Context) -> None:
+    """Visit actions in order; raises what a launch file's own code raises."""
+    for entity in entities:
+        if isinstance(entity, LaunchDescription):
+            walk(entity.entities, context)
+            continue
+        if not isinstance(entity, Action):
+            raise TypeError(f"expected an action in the launch description, found {type(entity).__name__}")
+        try:
+            if entity.condition is None or entity.condition.evaluate(context):
+                walk(entity.visit(context), context)
+        except LeftOutError as error:
+            context.leave_out(entity, str(error))
+
+
+def described_by(path: str) -> LaunchDescription:
+    """Run a launch file and return what its `generate_launch_description` returns."""
+    with open(path, "rb") as source:
+        code = compile(source.read(), path, "exec", dont_inherit=True)
+    module = ModuleType("launch_file")
+    module.__file__ = path
+    exec(code, module.__dict__)  # noqa: S102  evaluating the student's file is the purpose
+    make = getattr(module, "generate_launch_description", None)
+    if not callable(make):
+        raise AttributeError(f"{os.path.basename(path)} has no function generate_launch_description()")
+    made = make()
+    if not isinstance(made, LaunchDescription):
+        raise TypeError(f"generate_launch_description() returned {type(made).__name__}, expected a LaunchDescription")
+    return made
+
+
+ACTIONS: dict[str, Any] = {
+    "Action": Action,
+    "DeclareLaunchArgument": DeclareLaunchArgument,
+    "ExecuteProcess": ExecuteProcess,
+    "GroupAction": GroupAction,
+    "IncludeLaunchDescription": IncludeLaunchDescription,
+    "LogInfo": _setting("LogInfo", lambda context, msg: text_of(msg, context)),
+    "OpaqueFunction": OpaqueFunction,
+    "SetEnvironmentVariable": _setting("SetEnvironmentVariable", _set_environment),
+    "SetLaunchConfiguration": SetLaunchConfiguration,
+    "TimerAction": TimerAction,
+}
+ROS_ACTIONS: dict[str, Any] = {
+    "Node": Node,
+    "LifecycleNode": LifecycleNode,
+    "PushRosNamespace": _setting("PushRosNamespace", _push_namespace),
+    "PushROSNamespace": _setting("PushROSNamespace", _push_namespace),
+    "SetParameter": _setting(
+        "SetParameter", lambda context, name, value: context.parameters.append((name, _evaluated(value, context)))
+    ),
+    "SetParametersFromFile": _setting("SetParametersFromFile", _set_parameters),
+    "SetRemap": _setting(
+        "SetRemap", lambda context, old, new: context.remappings.append((text_of(old, context), text_of(new, context)))
+    ),
+    "SetUseSimTime": _setting(
+        "SetUseSimTime", lambda context, value: context.parameters.append(("use_sim_time", bool(value)))
+    ),
+}
+_CONDITIONS: dict[str, Any] = {
+    kind.__name__: kind
+    for kind in (IfCondition, UnlessCondition, LaunchConfigurationEquals, LaunchConfigurationNotEquals)
+}
+_DESCRIPTIONS: dict[str, Any] = {
+    "ParameterValue": ParameterValue,
+    "ParameterFile": ParameterFile,
+    "Parameter": Parameter,
+}
+_SOURCES = {
+    "PythonLaunchDescriptionSource": PythonLaunchDescriptionSource,
+    "AnyLaunchDescriptionSource": PythonLaunchDescriptionSource,
+    "XMLLaunchDescriptionSource": PythonLaunchDescriptionSource,
+    "FrontendLaunchDescriptionSource": PythonLaunchDescriptionSource,
+}
+#: The modules that a launch file imports, with what each of them has.
+MODULES: dict[str, dict[str, Any]] = {
+    "launch": {"LaunchDescription": LaunchDescription, "LaunchContext": Context, "Substitution": Substitution},
+    "launch.actions": ACTIONS,
+    "launch.conditions": _CONDITIONS,
+    "launch.event_handlers": {},
+    "launch.events": {},
+    "launch.launch_description_sources": dict(_SOURCES),
+    "launch.substitutions": SUBSTITUTIONS,
+    "launch.some_substitutions_type": {},
+    "launch_ros": {},
+    "launch_ros.actions": ROS_ACTIONS,
+    "launch_ros.descriptions": _DESCRIPTIONS,
+    "launch_ros.parameter_descriptions": _DESCRIPTIONS,
+    "launch_ros.substitutions": ROS_SUBSTITUTIONS,
+    "launch_ros.events": {},
+    "launch_ros.event_handlers": {},
+    "launch_xml.launch_description_sources": dict(_SOURCES),
+    "launch_xml": {},
+    "launch_yaml.launch_description_sources": {"YAMLLaunchDescriptionSource": PythonLaunchDescriptionSource},
+    "launch_yaml": {},
+    "ament_index_python": {},
+    "ament_index_python.packages": {},
+}
+_TYPE = re.compile(r"[A-Z]\w*")
+
+
+def install(context: Context) -> None:
+    """Put the modules in place of `launch`, `launch_ros` and `ament_index_python`."""
+    from pathlib import Path
+
+    def share(package: str, *_: Any, **__: Any) -> str:
+        return context.share_of(package)
+
+    index = {
+        "get_package_share_directory": share,
+        "get_package_prefix": share,
+        "get_package_share_path": lambda package, *_: Path(context.share_of(package)),
+        "PackageNotFoundError": PackageNotFoundError,
+    }
+    for name, members in MODULES.items():
+        module = sys.modules[name] = ModuleType(name)
+        module.__path__ = []
+        module.__dict__.update(members)
+        module.__dict__["__getattr__"] = _missing(name)
+    for name in MODULES:
+        above, _, last = name.rpartition(".")
+        if above:
+            setattr(sys.modules[above], last, sys.modules[name])
+    for name in ("ament_index_python", "ament_index_python.packages"):
+        sys.modules[name].__dict__.update(index)
+    sys.modules["launch"].__dict__["SomeSubstitutionsType"] = Any
+
+
+def _missing(module: str) -> Callable[[str], Any]:
+    def find(name: str) -> Any:
+        if _TYPE.fullmatch(name):
+            return unknown(name)
+        raise AttributeError(f"module '{module}' has no attribute '{name}'")
+
+    return find
+
+
+def describe(
+    folders: tuple[str, ...], path: str, packages: Mapping[str, str], arguments: Mapping[str, str]
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Evaluate a launch file; raises whatever it raises.
+
+    Args:
+        folders: The submission's folder, and that of the rubric's own files.
+        path: The launch file, in one of them.
+        packages: Name and folder of each ROS package of the submission.
+        arguments: The launch arguments.
+
+    Returns:
+        The nodes, and what was left out, each with `file` and `line`.
+    """
+    global _folders  # noqa: PLW0603  every action needs them, also those that a launch file makes at import
+    _folders = tuple(os.path.join(folder, "") for folder in folders)
+    context = Context(packages, arguments)
+    install(context)
+    context.files.append(path)
+    try:
+        walk(described_by(path).entities, context)
+    except LeftOutError as error:
+        context.left_out.append({"file": os.path.basename(path), "line": 0, "what": str(error)})
+    return context.nodes, context.left_out

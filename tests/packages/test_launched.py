@@ -1,0 +1,155 @@
+"""Packages with launch files and executables, recorded with real nodes: right ones, wrong ones, hostile ones."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from grading import grade_until_decided
+
+from grader.app.request import GradeRequest
+from grader.core.report import ExerciseReport, Outcome
+
+pytestmark = pytest.mark.ros
+
+HERE = Path(__file__).resolve().parent
+WORKSPACE = HERE / "workspace"
+LAUNCH, NODES = "src/robot/launch/robot.launch.py", "src/robot/robot/nodes.py"
+Edit = tuple[str, str, str]
+
+
+@pytest.fixture
+def graded(tmp_path: Path) -> Callable[..., ExerciseReport]:
+    """Grade the workspace with some of its text replaced."""
+
+    def grade(*edits: Edit, rubric: str = "launched.yaml", clock: str = "virtual") -> ExerciseReport:
+        folder = tmp_path / "ws"
+        shutil.copytree(WORKSPACE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+        for name, old, new in edits:
+            file = folder / name
+            text = file.read_text()
+            assert old in text
+            file.write_text(text.replace(old, new))
+        request = GradeRequest(str(folder), rubrics=(HERE / "rubrics" / rubric,), clock=clock)
+        return grade_until_decided(request).exercises[0]
+
+    return grade
+
+
+def line_of(name: str, text: str) -> int:
+    lines = (WORKSPACE / name).read_text().splitlines()
+    return next(number for number, line in enumerate(lines, 1) if text in line)
+
+
+def outcomes(report: ExerciseReport) -> dict[str, str]:
+    return {verdict.id: verdict.outcome.value for verdict in report.verdicts}
+
+
+def test_a_launch_file_starts_its_nodes(graded: Callable[..., ExerciseReport]) -> None:
+    """Parameters of a file and inline, arguments, a remapping, a namespace, an included file, a condition."""
+    report = graded()
+    assert set(outcomes(report).values()) == {"met"}, report
+    notes = "\n".join(report.notes)
+    assert f"{NODES}: run as `ros2 run` does: the entry point robot.nodes:talk with --ros-args" in notes
+    listener = "src/robot/launch/listener.launch.py"
+    assert f"by {listener}:{line_of(listener, 'Node(')}" in notes
+    assert {start.process for start in report.starts} == {"robot.launch.py"}
+
+
+def test_the_wall_clock_starts_the_same(graded: Callable[..., ExerciseReport]) -> None:
+    """The same command lines, in real time."""
+    assert set(outcomes(graded(clock="wall")).values()) == {"met"}
+
+
+def test_a_wrong_launch_file_loses_what_is_wrong(graded: Callable[..., ExerciseReport]) -> None:
+    """Here the namespace and the parameter file."""
+    report = graded(
+        (LAUNCH, 'PushRosNamespace("ears"),', ""), (LAUNCH, 'os.path.join(share, "config", "talker.yaml"), ', "")
+    )
+    expected = {"rate": "met", "prefix": "not_met", "heard": "not_met", "names": "met", "faster": "met"}
+    assert outcomes(report) == expected
+
+
+def test_an_executable_that_is_not_there_is_a_fault(graded: Callable[..., ExerciseReport]) -> None:
+    """With the line of the node, and what the package has."""
+    report = graded((LAUNCH, 'executable="talker"', 'executable="talk"'))
+    assert set(outcomes(report).values()) <= {"not_met", "blocked"}
+    (fault,) = report.faults
+    assert (fault.file, fault.line) == (LAUNCH, line_of(LAUNCH, "        Node("))
+    assert "executable 'talk' not found; its entry points are talker, listener" in fault.text
+
+
+def test_what_is_left_out_costs_no_points(graded: Callable[..., ExerciseReport]) -> None:
+    """What is not met is undecided, because what was left out may be why; a viewer changes nothing."""
+    node = 'Node(package="turtle_sim", executable="node"),'
+    viewer = 'Node(package="rviz2", executable="rviz2"),'
+    report = graded(
+        (LAUNCH, "        Node(\n", f"        {viewer}\n        {node}\n        Node(\n"), (NODES, ".upper()", "")
+    )
+    assert set(outcomes(report).values()) == {"met"}
+    line = line_of(LAUNCH, "        Node(") + 1
+    left_out = f"{LAUNCH}:{line}: turtle_sim/node was not started: the submission has no package turtle_sim"
+    assert left_out in report.notes
+    assert any("rviz2/rviz2 was not started" in note for note in report.notes)
+    report = graded((LAUNCH, 'name="speaker",', ""), (LAUNCH, "        Node(\n", f"        {node}\n        Node(\n"))
+    verdict = next(verdict for verdict in report.verdicts if verdict.id == "names")
+    assert verdict.outcome is Outcome.UNDECIDED
+    assert "turtle_sim/node was not started" in verdict.reason
+
+
+HOSTILE = {
+    "exits": ("import sys; sys.exit(0)", "SystemExit"),
+    "exits_hard": ("import os; os._exit(0)", "ended while it was evaluated"),
+    "raises": ("raise ValueError('no')", "ValueError: no"),
+    "kills": ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "ended while it was evaluated"),
+    "forks": (
+        "import os\n    for _ in range(5000):\n        try:\n            os.fork()\n        except OSError:\n            "
+        "os._exit(3)",
+        "ended while it was evaluated",
+    ),
+    "no_description": ("return None", "TypeError"),
+    "no_node": ("return LaunchDescription([])", "describes no node"),
+}
+
+
+@pytest.mark.parametrize(("harm", "said"), HOSTILE.values(), ids=HOSTILE)
+def test_a_launch_file_that_does_harm_is_a_fault(graded: Callable[..., ExerciseReport], harm: str, said: str) -> None:
+    """It ends in its sandbox, and costs what it describes nothing of."""
+    report = graded((LAUNCH, '    share = get_package_share_directory("robot")\n', f"    {harm}\n    share = ''\n"))
+    assert set(outcomes(report).values()) <= {"not_met", "blocked"}, report
+    assert any(said in fault.text for fault in report.faults), report.faults
+
+
+def test_a_forged_description_starts_nothing_but_the_submission(graded: Callable[..., ExerciseReport]) -> None:
+    """Whatever a launch file writes to its connection only names programs, and every field of it is checked."""
+    forged = '{"kind": "launched", "nodes": [{"package": "", "executable": "../../../bin/sh", "line": []}, 5, null]}'
+    harm = (
+        f"import os\n    for n in range(3, 50):\n        try:\n            os.write(n, {forged!r}.encode() + b'\\n')\n"
+    )
+    harm += '        except OSError:\n            pass\n    print(\'{"kind": "exited"}\')'
+    report = graded((LAUNCH, '    share = get_package_share_directory("robot")\n', f"    {harm}\n    share = ''\n"))
+    assert set(outcomes(report).values()) <= {"not_met", "undecided"}
+    assert not report.starts
+
+
+@pytest.mark.long
+def test_an_endless_launch_file_is_ended(graded: Callable[..., ExerciseReport]) -> None:
+    """By its processor time."""
+    report = graded((LAUNCH, '    share = get_package_share_directory("robot")\n', "    while True: pass\n"))
+    assert set(outcomes(report).values()) <= {"not_met", "blocked"}
+    assert "did not return within 10 s of processor time" in report.faults[0].text
+
+
+def test_executables_are_found_by_their_names(graded: Callable[..., ExerciseReport]) -> None:
+    """Two of one module, each by its own entry point."""
+    assert set(outcomes(graded(rubric="installed.yaml")).values()) == {"met"}
+
+
+def test_a_launch_file_of_the_rubric_starts_what_was_handed_in() -> None:
+    """Two loose files, each by its name; what they log is told apart."""
+    request = GradeRequest(str(HERE / "loose"), rubrics=(HERE / "rubrics" / "provided.yaml",), clock="virtual")
+    report = grade_until_decided(request).exercises[0]
+    assert outcomes(report) == {"rate": "met", "heard": "met", "frame": "met"}, report
+    assert {start.process for start in report.starts} == {"talker.py", "hearer.py"}

@@ -1,0 +1,5 @@
+"""What the talker says."""
+
+
+def word(number):
+    return f"word {number}"

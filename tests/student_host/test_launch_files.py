@@ -1,0 +1,191 @@
+"""What a launch file describes: nodes with all they are started with, and what only ROS itself could do."""
+
+from __future__ import annotations
+
+import sys
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import pytest
+
+from grader.student_host.launch_files import describe
+
+IMPORTS = """
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import *
+from launch.actions import (DeclareLaunchArgument, ExecuteProcess, GroupAction, IncludeLaunchDescription, LogInfo,
+    OpaqueFunction, SetEnvironmentVariable, SetLaunchConfiguration, TimerAction, RegisterEventHandler, EmitEvent)
+from launch.conditions import IfCondition, UnlessCondition, LaunchConfigurationEquals
+from launch.event_handlers import OnProcessExit
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import (Command, EnvironmentVariable, LaunchConfiguration, PathJoinSubstitution,
+    PythonExpression, TextSubstitution, ThisLaunchFileDir)
+from launch_ros.actions import (ComposableNodeContainer, LifecycleNode, Node, PushRosNamespace, SetParameter, SetRemap)
+from launch_ros.parameter_descriptions import ParameterFile, ParameterValue
+from launch_ros.substitutions import FindPackageShare
+TALKER = dict(package="robot", executable="talker")
+"""
+Described = tuple[list[dict[str, Any]], list[dict[str, Any]]]
+
+
+@pytest.fixture
+def described(tmp_path: Path) -> Callable[..., Described]:
+    """Evaluate a launch file with these actions."""
+
+    def evaluate(actions: str, arguments: dict[str, str] | None = None, **others: str) -> Described:
+        robot = tmp_path / "robot"
+        (robot / "launch").mkdir(parents=True, exist_ok=True)
+        (robot / "own.yaml").write_text("/**: {ros__parameters: {rate: 2.0}}\n")
+        body = textwrap.indent(f"return LaunchDescription([{actions}])", "    ")
+        file = robot / "launch" / "a.launch.py"
+        file.write_text(f"{IMPORTS}\ndef generate_launch_description():\n{body}\n")
+        for name, text in others.items():
+            (robot / "launch" / f"{name}.launch.py").write_text(f"{IMPORTS}\n{text}")
+        with patch.dict(sys.modules):
+            return describe((str(tmp_path),), str(file), {"robot": str(robot)}, arguments or {})
+
+    return evaluate
+
+
+def ros(nodes: list[dict[str, Any]]) -> list[list[str]]:
+    return [node["ros_arguments"] for node in nodes]
+
+
+def test_a_node_has_everything_it_is_started_with(described: Callable[..., Described]) -> None:
+    """Names, remappings, arguments, and the place where it was written."""
+    nodes, left_out = described(
+        "Node(**TALKER, name='a', namespace='b', remappings=[('x', '/y')], arguments=['go'], "
+        "ros_arguments=['--log-level', 'debug'], output='screen', emulate_tty=True)"
+    )
+    assert left_out == []
+    (node,) = nodes
+    rules = ["-r", "__node:=a", "-r", "__ns:=/b", "-r", "x:=/y"]
+    assert node["ros_arguments"] == [*rules, "--log-level", "debug"]
+    assert (node["package"], node["executable"], node["arguments"]) == ("robot", "talker", ["go"])
+    assert (node["file"], node["delay_s"]) == ("robot/launch/a.launch.py", 0.0)
+    assert node["line"] == IMPORTS.count("\n") + 3
+
+
+PARAMETERS = {
+    "{'a': 1, 'b': 2.0, 'c': 'x', 'd': True}": '{"a": 1, "b": 2.0, "c": "x", "d": true}',
+    "{'pid': {'kp': 1.5, 'on': [1, 2.5]}, 'w': ['a', 'b']}": '{"pid.kp": 1.5, "pid.on": [1.0, 2.5], "w": ["a", "b"]}',
+    "{'n': LaunchConfiguration('n')}": '{"n": 5}',
+    "{'n': ParameterValue(LaunchConfiguration('n'), value_type=str)}": '{"n": "5"}',
+    "{'n': ParameterValue(LaunchConfiguration('n'), value_type=float)}": '{"n": 5.0}',
+    "{'n': '5'}": '{"n": "5"}',
+    "{'n': PythonExpression(['2 * ', LaunchConfiguration('n')])}": '{"n": 10}',
+    "{'n': [LaunchConfiguration('n'), '.5']}": '{"n": 5.5}',
+}
+
+
+@pytest.mark.parametrize(("given", "expected"), PARAMETERS.items(), ids=PARAMETERS)
+def test_parameters_keep_their_types(described: Callable[..., Described], given: str, expected: str) -> None:
+    """A text stays a text, and the text of a substitution is read as YAML, as launch_ros does."""
+    nodes, _ = described(f"DeclareLaunchArgument('n', default_value='5'), Node(**TALKER, parameters=[{given}])")
+    assert nodes[0]["parameter_files"] == [["parameters", f'"/**": {{ros__parameters: {expected}}}\n']]
+
+
+def test_parameter_files_and_values_keep_their_order(described: Callable[..., Described]) -> None:
+    """Values of a named node are for that node alone, so that they win over a file's."""
+    share = "get_package_share_directory('robot')"
+    nodes, left_out = described(
+        f"Node(**TALKER, name='a', namespace='/n', parameters=[{share} + '/own.yaml', {{'rate': 3.0}}]), "
+        "Node(**TALKER, parameters=[ParameterFile(PathJoinSubstitution([FindPackageShare('robot'), 'no.yaml']))])"
+    )
+    assert nodes[0]["parameter_files"] == [
+        ["own.yaml", "/**: {ros__parameters: {rate: 2.0}}\n"],
+        ["parameters", '"/n/a": {ros__parameters: {"rate": 3.0}}\n'],
+    ]
+    assert nodes[1]["parameter_files"] == []
+    assert [one["what"] for one in left_out] == ["the parameter file no.yaml, which is not there"]
+
+
+def test_groups_have_a_scope(described: Callable[..., Described]) -> None:
+    """Namespaces add up inside, and nothing of it is left outside; remappings and parameters likewise."""
+    nodes, _ = described(
+        "GroupAction([PushRosNamespace('a'), SetParameter('x', 1), SetRemap('p', 'q'), "
+        "  GroupAction([PushRosNamespace('b'), Node(**TALKER, namespace='c'), Node(**TALKER, namespace='/d')]),"
+        "  Node(**TALKER)]), Node(**TALKER)"
+    )
+    more = ["-r", "p:=q", "-p", "x:=1"]
+    names = ["/a/b/c", "/d", "/a"]
+    assert ros(nodes) == [*(["-r", f"__ns:={name}", *more] for name in names), []]
+
+
+@pytest.mark.parametrize(("arguments", "started"), [({}, ["yes"]), ({"go": "false"}, ["no"]), ({"go": "1"}, ["yes"])])
+def test_conditions_choose(described: Callable[..., Described], arguments: dict[str, str], started: list[str]) -> None:
+    """By an argument, whose default counts if it is not given."""
+    go = "LaunchConfiguration('go')"
+    nodes, _ = described(
+        f"DeclareLaunchArgument('go', default_value='true'), Node(**TALKER, name='yes', condition=IfCondition({go})),"
+        f"Node(**TALKER, name='no', condition=UnlessCondition({go}))",
+        arguments,
+    )
+    assert [rules[1] for rules in ros(nodes)] == [f"__node:={name}" for name in started]
+
+
+def test_included_files_get_arguments(described: Callable[..., Described]) -> None:
+    """Beside the file, or found by the package; a function's actions and later ones are described too."""
+    part = "def generate_launch_description():\n    return LaunchDescription([DeclareLaunchArgument('name'), "
+    part += "Node(**TALKER, name=LaunchConfiguration('name'))])\n"
+    nodes, _ = described(
+        "IncludeLaunchDescription(PythonLaunchDescriptionSource([ThisLaunchFileDir(), '/part.launch.py']), "
+        "  launch_arguments={'name': 'one'}.items()), "
+        "TimerAction(period=2.0, actions=[OpaqueFunction(function=lambda context: [Node(**TALKER, "
+        "  name=LaunchConfiguration('name').perform(context) + '_more')])]),"
+        "ExecuteProcess(cmd=['ros2', 'run', 'robot', 'talker', 'hi', '--ros-args', '-r', 'a:=b'])",
+        part=part,
+    )
+    assert [rules[1] for rules in ros(nodes)] == ["__node:=one", "__node:=one_more", "a:=b"]
+    assert [node["delay_s"] for node in nodes] == [0.0, 2.0, 0.0]
+    assert nodes[2]["arguments"] == ["hi"]
+
+
+LEFT_OUT = {
+    "ExecuteProcess(cmd=['rm', '-rf', '/'])": "ExecuteProcess: rm -rf /",
+    "RegisterEventHandler(OnProcessExit(target_action=None, on_exit=[]))": "RegisterEventHandler",
+    "ComposableNodeContainer(name='c', namespace='')": "ComposableNodeContainer",
+    "Node(**TALKER, parameters=[{'urdf': Command(['xacro ', 'a.urdf'])}])": "Command(xacro a.urdf)",
+    "SetEnvironmentVariable('PATH', '/x')": "the environment variable PATH",
+    "Node(**TALKER, prefix='gdb')": "prefix= of a node",
+    "IncludeLaunchDescription('more.launch.xml')": "the launch file more.launch.xml: only Python launch files are "
+    "evaluated",
+    "LogInfo(msg=FindPackageShare('gazebo_ros'))": "the package gazebo_ros, which is not in the submission",
+}
+
+
+@pytest.mark.parametrize(("action", "what"), LEFT_OUT.items(), ids=LEFT_OUT)
+def test_what_only_ros_can_do_is_named(described: Callable[..., Described], action: str, what: str) -> None:
+    """With its line; everything else of the file is described all the same."""
+    nodes, left_out = described(f"{action}, Node(**TALKER, name='after')")
+    assert "__node:=after" in nodes[-1]["ros_arguments"]
+    line = IMPORTS.count("\n") + 3
+    assert left_out == [{"file": "robot/launch/a.launch.py", "line": line, "what": what}]
+
+
+INCLUDES_ITSELF = "IncludeLaunchDescription(PythonLaunchDescriptionSource([ThisLaunchFileDir(), '/a.launch.py']))"
+WRONG = {
+    "Node(**TALKER, nam='a')": "TypeError",
+    "Node(package='robot')": "TypeError",
+    "LaunchConfiguration('x')": "TypeError",
+    "Node(**TALKER, name=LaunchConfiguration('x'))": "SubstitutionFailure",
+    "DeclareLaunchArgument('x')": "RuntimeError",
+    "DeclareLaunchArgument('x', default_value=5)": "TypeError",
+    "DeclareLaunchArgument('x', default_value='5', choices=['6'])": "RuntimeError",
+    "Node(**TALKER, condition=IfCondition('maybe'))": "ValueError",
+    "LogInfo(msg=get_package_share_directory('robots'))": "PackageNotFoundError",
+    "Node(**TALKER, parameters=[{'a': object()}])": "TypeError",
+    INCLUDES_ITSELF: "RecursionError",
+}
+
+
+@pytest.mark.parametrize(("action", "error"), WRONG.items(), ids=WRONG)
+def test_a_mistake_raises_what_ros_raises(described: Callable[..., Described], action: str, error: str) -> None:
+    """The student's own mistake becomes a fault of the launch file, as a node's exception does."""
+    with pytest.raises(Exception, match=r"\S") as raised:
+        described(action)
+    assert type(raised.value).__name__ == error
