@@ -30,6 +30,9 @@ EPOCH_NS = 1_767_225_600_000_000_000
 STEPS = 400_000
 #: The host never sends more reports before it waits or ends, and never reports more endpoints and parameters.
 MOST_REPORTS, CLAIMS = 10_000, 1_000
+#: Nodes may take messages so often without resting in between. After HOPS, each time also takes as long as a message
+#: needs between two processes; after MOST_HOPS they answer each other without end, and the run is over.
+HOPS, HOP_NS, MOST_HOPS = 200, 250_000, 4_000
 #: Reasons for recording on the wall clock.
 THREADS = "the node's threads wait for each other without blocking"
 OUTSIDE = "the node waits for something that is neither ROS nor time"
@@ -48,6 +51,7 @@ class VirtualRunner(Runner):
         self._now_ns = 0
         self._free_until_ns = 0
         self._steps = 0
+        self._hops = 0
         self._discovery = Discovery(students, observer, self._recorder, self._services, self._mark_dead)
         self._topics = VirtualTopicPeers(students, observer, self._recorder, self._discovery)
 
@@ -102,6 +106,7 @@ class VirtualRunner(Runner):
             if student is not None:
                 self._step(student)
             elif not self._due or self._due[0].t_ns > self._now_ns:
+                self._hops = 0
                 return
 
     def _next_student(self) -> NodeProcess | None:
@@ -117,6 +122,8 @@ class VirtualRunner(Runner):
     def _step(self, student: NodeProcess) -> None:
         """Let one process run: send it the time and the messages on their way, and handle its reports."""
         arrivals, student.arrivals, student.nudged = student.arrivals, {}, False
+        if arrivals:
+            self._count_hop()
         if self._starts_ns.pop(student.name, 0):
             self._recorder.add(Mark(self._now_ns, "process_starts", student.name))
         self._free_until_ns = self._quiet_until(student)
@@ -131,11 +138,20 @@ class VirtualRunner(Runner):
         self._steps += 1
         hopeless_now = self._plan.stop_when_unfit and hopeless(self._students) and self._unfit()
         # A flood is wrong on every clock. It runs until its limit, which is the same on every machine.
-        if hopeless_now and not self._recorder.floods(self._now_ns):
+        floods = self._hops > HOPS or self._recorder.floods(self._now_ns)
+        if hopeless_now and not floods:
             self._end_ns = self._now_ns
         if self._steps >= STEPS:
             self._recorder.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
         self._end_if_full(self._now_ns)
+
+    def _count_hop(self) -> None:
+        """Note that a process takes messages, which takes time if the nodes have not rested for long."""
+        self._hops += 1
+        if self._hops > HOPS:
+            self._now_ns = min(self._now_ns + HOP_NS, self._end_ns)
+        if self._hops > MOST_HOPS:
+            self._recorder.stop(self._now_ns, f"the nodes answered each other {MOST_HOPS:,} times without a rest")
 
     def _quiet_until(self, student: NodeProcess) -> int:
         """Return the next moment at which a stimulus or any other process is due."""

@@ -36,6 +36,7 @@ from grader.execution.observer import Observer
 from grader.execution.plan import PlannedRecording
 from grader.execution.student_process import NodeProcess
 from grader.execution.virtual_runner import VirtualRunner
+from grader.execution.workload import HOPELESS_NS
 from grader.student_host import clock as host_clock
 
 
@@ -264,6 +265,40 @@ def test_too_many_wake_ups_end_the_run_with_a_mark(monkeypatch: pytest.MonkeyPat
             yield idle(0)
 
     assert Run(restless).seen() == ["0 limit more than 50 wake-ups: the rest was not looked at"]
+
+
+def player(mine: str, theirs: str, *, serves: bool = False, last: int = 1_000, cost_ns: int = 0) -> Behaviour:
+    """A program that answers each message at once, up to a last number; one of two begins at 10 ms."""
+
+    def program(me: ScriptedStudent, world: World) -> Program:
+        ends = world.have(me.name, claim("publisher", mine), claim("subscription", theirs))
+        yield from wait(10 if serves else None, endpoints=ends)
+        for count in range(last):
+            world.publish(mine, count)
+            yield from wait(None, sent={f"topic {mine}": 1}, cost_ns=cost_ns)
+        yield idle(None)
+
+    return program
+
+
+def test_nodes_that_answer_each_other_without_end_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After some messages at one instant each takes time, and after many more the run ends, however busy a node is."""
+    monkeypatch.setattr(module, "HOPS", 4)
+    monkeypatch.setattr(module, "MOST_HOPS", 8)
+    slow = player("/a", "/b", serves=True, cost_ns=HOPELESS_NS // 3)
+    run = Run(slow, player("/b", "/a"), stop_when_unfit=True)
+    assert [m.t_ns / MS for m in run.trace.messages()] == [10, 10, 10, 10, 10, 10.25, 10.5, 10.75, 11]
+    said = "the nodes answered each other 8 times without a rest: the rest was not looked at"
+    assert run.seen(Message) == [f"11.25 limit {said}"]
+    assert not run.trace.clock_reason
+
+
+def test_nodes_may_answer_each_other_for_a_while_at_one_instant(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rest begins the count again."""
+    monkeypatch.setattr(module, "HOPS", 4)
+    run = Run(player("/a", "/b", serves=True, last=3), player("/b", "/a", last=2))
+    assert [m.t_ns / MS for m in run.trace.messages()] == [10] * 5
+    assert run.seen(Message) == []
 
 
 def test_a_process_that_talks_without_waiting_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
