@@ -24,6 +24,7 @@ from grader.core.scenario import (
     Scenario,
     ServiceCalls,
     ServiceServer,
+    Simulated,
     SomeOf,
     Stimulus,
     Time,
@@ -160,7 +161,7 @@ def _situation(scenario: Scenario) -> str:
     return "; ".join([text, *map(_stimulus, scenario.stimuli)])
 
 
-def _stimulus(stimulus: Stimulus) -> str:
+def _stimulus(stimulus: Stimulus) -> str:  # noqa: PLR0911  one for each kind
     if isinstance(stimulus, NumberStream):
         pace = f"one every {duration(stimulus.period_ns)}, each value for {_time(stimulus.hold_ns)}"
         return f"the grader publishes {_cases(stimulus.values, 'values')} on {stimulus.topic}, {pace}"
@@ -179,6 +180,8 @@ def _stimulus(stimulus: Stimulus) -> str:
     if isinstance(stimulus, ActionGoal):
         then = f", and cancels it {duration(stimulus.cancel_after_ns)} later" if stimulus.cancel_after_ns else ""
         return f"a client of the grader's sends {stimulus.action} a goal at {_time(stimulus.start_ns)}{then}"
+    if isinstance(stimulus, Simulated):
+        return f"the simulation {stimulus.name} reacts to what is published"
     played = f"from {_time(stimulus.start_ns)} on for {_time(stimulus.duration_ns)}"
     return f"the grader plays recorded odometry on {stimulus.topic}, {played}"
 

@@ -245,7 +245,21 @@ class ActionGoal:
     cancel_after_ns: TimeOrNever = 0  # time from the acceptance of the goal to the request to cancel it; 0 for never
 
 
-Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | ServiceCalls | ActionGoal
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """A stimulus: a participant that reacts to what the student's nodes publish, such as a simulated robot.
+
+    It exists from the beginning to the end of the observation.
+    """
+
+    name: str  # one of the built-in simulations, or one in the table of the file
+    parameters: Fields = field(hash=False)  # its parameters; those left out keep their defaults
+    path: str = ""  # the author's file with its class, for messages; empty for a built-in one
+    content: bytes = b""  # the text of that file
+    start_ns: int = 0
+
+
+Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | ServiceCalls | ActionGoal | Simulated
 
 
 def longest_course_ns(stimulus: Stimulus) -> int:

@@ -22,6 +22,7 @@ from grader.core.scenario import (
     MessageStream,
     ServiceCalls,
     ServiceServer,
+    Simulated,
     SomeOf,
     Time,
     TimeBetween,
@@ -143,6 +144,17 @@ class PlannedGoal:
     uuid: tuple[int, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class PlannedSimulation:
+    """A simulation with every parameter drawn, and the seed of its noise; see `grader.core.scenario.Simulated`."""
+
+    name: str
+    path: str
+    content: bytes
+    parameters: Fields
+    seed: int
+
+
 def goal_call(goal: PlannedGoal) -> PlannedCall:
     """Return the request that sends a goal, with the requests that follow: for its result, and perhaps to cancel it."""
     name, identity = f"{goal.action}/_action", {"uuid": list(goal.uuid)}
@@ -194,6 +206,12 @@ def plan_goal(goal: ActionGoal, draw: random.Random) -> PlannedGoal:
     """Draw every field of a goal."""
     start_ns, asked = drawn_time(goal.start_ns, draw), drawn_fields(goal.goal, draw)
     return _planned(PlannedGoal, goal, start_ns=start_ns, goal=asked, uuid=tuple(draw.randbytes(16)))
+
+
+def plan_simulation(simulated: Simulated, draw: random.Random) -> PlannedSimulation:
+    """Draw every parameter of a simulation, and the seed of its noise."""
+    parameters = drawn_fields(simulated.parameters, draw)
+    return _planned(PlannedSimulation, simulated, parameters=parameters, seed=draw.getrandbits(48))
 
 
 def _planned(kind: Callable[..., Planned], stimulus: Any, **drawn: Any) -> Planned:

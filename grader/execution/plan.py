@@ -23,6 +23,7 @@ from grader.core.scenario import (
     Scenario,
     ServiceCalls,
     ServiceServer,
+    Simulated,
     TimeBetween,
     is_launch_file,
     shortest,
@@ -35,12 +36,14 @@ from grader.execution.exchanges import (
     PlannedGoal,
     PlannedMessages,
     PlannedServer,
+    PlannedSimulation,
     drawn_time,
     in_drawn_order,
     plan_calls,
     plan_goal,
     plan_messages,
     plan_server,
+    plan_simulation,
 )
 
 #: A number to publish, or the limit it lies just above (1) or just below (-1) in the student's own type.
@@ -125,6 +128,7 @@ class Plan:
         servers: Service servers.
         calls: Service calls.
         goals: Action goals.
+        simulations: Participants that react.
         starts_ns: Name and start time of the processes that start late.
         may_exit: Names of the processes that may exit.
         shutdown_ns: How long processes may take to end after the stop signal; 0 to send none.
@@ -151,6 +155,7 @@ class Plan:
     servers: tuple[PlannedServer, ...] = ()
     calls: tuple[PlannedCalls, ...] = ()
     goals: tuple[PlannedGoal, ...] = ()
+    simulations: tuple[PlannedSimulation, ...] = ()
     starts_ns: tuple[tuple[str, int], ...] = ()
     may_exit: tuple[str, ...] = ()
     shutdown_ns: int = 0
@@ -206,6 +211,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         servers=tuple(plan_server(s, source) for s, source in drawn if isinstance(s, ServiceServer)),
         calls=tuple(plan_calls(s, source) for s, source in drawn if isinstance(s, ServiceCalls)),
         goals=tuple(plan_goal(s, source) for s, source in drawn if isinstance(s, ActionGoal)),
+        simulations=tuple(plan_simulation(s, source) for s, source in drawn if isinstance(s, Simulated)),
         starts_ns=tuple((name, drawn_time(t_ns, course)) for name, t_ns in scenario.starts_ns),
         may_exit=scenario.may_exit,
         shutdown_ns=scenario.shutdown_ns,

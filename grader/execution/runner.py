@@ -13,6 +13,7 @@ from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer, Taken
 from grader.execution.plan import Plan
 from grader.execution.service_peers import ServicePeers
+from grader.execution.simulations import Simulations
 from grader.execution.stimuli import (
     AddClients,
     AddServer,
@@ -20,12 +21,15 @@ from grader.execution.stimuli import (
     Event,
     RemoveServer,
     Respond,
+    Step,
     TopicEvent,
+    in_order,
     schedule,
 )
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import TopicPeers
 from grader.execution.trace_recorder import TraceRecorder
+from grader.simulation.participant import Moment
 
 
 class Runner(ABC):
@@ -49,10 +53,16 @@ class Runner(ABC):
         self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
         self._stop_ns = 0
         self._starts_ns = dict(plan.starts_ns)
-        self._due = schedule(plan)
+        self._simulations = Simulations(plan)
+        self._due = in_order([*schedule(plan), *self._simulations.events()])
         self._recorder = TraceRecorder(plan.limits)
         self._services = ServicePeers(
-            plan, observer.services, self._recorder, nodes=lambda: self._recorder.graph.nodes, later=self._later
+            plan,
+            observer.services,
+            self._recorder,
+            nodes=lambda: self._recorder.graph.nodes,
+            later=self._later,
+            simulated=lambda now_ns, service, value: self._simulations.answer(service, value, self._moment(now_ns)),
         )
 
     def run(self) -> Trace:
@@ -78,6 +88,10 @@ class Runner(ABC):
     @abstractmethod
     def _time_ns(self) -> int:
         """Return the time of the run, in nanoseconds from its start."""
+
+    @abstractmethod
+    def _clock_ns(self, now_ns: int) -> int:
+        """Return what the clock of a student's node shows at a time of the run, in nanoseconds since 1970."""
 
     @abstractmethod
     def _begin(self) -> None:
@@ -129,13 +143,19 @@ class Runner(ABC):
                 self._recorder.add(never_stopped(student.name, self._end_ns, self._plan.shutdown_ns))
 
     def _finished(self) -> bool:
-        return all(s.ended for s in self._students) and not any(isinstance(d, TopicEvent) for d in self._due)
+        return all(s.ended for s in self._students) and not any(isinstance(d, (TopicEvent, Step)) for d in self._due)
 
     def _record(self, now_ns: int, taken: Taken) -> None:
         first = taken.topic == self._plan.first_message_on and not self._recorder.seen(taken.topic)
         if first and not self._stop_ns:
             self._end_ns = now_ns + self._plan.duration_ns
         self._recorder.message(now_ns, taken)
+        if self._plan.simulations and not (self._recorder.full or self._stop_ns):
+            for event in self._simulations.hear(taken, self._moment(now_ns)):
+                self._later(event)
+
+    def _moment(self, now_ns: int) -> Moment:
+        return Moment(now_ns, self._clock_ns(now_ns))
 
     def _end_if_full(self, now_ns: int) -> None:
         if self._recorder.full:
@@ -154,6 +174,11 @@ class Runner(ABC):
         """Execute one event of a stimulus."""
         if isinstance(event, TopicEvent):
             self._topics.do(event, now_ns)
+        elif isinstance(event, Step):
+            *published, following = self._simulations.step(event, self._moment(event.t_ns))
+            for message in published:
+                self._do(message, now_ns)
+            self._later(following)
         elif isinstance(event, AddServer):
             self._services.add_server(now_ns, event.server)
         elif isinstance(event, RemoveServer):

@@ -28,7 +28,8 @@ class _Served:
 
     plan: PlannedServer
     taken: int = 0
-    unanswered: dict[int, tuple[Any, int]] = field(default_factory=dict)
+    # Header of each open request, and the fields of its response
+    unanswered: dict[int, tuple[Any, Mapping[str, Any]]] = field(default_factory=dict)
 
 
 class ServicePeers:
@@ -40,12 +41,13 @@ class ServicePeers:
         recorder: Records requests and responses.
         nodes: Returns the names of the students' nodes.
         later: Schedules an event.
+        simulated: Returns the response of a simulation to a request at a time; None if none offers the service.
 
     Raises:
         HarnessError: The plan names a type or field that is unknown on this machine.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - all that a server or client can depend on
         self,
         plan: Plan,
         ends: ServiceEnds,
@@ -53,11 +55,13 @@ class ServicePeers:
         *,
         nodes: Callable[[], Sequence[str]],
         later: Callable[[Event], None],
+        simulated: Callable[[int, str, Mapping[str, Any]], Mapping[str, Any] | None] = lambda *_: None,
     ) -> None:
         self._ends = ends
         self._recorder = recorder
         self._nodes = nodes
         self._later = later
+        self._simulated = simulated
         self._message_bytes = plan.limits.message_bytes
         self._servers: dict[str, _Served] = {}
         self._requests: Counter[str] = Counter()
@@ -191,8 +195,11 @@ class ServicePeers:
         plan, number = served.plan, self._numbered(request.service, STUDENT)
         value, size = self._content(request.message)
         self._recorder.exchange(Request(now_ns, plan.service, plan.type, number, STUDENT, 0, value), size)
-        if plan.response(served.taken) is not None:
-            served.unanswered[number] = (request.header, served.taken)
+        known = size <= self._message_bytes
+        response = self._simulated(now_ns, request.service, value) if known else None
+        response = plan.response(served.taken) if response is None else response
+        if response is not None:
+            served.unanswered[number] = (request.header, response)
             self._later(Respond(now_ns + plan.delay_ns, plan, number))
         served.taken += 1
 
@@ -201,9 +208,9 @@ class ServicePeers:
         served = self._servers.get(server.service)
         if served is None or served.plan is not server or number not in served.unanswered:
             return False
-        header, index = served.unanswered.pop(number)
+        header, fields = served.unanswered.pop(number)
         interface = wanted_class(server.type, "srv", server.service)
-        response = built(interface.Response, server.response(index) or {}, server.service)
+        response = built(interface.Response, fields, server.service)
         value = plain_fields(response)
         self._recorder.exchange(Response(now_ns, server.service, server.type, number, GRADER, 0, value), 0)
         self._ends.answer(server.service, header, response)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,6 +110,13 @@ class Ask(Event):
     call: PlannedCall
 
 
+@dataclass(frozen=True, slots=True)
+class Step(Event):
+    """Let time pass for the simulation with a number."""
+
+    number: int
+
+
 #: Events that create an endpoint; at time 0 they come before all others.
 APPEARANCES = (Appear, Advertise, AddServer, AddClients)
 
@@ -132,7 +139,12 @@ def schedule(plan: Plan) -> list[Event]:
         parts = [call, *(following for _, following in call.then)]
         due += [AddClients(goal.start_ns, part.calls) for part in parts]
         due.append(Ask(goal.start_ns, call))
-    return sorted(due, key=lambda d: (d.t_ns, d.t_ns == 0 and not isinstance(d, APPEARANCES)))
+    return in_order(due)
+
+
+def in_order(events: Iterable[Event]) -> list[Event]:
+    """Sort events by time; at time 0, endpoints are created before anything else happens."""
+    return sorted(events, key=lambda e: (e.t_ns, e.t_ns == 0 and not isinstance(e, APPEARANCES)))
 
 
 def _message_events(stream: PlannedMessages) -> Iterator[Event]:

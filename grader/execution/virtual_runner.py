@@ -58,6 +58,9 @@ class VirtualRunner(Runner):
     def _time_ns(self) -> int:
         return self._now_ns
 
+    def _clock_ns(self, now_ns: int) -> int:
+        return EPOCH_NS + now_ns
+
     def _begin(self) -> None:
         self._play(phase="before")
         for student in self._students:

@@ -49,6 +49,9 @@ class WallRunner(Runner):
     def _time_ns(self) -> int:
         return max(self._stop_ns, time.monotonic_ns() - self._started)
 
+    def _clock_ns(self, now_ns: int) -> int:
+        return time.time_ns() - self._time_ns() + now_ns
+
     def _begin(self) -> None:
         """Start the clock and every process that does not start late."""
         self._started = time.monotonic_ns()

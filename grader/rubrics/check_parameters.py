@@ -15,10 +15,16 @@ from pydantic import AfterValidator, Field, create_model
 from pydantic.config import JsonDict
 
 from grader.core.quantities import DurationNs, FieldOf, Hertz, Kind, Least, Unit
+from grader.core.scenario import Simulated
 from grader.rubrics.drawing import (
     Calls,
     CallsOrNever,
     Clients,
+    DrawnNumber,
+    DrawnText,
+    DrawnWhole,
+    DrawnYesNo,
+    Either,
     Fields,
     MessageCases,
     MessageCasesOrNone,
@@ -132,6 +138,58 @@ def _parameters(cls: type) -> type[Shape]:
         accepted = _accepted(hints[field.name], field.name)
         fields[f"{_PREFIX}{field.name}"] = (accepted, Field(default, alias=field.name))
     return _model(cls, cls.__name__, fields)
+
+
+class _SimulationParameters(Shape):
+    """The parameters of a simulation, each of which may be drawn from the seed."""
+
+    made: ClassVar[type]
+    name: ClassVar[str]
+    path: ClassVar[str]
+    content: ClassVar[bytes]
+
+    def built(self) -> Simulated:
+        """Return the stimulus, with the parameters that are given."""
+        given = {name: build(getattr(self, name)) for name in self.model_fields_set}
+        parameters = {key.removeprefix(_PREFIX): value for key, value in given.items()}
+        return Simulated(self.name, parameters, self.path, self.content)
+
+
+def simulation_shape(name: str, kind: type, path: str = "", content: bytes = b"") -> type[Shape]:
+    """Return the model of a simulation's parameters.
+
+    Args:
+        name: Its name in rubrics.
+        kind: Its class, a dataclass.
+        path: The author's file with the class; empty for a built-in one.
+        content: The text of that file.
+
+    Raises:
+        TypeError: A parameter has a type for which there is no rubric syntax.
+    """
+    hints = get_type_hints(kind, include_extras=True)
+    fields: dict[str, Any] = {}
+    meanings = manual_of(kind).parameters
+    for field in dataclasses.fields(kind):
+        if field.init:
+            default = ... if _is_required(field) else None
+            accepted = _drawable(hints[field.name], field.name)
+            description = meanings.get(field.name)
+            fields[f"{_PREFIX}{field.name}"] = (accepted, Field(default, alias=field.name, description=description))
+    summary = " ".join((kind.__doc__ or "").strip().split("\n\n")[0].split())
+    model = create_model(f"{kind.__name__}Simulation", __base__=_SimulationParameters, __doc__=summary, **fields)
+    model.made, model.name, model.path, model.content = kind, name, path, content
+    return model
+
+
+def _drawable(annotation: object, name: str) -> object:
+    """Return the type that a rubric may hold for a parameter; a number, truth value or text may be drawn."""
+    if isinstance(annotation, type) and dataclasses.is_dataclass(annotation):
+        raise TypeError(f"no rubric syntax for a parameter annotated {annotation!r}")
+    accepted = _accepted(annotation, name)
+    drawn = {float: DrawnNumber, int: DrawnWhole, bool: DrawnYesNo, str: DrawnText}
+    known = next((shape for kind, shape in drawn.items() if annotation is kind), None)
+    return accepted if known is None else Either[accepted, known]  # type: ignore[misc, valid-type]
 
 
 def part_model(cls: type, name: str, aliases: Mapping[str, str] | None = None, **usual: Any) -> type[Shape]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import GenericAlias
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar, Union
 
@@ -159,12 +159,10 @@ _Count = Annotated[Whole, must(lambda n: 0 <= n <= CASES, f"a whole number from 
 _Fixed = TypeVar("_Fixed")
 _Varying = TypeVar("_Varying")
 #: A fixed value, or a mapping that says how it is drawn.
-_Either = Annotated[
-    Annotated[_Fixed, Tag("<fixed>")] | Annotated[_Varying, Tag("<drawn>")], Discriminator(drawn_or_not)
-]
-SomeTime = _Either[Duration, DrawnTimeShape]
-SomeLongTime = _Either[LongDuration, DrawnLongTimeShape]
-SomeCount = _Either[_Count, DrawnCountShape]
+Either = Annotated[Annotated[_Fixed, Tag("<fixed>")] | Annotated[_Varying, Tag("<drawn>")], Discriminator(drawn_or_not)]
+SomeTime = Either[Duration, DrawnTimeShape]
+SomeLongTime = Either[LongDuration, DrawnLongTimeShape]
+SomeCount = Either[_Count, DrawnCountShape]
 
 
 class _CasesShape(Shape):
@@ -261,7 +259,7 @@ class DrawnShape(Choice):
         return JustAbove(value) if kind == "just_above" else JustBelow(value)
 
 
-NumberShape = _Either[Real, DrawnShape]
+NumberShape = Either[Real, DrawnShape]
 
 
 def _count_to(most: int) -> AfterValidator:
@@ -272,7 +270,7 @@ _DRAWN_CALLS = must(
     lambda drawn: 1 <= drawn.between[0] < drawn.between[1] <= CALLS,
     f"two whole numbers from 1 to {CALLS:,}, the lower one first",
 )
-Calls = _Either[Annotated[Whole, _count_to(CALLS)], Annotated[DrawnCountShape, _DRAWN_CALLS]]
+Calls = Either[Annotated[Whole, _count_to(CALLS)], Annotated[DrawnCountShape, _DRAWN_CALLS]]
 Clients = Annotated[Whole, _count_to(CLIENTS)]
 _NEVER = AfterValidator(lambda value: value or 0)
 TimeOrNever = Annotated[LongDuration | None, _NEVER]
@@ -280,6 +278,32 @@ CallsOrNever = Annotated[Calls | None, _NEVER]
 NumberCases: Any = Annotated[list_of(cases_model(NumberShape, "Numbers")), Field(min_length=1)]
 MessageCasesOrNone: Any = list_of(cases_model(Fields, "Messages"))
 MessageCases: Any = Annotated[MessageCasesOrNone, Field(min_length=1)]
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _drawn_as(holds: Callable[[DrawnFieldShape], bool], expected: str) -> Any:
+    return Annotated[DrawnFieldShape, must(holds, expected)]
+
+
+def _options(drawn: DrawnFieldShape, kind: type) -> bool:
+    return all(type(option) is kind for option in drawn.choose or ())
+
+
+#: What a parameter of a simulation is drawn from, by its type.
+DrawnNumber = _drawn_as(
+    lambda drawn: drawn.text is None and all(map(_is_number, drawn.choose or ())), "numbers to draw from"
+)
+DrawnWhole = _drawn_as(
+    lambda drawn: drawn.text is None and _options(drawn, int) and all(n.is_integer() for n in drawn.between or ()),
+    "whole numbers to draw from",
+)
+DrawnYesNo = _drawn_as(lambda drawn: drawn.between is None and _options(drawn, bool), "true and false to draw from")
+DrawnText = _drawn_as(
+    lambda drawn: (drawn.between is None or drawn.text is not None) and _options(drawn, str), "texts to draw from"
+)
 
 
 class ParameterShape(Shape):

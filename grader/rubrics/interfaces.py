@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,11 +13,13 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
+from grader.core.errors import HarnessError
 from grader.core.quantities import FieldOf
 from grader.core.scenario import ActionGoal, MessageStream, NumberStream, ServiceCalls, ServiceServer, Stimulus
 from grader.judging.series import curve
 from grader.rubrics.mistakes import found, nearest
 from grader.rubrics.model import RubricShape
+from grader.rubrics.simulations import Offered, offered, simulated_in
 from grader.rubrics.types import build
 from grader.rubrics.yaml_tree import Mistake, Position, TreePath, YamlTree
 from grader.submissions.collected import listed, shown
@@ -191,6 +194,7 @@ class _Checked:
         self._tree = tree
         self._interfaces = interfaces
         self._stimuli = tuple(_stimuli(rubric))
+        self._simulated = tuple(_simulated(rubric))
         self._checks = tuple(_checks(rubric))
         #: Type of each topic, service and action; a topic with numbers has the type that the student's node chooses.
         self._types: dict[str, set[str]] = {}
@@ -208,6 +212,10 @@ class _Checked:
             if isinstance(stimulus, NumberStream):
                 self._free.add(on)
             yield _Named(stimulus.type, where), on  # type: ignore[union-attr]
+
+        for path, offered_ in self._simulated:
+            for on, type_ in {**offered_.publishes, **offered_.hears, **offered_.serves}.items():
+                yield _Named(type_, self._tree.at_key(path)), on
 
     def _of_checks(self) -> Iterator[tuple[_Named, str]]:
         for path, check in self._checks:
@@ -227,6 +235,28 @@ class _Checked:
                 raw = self._raw((*path, key))
                 each = [((*path, key), raw)] if isinstance(raw, Mapping) else _cases(raw, (*path, key))
                 yield from (m for place, value in each for m in self._in_message(value, type_, place))
+
+        for path, offered_ in self._simulated:
+            for topic, value in offered_.outputs:
+                wrong = self._unknown_field(value, offered_.publishes[topic], topic)
+                if wrong:
+                    yield self._tree.at_key(path).mistake(f"expected a simulation that runs, found that {wrong}")
+                    break
+
+    def _unknown_field(self, value: Mapping[str, Any], type_: str, where: str) -> str:
+        """Describe the first field in a simulated message that its type does not have; empty if there is none."""
+        known = self._interfaces.fields(type_)
+        for name, inner in value.items() if known is not None else ():
+            if name not in (known or {}):
+                return f"what it publishes on {where} has a field `{shown(name)}`: {_no_field(type_, known or {})}"
+            field = (known or {})[name]
+            items = inner if field.is_list and isinstance(inner, (list, tuple)) else [inner]
+            for item in items:
+                if field.element == _NESTED and isinstance(item, Mapping):
+                    found = self._unknown_field(item, field.type.nested_type_name, f"{where} in `{name}`")
+                    if found:
+                        return found
+        return ""
 
     def _raw(self, path: TreePath) -> Any:
         here = self._tree.data
@@ -298,6 +328,12 @@ def _stimuli(rubric: RubricShape) -> Iterator[tuple[TreePath, Stimulus]]:
     for index, scenario in enumerate(rubric.scenarios):
         for number, shape in enumerate(scenario.stimuli):
             yield ("scenarios", index, "stimuli", number, shape.chosen[0]), build(shape)
+
+
+def _simulated(rubric: RubricShape) -> Iterator[tuple[TreePath, Offered]]:
+    for path, simulated in simulated_in(rubric):
+        with suppress(HarnessError):  # told where simulations are tried
+            yield path, offered(simulated)
 
 
 def _checks(rubric: RubricShape) -> Iterator[tuple[TreePath, Any]]:

@@ -6,7 +6,7 @@ import ast
 import re
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
@@ -34,8 +34,17 @@ from grader.judging.checks import CHECKS
 from grader.rubrics.interfaces import Interfaces, interface_mistakes
 from grader.rubrics.mistakes import mistakes_of, nearest
 from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, feedback_of, rubric_model
-from grader.rubrics.own_checks import OwnFile, digest_of, load, named_files, own_files, provided_files
+from grader.rubrics.own_checks import (
+    OwnFile,
+    OwnSimulation,
+    digest_of,
+    load,
+    load_simulations,
+    named_files,
+    own_files,
+)
 from grader.rubrics.run_options import RunShape
+from grader.rubrics.simulations import simulation_mistakes
 from grader.rubrics.types import CHECK_FILE, PROVIDED_FILE, PROVIDED_WORDS, build
 from grader.rubrics.variants import (
     Draw,
@@ -215,6 +224,15 @@ class RubricMistakes(RubricError):  # noqa: N818  named after what it holds
         super().__init__("\n".join(lines), "; ".join(hints))
 
 
+@dataclass(frozen=True, slots=True)
+class _Brought:
+    """What a rubric may use, by name: checks, the grader's among them, its own simulations, texts of provided files."""
+
+    checks: Mapping[str, type]
+    simulations: Mapping[str, OwnSimulation]
+    provided: Mapping[str, str]
+
+
 def read_rubric(
     path: Path,
     *,
@@ -237,20 +255,22 @@ def read_rubric(
     """
     content = _content(path)
     tree = _tree(path, content)
-    files = own_files(path, _own_names(path, tree), submissions)
-    provided = {file.name: _provided(file) for file in own_files(path, _provided_names(path, tree), submissions)}
-    checks = {**checks, **load(files, checks)}
-    digest = digest_of(content, (*files, *own_files(path, tuple(provided), submissions)))
+    files = own_files(path, _own_names(path, tree, "checks"), submissions)
+    simulated = own_files(path, _own_names(path, tree, "simulations"), submissions, key="simulations")
+    others = own_files(path, _provided_names(path, tree), submissions, key="provided")
+    brought = _Brought(
+        {**checks, **load(files, checks)}, load_simulations(simulated), {one.name: _provided(one) for one in others}
+    )
+    digest = digest_of(content, tuple(dict.fromkeys((*files, *others, *simulated))))
     if not has_variants(tree):
-        return _exercise(path, tree, checks, digest, interfaces, provided)
+        return _exercise(path, tree, brought, digest, interfaces)
     options = options_of(_validated(path, tree, Variants))
     known = {option.name: option.value(0) for option in options}
-    nobodys = _exercise(path, with_values(tree, known), checks, digest, interfaces, provided)
+    nobodys = _exercise(path, with_values(tree, known), brought, digest, interfaces)
     for values in tried(options, known) if draw is None or isinstance(draw, First) else ():
-        _exercise(path, with_values(tree, values), checks, digest, interfaces, provided)
+        _exercise(path, with_values(tree, values), brought, digest, interfaces)
     variant = _variant(path, tree, nobodys, options, draw)
-    varied = with_values(tree, dict(variant.values))
-    exercise = _exercise(path, varied, checks, varied_digest(digest, variant), None, provided)
+    exercise = _exercise(path, with_values(tree, dict(variant.values)), brought, varied_digest(digest, variant))
     return replace(exercise, variant=variant)
 
 
@@ -300,16 +320,12 @@ def _has_parameters(value: object) -> bool:
     return isinstance(value.get(PARAMETERS_KEY), dict) or all(map(_has_parameters, value.values()))
 
 
-def _exercise(  # noqa: PLR0913  what a rubric and its own files hold
-    path: Path,
-    tree: YamlTree,
-    checks: Mapping[str, type],
-    digest: str,
-    interfaces: Interfaces | None = None,
-    provided: Mapping[str, str] | None = None,
+def _exercise(
+    path: Path, tree: YamlTree, brought: _Brought, digest: str, interfaces: Interfaces | None = None
 ) -> Exercise:
-    rubric = _validated(path, tree, rubric_model(tuple(checks.items())))
-    mistakes = [*tree.mistakes, *broken_links(rubric, tree)]
+    model = rubric_model(tuple(brought.checks.items()), tuple(brought.simulations.items()))
+    rubric = _validated(path, tree, model)
+    mistakes = [*tree.mistakes, *broken_links(rubric, tree), *simulation_mistakes(rubric, tree)]
     criteria = tuple(_criteria(rubric, tree, mistakes))
     if interfaces is not None:
         mistakes += interface_mistakes(rubric, tree, interfaces)
@@ -322,7 +338,7 @@ def _exercise(  # noqa: PLR0913  what a rubric and its own files hold
         title=rubric.exercise.title,
         required=rubric.exercise.required,
         files=rubric.files,
-        scenarios=tuple(_scenario(shape, limits, provided or {}) for shape in rubric.scenarios),
+        scenarios=tuple(_scenario(shape, limits, brought.provided) for shape in rubric.scenarios),
         criteria=criteria,
         digest=digest,
         by_request=rubric.exercise.by_request,
@@ -331,13 +347,14 @@ def _exercise(  # noqa: PLR0913  what a rubric and its own files hold
 
 def own_check_files(path: Path) -> tuple[OwnFile, ...]:
     """Return the check files that a rubric names, without running them; raises RubricError like `read_rubric`."""
-    return own_files(path, _own_names(path, _tree(path, _content(path))))
+    return own_files(path, _own_names(path, _tree(path, _content(path)), "checks"))
 
 
 def side_files(path: Path) -> tuple[OwnFile, ...]:
     """Return every file that a rubric names beside it, without running any; raises RubricError like `read_rubric`."""
     tree = _tree(path, _content(path))
-    return own_files(path, (*_own_names(path, tree), *_provided_names(path, tree)))
+    checks, simulations = (_own_names(path, tree, key) for key in ("checks", "simulations"))
+    return own_files(path, (*checks, *simulations, *_provided_names(path, tree)))
 
 
 def own_checks(path: Path) -> Mapping[str, type]:
@@ -354,19 +371,19 @@ def _tree(path: Path, content: bytes) -> YamlTree:
         _refuse(path, [error.mistake])
 
 
-def _own_names(path: Path, tree: YamlTree) -> tuple[str, ...]:
-    """Return the named check files; raises RubricError for a name that leads elsewhere."""
-    names = named_files(tree.data)
+def _own_names(path: Path, tree: YamlTree, key: str) -> tuple[str, ...]:
+    """Return the files named under a key; raises RubricError for a name that leads elsewhere."""
+    names = named_files(tree.data, key)
     wrong = [(n, name) for n, name in enumerate(names) if re.fullmatch(CHECK_FILE, name) is None]
     if wrong:
         text = "expected a Python file in the rubric's folder such as my_checks.py, found"
-        _refuse(path, [tree.at(("checks", n)).mistake(f"{text} `{shown(name)}`") for n, name in wrong])
+        _refuse(path, [tree.at((key, n)).mistake(f"{text} `{shown(name)}`") for n, name in wrong])
     return names
 
 
 def _provided_names(path: Path, tree: YamlTree) -> tuple[str, ...]:
     """Return the named provided files; raises RubricError for a name that leads elsewhere."""
-    names = provided_files(tree.data)
+    names = named_files(tree.data, "provided")
     wrong = [(n, name) for n, name in enumerate(names) if re.fullmatch(PROVIDED_FILE, name) is None]
     if wrong:
         text = f"expected {PROVIDED_WORDS}, found"

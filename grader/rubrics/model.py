@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import date
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, create_model, model_validator
 from typing_extensions import Self
@@ -22,9 +22,10 @@ from grader.core.scenario import (
     ServiceServer,
     Span,
 )
-from grader.rubrics.check_parameters import choice_model, part_model
+from grader.rubrics.check_parameters import choice_model, part_model, simulation_shape
 from grader.rubrics.drawing import ParameterShape, SomeLongTime, StateShape, TransitionShape, list_of
 from grader.rubrics.mistakes import nearest
+from grader.rubrics.own_checks import OwnSimulation
 from grader.rubrics.run_options import RunShape
 from grader.rubrics.types import (
     CheckFile,
@@ -42,6 +43,7 @@ from grader.rubrics.types import (
     wrong,
 )
 from grader.rubrics.variants import VariantsField
+from grader.simulation.robots import SIMULATIONS
 from grader.submissions.collected import listed
 
 _EVENTS = (DUE_DATE, PUBLISHED)
@@ -65,6 +67,19 @@ _STIMULI: Mapping[str, type[Shape]] = {
     "state": StateShape,
     "goal": part_model(ActionGoal, "GoalShape", goal={}, cancel_after=None),
 }
+_SIMULATIONS = {name: simulation_shape(name, kind) for name, kind in SIMULATIONS.items()}
+
+
+def _stimulus_model(simulations: Mapping[str, type[Shape]]) -> type[Choice]:
+    """Return the model of a stimulus, with some simulations of one's own."""
+    shapes = {**_SIMULATIONS, **simulations}
+    chosen = choice_model(
+        "SimulationShape", "A stimulus: a participant that reacts, such as a simulated robot.", shapes
+    )
+    about = "Something that the grader does to the student's nodes."
+    return choice_model("StimulusShape", about, {**_STIMULI, "simulation": chosen})
+
+
 if TYPE_CHECKING:  # created at run time; pydantic reads those below
     LimitsShape = Shape
     ObserveShape = Shape
@@ -72,7 +87,7 @@ if TYPE_CHECKING:  # created at run time; pydantic reads those below
 else:
     LimitsShape = part_model(Limits, "LimitsShape", _LIMITS)
     ObserveShape = part_model(Span, "ObserveShape")
-    StimulusShape = choice_model("StimulusShape", "Something that the grader does to the student's nodes.", _STIMULI)
+    StimulusShape = _stimulus_model({})
 
 
 def _shows(value: object) -> str:
@@ -194,6 +209,7 @@ class RubricShape(Shape):
         default=(), description="launch files and parameter files of the rubric's own, beside it"
     )
     checks: tuple[CheckFile, ...] = Field(default=(), description="files of checks of one's own, beside the rubric")
+    simulations: tuple[CheckFile, ...] = Field(default=(), description="files of simulations of one's own, as above")
     limits: LimitsShape = Field(default_factory=LimitsShape)
     feedback: FeedbackField | None = None
     variants: VariantsField = Field(default_factory=dict)
@@ -202,9 +218,16 @@ class RubricShape(Shape):
 
 
 @lru_cache(maxsize=8)
-def rubric_model(checks: tuple[tuple[str, type], ...]) -> type[RubricShape]:
-    """Return the model of a rubric file with these checks, in the order in which messages list them."""
+def rubric_model(
+    checks: tuple[tuple[str, type], ...], simulations: tuple[tuple[str, OwnSimulation], ...] = ()
+) -> type[RubricShape]:
+    """Return the model of a rubric file with these checks and simulations, in the order in which messages list them."""
     check = choice_model("Check", "The question asked of the trace, by the check's name.", dict(checks))
     criterion = create_model("Criterion", __base__=CriterionShape, __doc__="One row of a rubric.", check=(check, ...))
-    criteria = (list_of(criterion), Field(min_length=1))
-    return create_model("Rubric", __base__=RubricShape, __doc__="A rubric of rclpy-grader.", criteria=criteria)
+    parts: dict[str, Any] = {"criteria": (list_of(criterion), Field(min_length=1))}
+    if simulations:
+        own = {n: simulation_shape(n, one.kind, one.file.name, one.file.content) for n, one in simulations}
+        stimuli = (list_of(_stimulus_model(own)), ())
+        scenario = create_model("ScenarioShape", __base__=ScenarioShape, __doc__=ScenarioShape.__doc__, stimuli=stimuli)
+        parts["scenarios"] = (list_of(scenario), Field(min_length=1))
+    return create_model("Rubric", __base__=RubricShape, __doc__="A rubric of rclpy-grader.", **parts)

@@ -1,4 +1,7 @@
-"""Loads a rubric's own checks: Python files beside a rubric, which names them; they run in the judging process."""
+"""Loads a rubric's own checks and simulations: Python files beside a rubric, which names them.
+
+Checks run in the judging process. Simulations run in the worker, which gets the text of their file with each plan.
+"""
 
 from __future__ import annotations
 
@@ -9,15 +12,18 @@ import hashlib
 import inspect
 import re
 import sys
-import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from grader.core.author_files import line_of, run, words_of
 from grader.core.errors import RubricError
-from grader.rubrics.check_parameters import choice_model
+from grader.rubrics.check_parameters import choice_model, simulation_shape
+from grader.simulation import loading
+from grader.simulation.participant import Simulation
+from grader.simulation.robots import SIMULATIONS
 from grader.submissions.collected import shown
 
 #: Largest file of checks, in bytes.
@@ -25,7 +31,7 @@ MAX_BYTES = 256 * 1024
 #: Name of the table in such a file.
 TABLE = "CHECKS"
 _ID = re.compile(r"[a-z][a-z0-9_]*")
-_ALONE = "a file of checks may import the standard library, grader and what is installed, but no file beside it"
+_ALONE = "such a file may import the standard library, grader and what is installed, but no file beside it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,27 +43,35 @@ class OwnFile:
     content: bytes
 
 
-def own_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ()) -> tuple[OwnFile, ...]:
-    """Return the check files and provided files that a rubric names, without running them.
+@dataclass(frozen=True, slots=True)
+class OwnSimulation:
+    """A class of simulations, and the file that holds it."""
+
+    kind: type[Simulation]
+    file: OwnFile
+
+
+def own_files(
+    rubric: Path, names: Sequence[str], never_in: Sequence[Path] = (), *, key: str = "checks"
+) -> tuple[OwnFile, ...]:
+    """Return files that a rubric names, without running them.
+
+    Args:
+        rubric: The rubric.
+        names: Their names as written in it.
+        never_in: Folders that students write to.
+        key: The key that they stand under, for messages.
 
     Raises:
         RubricError: A file is missing, too large, neither in the rubric's folder nor below, or in one of the folders
             `never_in`, which students write to.
     """
-    return tuple(_own_file(rubric, name, never_in) for name in dict.fromkeys(names))
+    where = f"{shown(str(rubric), 500)}: {key}:"
+    return tuple(_own_file(rubric, name, never_in, f"{where} {shown(name)}") for name in dict.fromkeys(names))
 
 
-def named_files(data: object) -> tuple[str, ...]:
-    """Return the check files named in a rubric's data; the rubric's shape reports anything else."""
-    return _named(data, "checks")
-
-
-def provided_files(data: object) -> tuple[str, ...]:
-    """Return the provided files named in a rubric's data; the rubric's shape reports anything else."""
-    return _named(data, "provided")
-
-
-def _named(data: object, key: str) -> tuple[str, ...]:
+def named_files(data: object, key: str) -> tuple[str, ...]:
+    """Return the files named under a key of a rubric's data; the rubric's shape reports anything else."""
     names = data.get(key) if isinstance(data, Mapping) else None
     return tuple(name for name in names if isinstance(name, str)) if isinstance(names, list) else ()
 
@@ -66,25 +80,36 @@ def load(files: Sequence[OwnFile], known: Mapping[str, type]) -> dict[str, type]
     """Run check files, and return their checks by name, none of which is in `known`; raises RubricError."""
     found: dict[str, type] = {}
     for file in files:
-        table = _table(file)
-        problems = list(_problems(file, table, {**known, **found}))
+        table = _table(file, TABLE, lambda f: vars(_module(str(f.path.resolve()), f.content)).get(TABLE))
+        problems = list(_problems(file, table, {**known, **found}, _no_check))
         if problems:
             raise RubricError("\n".join(problems))
         found |= table
     return found
 
 
+def load_simulations(files: Sequence[OwnFile]) -> dict[str, OwnSimulation]:
+    """Run simulation files, and return their classes by name, none of which is built in; raises RubricError."""
+    found: dict[str, OwnSimulation] = {}
+    for file in files:
+        table = _table(file, loading.TABLE, lambda f: loading.classes(f.name, f.content))
+        problems = list(_problems(file, table, {**SIMULATIONS, **found}, _no_simulation))
+        if problems:
+            raise RubricError("\n".join(problems))
+        found |= {name: OwnSimulation(kind, file) for name, kind in table.items()}
+    return found
+
+
 def digest_of(rubric: bytes, files: Sequence[OwnFile]) -> str:
-    """Return the `sha256:` digest of a rubric and its check files; without such files, that of the rubric alone."""
+    """Return the `sha256:` digest of a rubric and the files it names; without such files, that of the rubric alone."""
     digest = hashlib.sha256(rubric)
     for file in files:
         digest.update(f"\0{file.name}\0{len(file.content)}\0".encode() + file.content)
     return f"sha256:{digest.hexdigest()}"
 
 
-def _own_file(rubric: Path, name: str, never_in: Sequence[Path]) -> OwnFile:
+def _own_file(rubric: Path, name: str, never_in: Sequence[Path], where: str) -> OwnFile:
     path = rubric.parent / name
-    where = f"{shown(str(rubric), 500)}: {shown(name)}"
     try:
         real = path.resolve(strict=True)
         inside = real.is_relative_to(rubric.parent.resolve()) and real.is_file()
@@ -104,53 +129,27 @@ def _own_file(rubric: Path, name: str, never_in: Sequence[Path]) -> OwnFile:
     return OwnFile(name, path, content)
 
 
-def _table(file: OwnFile) -> dict[str, Any]:
+def _table(file: OwnFile, name: str, ran: Callable[[OwnFile], object]) -> dict[str, Any]:
     """Run a file and return its table; raises RubricError with the line that failed."""
     where = shown(str(file.path), 500)
     try:
-        module = _module(str(file.path.resolve()), file.content)
+        table = ran(file)
     except (Exception, SystemExit) as error:  # whatever the author's file raises, the author has to fix
-        text = f"{where}:{_line_of(error, file)}: expected a file that can be imported, found "
-        text += f"{type(error).__name__}: {shown(_words(error), 200)}"
+        line = max(line_of(error, str(file.path.resolve())), line_of(error, file.name))
+        text = f"{where}:{line}: expected a file that can be imported, found "
+        text += f"{type(error).__name__}: {shown(words_of(error), 200)}"
         raise RubricError(text, _ALONE if isinstance(error, ImportError) else "") from None
-    table = getattr(module, TABLE, None)
     if not isinstance(table, dict) or not table:
         found = "none" if table is None else "an empty one" if table == {} else f"a {type(table).__name__}"
-        raise RubricError(f'{where}:1: expected a table {TABLE} = {{"name": Class}}, found {found}')
+        raise RubricError(f'{where}:1: expected a table {name} = {{"name": Class}}, found {found}')
     return table
 
 
-def _words(error: BaseException) -> str:
-    return str(error.msg) if isinstance(error, SyntaxError) else str(error)
-
-
-def _line_of(error: BaseException, file: OwnFile) -> int:
-    """Return the line of a file in which an error arose, or that led to it."""
-    path = str(file.path.resolve())
-    if isinstance(error, SyntaxError) and error.filename == path:
-        return error.lineno or 1
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == path]
-    return (lines[-1] if lines else None) or 1
-
-
 def _module(path: str, content: bytes) -> ModuleType:
-    """Return the module of a file; the same file with the same content runs once per process."""
-    digest = hashlib.sha256(path.encode("utf-8", "surrogateescape") + b"\0" + content).hexdigest()
-    name = f"_own_checks_{digest[:24]}"
-    if name in sys.modules:
-        return sys.modules[name]
-    module = ModuleType(name)
-    module.__file__ = path
-    vars(module)["__content__"] = content
-    code = compile(content, path, "exec", dont_inherit=True)
-    sys.modules[name] = module  # dataclasses look up their module while they are created
-    try:
-        exec(code, vars(module))  # noqa: S102  the instructor chose this file, and it lies where no student writes
-    except BaseException:
-        del sys.modules[name]
-        raise
+    """Return the module of a file, whose checks other processes can recreate."""
+    module = run("_own_checks", path, content)
     for kind in vars(module).values():
-        if isinstance(kind, type) and kind.__module__ == name and dataclasses.is_dataclass(kind):
+        if isinstance(kind, type) and kind.__module__ == module.__name__ and dataclasses.is_dataclass(kind):
             copyreg.pickle(kind, _reduced)
     return module
 
@@ -166,8 +165,10 @@ def _remade(path: str, content: bytes, name: str, given: Mapping[str, object]) -
     return getattr(_module(path, content), name)(**given)
 
 
-def _problems(file: OwnFile, table: Mapping[str, object], taken: Mapping[str, type]) -> Iterator[str]:
-    """Yield what prevents the entries of a table from being checks, each with its place."""
+def _problems(
+    file: OwnFile, table: Mapping[str, object], taken: Mapping[str, object], unfit: Callable[[object], str]
+) -> Iterator[str]:
+    """Yield what makes the entries of a table unfit, each with its place."""
     where = shown(str(file.path), 500)
     lines = _lines(file.content)
     for name, kind in table.items():
@@ -177,7 +178,7 @@ def _problems(file: OwnFile, table: Mapping[str, object], taken: Mapping[str, ty
             yield f"{where}:{line}: {wrong}, found `{shown(str(name))}`"
         elif name in taken:
             yield f"{where}:{line}: expected a name of its own, found `{name}`, which is taken"
-        elif wrong := _no_check(kind):
+        elif wrong := unfit(kind):
             class_line = lines.get(f"class {kind.__name__}", line) if isinstance(kind, type) else line
             yield f"{where}:{class_line}: `{name}`: {wrong}"
 
@@ -193,8 +194,21 @@ def _no_check(kind: object) -> str:
         inspect.signature(judge).bind(None, None)  # raises TypeError if it cannot be called
     except (TypeError, ValueError):
         return "expected a method judge(self, trace), found none that takes a trace"
+    return _no_parameters(lambda: choice_model("Check", "", {"own": kind}))
+
+
+def _no_simulation(kind: object) -> str:
+    """Return why something is not a simulation; empty if it is one."""
+    if not isinstance(kind, type) or not issubclass(kind, Simulation):
+        return "expected a class derived from grader.simulation.Simulation, found something else"
+    if "__dataclass_fields__" not in vars(kind):
+        return "expected a dataclass, found another class: write @dataclass above it"
+    return _no_parameters(lambda: simulation_shape("own", kind))
+
+
+def _no_parameters(make: Callable[[], object]) -> str:
     try:
-        choice_model("Check", "", {"own": kind})
+        make()
     except Exception as error:  # an annotation may be anything, and may name something undefined
         return f"expected parameters that a rubric can hold, found {type(error).__name__}: {shown(str(error), 200)}"
     return ""

@@ -2,6 +2,7 @@
 
 from grader.judging.checks.actions import ActionFeedback, ActionResult, LifecycleStates
 from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
+from grader.judging.checks.closed_loop import ReachesGoal, StaysInRange
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange, FieldMonotone, RandomInRange
 from grader.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
@@ -78,6 +79,8 @@ CHECKS: dict[str, type] = {
     "action_feedback": ActionFeedback,
     "lifecycle_states": LifecycleStates,
     "transform": Transform,
+    "reaches_goal": ReachesGoal,
+    "stays_in_range": StaysInRange,
     "source_uses": SourceUses,
     "source_avoids": SourceAvoids,
 }

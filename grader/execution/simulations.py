@@ -1,0 +1,132 @@
+"""The simulations of one run: steps them, hands them what the students' nodes publish, and takes what they publish."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from copy import deepcopy
+from dataclasses import replace
+from functools import partial
+from itertools import islice
+from typing import Any, TypeVar
+
+from grader.core.errors import HarnessError
+from grader.core.quantities import NS_PER_MS
+from grader.execution.exchanges import PlannedMessages, PlannedServer, PlannedSimulation
+from grader.execution.interfaces import built, wanted_class
+from grader.execution.observer import Taken
+from grader.execution.plan import Plan
+from grader.execution.stimuli import AddServer, Advertise, Event, PublishFields, Step
+from grader.simulation.loading import guarded, made
+from grader.simulation.participant import Moment, Output
+
+Result = TypeVar("Result")
+
+#: The most messages that a simulation may publish in one call, and its shortest period.
+OUTPUTS, SHORTEST_NS = 100, NS_PER_MS
+#: How many times as many messages as a student's node a simulation may publish: it may react to several topics.
+BEYOND = 5
+
+
+class Simulations:
+    """The simulations of a plan.
+
+    Args:
+        plan: Names them, with their parameters.
+
+    Raises:
+        HarnessError: A simulation cannot be made, or names a type that is unknown on this machine.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._all = [_Running(planned, BEYOND * plan.limits.messages) for planned in plan.simulations]
+        self._last_ns = 0
+
+    def events(self) -> list[Event]:
+        """Return the events that create what the simulations offer, and their first steps."""
+        return [e for number, one in enumerate(self._all) for e in (*one.appearances(), Step(0, number))]
+
+    def step(self, step: Step, now: Moment) -> tuple[Event, ...]:
+        """Let time pass for one simulation; return what it publishes, and its next step."""
+        one = self._all[step.number]
+        return (*one.publish(one.simulation.step, self._after(now)), replace(step, t_ns=step.t_ns + one.period_ns))
+
+    def hear(self, taken: Taken, now: Moment) -> list[Event]:
+        """Hand a message of a student's node to the simulations that listen to its topic; return what they publish."""
+        listening = [one for one in self._all if taken.value and one.hears.get(taken.topic) == taken.type]
+        return [event for one in listening for event in one.hear(taken, self._after(now))]
+
+    def answer(self, service: str, request: Mapping[str, Any], now: Moment) -> Mapping[str, Any] | None:
+        """Return the response to a request of a student's client; None if no simulation offers the service."""
+        one = next((one for one in self._all if service in one.serves), None)
+        return None if one is None else one.answer(service, request, self._after(now))
+
+    def _after(self, now: Moment) -> Moment:
+        """Return a moment that does not lie before an earlier one: a late step on the wall clock has its due time."""
+        self._last_ns = max(self._last_ns, now.t_ns)
+        return replace(now, t_ns=self._last_ns)
+
+
+class _Running:
+    """One simulation, with what it publishes, hears and offers."""
+
+    def __init__(self, planned: PlannedSimulation, most: int) -> None:
+        self._planned = planned
+        self._left = most
+        self.simulation = made(planned.name, planned.path, planned.content, planned.parameters)
+        self.period_ns = max(SHORTEST_NS, self.simulation.period)
+        self.hears = dict(self._call(self.simulation.hears))
+        self.serves = dict(self._call(self.simulation.serves))
+        self._streams = {
+            topic: PlannedMessages(topic, type_, 0, 0, self.period_ns, 0, best_effort=False, latched=False, values=())
+            for topic, type_ in self._call(self.simulation.publishes).items()
+        }
+        for stream in self._streams.values():
+            wanted_class(stream.type, "msg", f"simulation {planned.name}, {stream.topic}")
+        for service, type_ in self.serves.items():
+            wanted_class(type_, "srv", f"simulation {planned.name}, {service}")
+        # reproducible, and nobody can know it who does not know the seed
+        self._call(partial(self.simulation.begin, random.Random(planned.seed)))  # noqa: S311
+
+    def appearances(self) -> Iterator[Event]:
+        for stream in self._streams.values():
+            yield Advertise(0, stream.topic, stream)
+        for service, type_ in self.serves.items():
+            server = PlannedServer(service, type_, 0, 0, 0, cycle=False, answers=0, responses=())
+            yield AddServer(0, server)
+
+    def publish(self, work: Callable[[Moment], Iterable[Output]], now: Moment) -> list[Event]:
+        outputs = self._call(lambda: list(islice(work(now), OUTPUTS + 1)))
+        if len(outputs) > OUTPUTS:
+            raise self._wrong(f"expected at most {OUTPUTS} messages at once, found more")
+        return [self._published(output, now) for output in outputs]
+
+    def hear(self, taken: Taken, now: Moment) -> list[Event]:
+        heard = deepcopy(taken.value)  # the trace holds the original
+        return self.publish(lambda at: self.simulation.on_message(at, taken.topic, heard), now)
+
+    def answer(self, service: str, request: Mapping[str, Any], now: Moment) -> Mapping[str, Any]:
+        fields = self._call(lambda: dict(self.simulation.on_request(now, service, request)))
+        where = f"simulation {self._planned.name}, {service}"
+        built(wanted_class(self.serves[service], "srv", where).Response, fields, where)
+        return fields
+
+    def _published(self, output: Output, now: Moment) -> PublishFields:
+        try:
+            topic, fields = output
+            stream = self._streams[topic]
+        except (TypeError, ValueError, KeyError):
+            text = f"a topic that it publishes on ({', '.join(self._streams) or 'none'}) with the fields of a message"
+            raise self._wrong(f"expected {text}, found {str(output)[:80]!r}") from None
+        self._left -= 1
+        if self._left < 0:
+            raise self._wrong("expected fewer messages in one recording")
+        if not isinstance(fields, Mapping):
+            raise self._wrong(f"expected a mapping of fields for {topic}, found {str(fields)[:80]!r}")
+        return PublishFields(now.t_ns, topic, stream, fields)
+
+    def _wrong(self, text: str) -> HarnessError:
+        return HarnessError(f"simulation {self._planned.name}: {text}")
+
+    def _call(self, work: Callable[[], Result]) -> Result:
+        return guarded(self._planned.name, self._planned.path, work)

@@ -1,0 +1,222 @@
+"""Checks on what a simulation publishes, such as the pose of a robot that the student's node drives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding, ProblemKind
+from grader.core.quantities import DurationNs, FieldNumber, FieldOf, Topic, seconds
+from grader.core.trace import Delivery, Trace
+from grader.judging.findings import explain_fault, faulted, first_fault, met, not_met
+from grader.judging.plots import Drawing, Plot, value_panels
+from grader.judging.values import JITTER_NS, FieldRule, as_number, delivered, number_at, value_at
+from grader.judging.wording import counted, moment, number, span
+
+#: Rounding to single precision must not push a value out of its range.
+_EDGE = 1e-6
+#: Names of what is drawn: the distance from a goal, and the extremes of a list with the edge that each may cross.
+_AWAY = "distance"
+_EXTREMES: tuple[tuple[str, Callable[[Sequence[float]], float], str], ...] = (
+    ("smallest", min, "low"),
+    ("largest", max, "high"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Goal:
+    """A goal, the states until the next one, and the distance of each from it."""
+
+    t_ns: int
+    stop_ns: int
+    states: tuple[Delivery, ...]
+    distances: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ReachesGoal:
+    """A simulated robot reaches each goal within a time, and stays there until the next goal or the end.
+
+    A goal is a message of the grader; one that is sent again is the same goal. A goal that is replaced, or whose
+    observation ends, before its time is over is not judged.
+
+    Attributes:
+        topic: Topic on which the simulation publishes its state.
+        goals: Topic on which the grader publishes the goals.
+        fields: Field path of the state -> field path of the goal; the distance is taken over all of them.
+        tolerance: Largest distance, in the unit of the fields.
+        within: Longest time from a goal to the arrival.
+        stays: Whether it must not leave again.
+    """
+
+    topic: Topic
+    goals: Topic
+    fields: Annotated[Mapping[str, str], FieldOf("topic", values="goals")]
+    tolerance: float
+    within: DurationNs
+    stays: bool = True
+
+    @property
+    def expected(self) -> str:
+        stays = ", and there until the next goal" if self.stays else ""
+        return f"{self.topic} within {number(self.tolerance)} of each goal after {span(self.within)} at most{stays}"
+
+    def judge(self, trace: Trace) -> Finding:
+        goals = [g for g in self._goals(trace) if g.stop_ns - g.t_ns > self.within]
+        if not goals:
+            return _cut_short(trace, f"{self.goals}: no goal was observed for {span(self.within)}")
+        wrong = [(goal, flaw) for goal in goals if (flaw := self._flaw(goal, JITTER_NS[trace.clock]))]
+        nearest = [min(g.distances) for g in goals]
+        evidence: dict[str, object] = {"goals": len(goals), "missed": len(wrong), "nearest": nearest[:10]}
+        if not wrong:
+            ends = number(max(g.distances[-1] for g in goals))
+            reason = f"{self.topic}: reached {counted(len(goals), 'goal')} within {span(self.within)}"
+            return met(f"{reason}, at the end at most {ends} away", evidence)
+        reason = f"{self.topic}: {wrong[0][1]}; missed {len(wrong)} of {counted(len(goals), 'goal')}"
+        fault = first_fault(trace)
+        if fault is not None:
+            return faulted(fault, reason, evidence, last=True)
+        return not_met(
+            reason, evidence | {"first_missed_s": seconds(wrong[0][0].t_ns)}, problem=ProblemKind.WRONG_VALUE
+        )
+
+    def _goals(self, trace: Trace) -> list[_Goal]:
+        states = delivered(trace, self.topic)
+        sent: list[Delivery] = []
+        for one in delivered(trace, self.goals):
+            if not sent or one.value != sent[-1].value:
+                sent.append(one)
+        stops = [*(one.t_ns for one in sent[1:]), trace.stop_ns]
+        found = []
+        for goal, stop_ns in zip(sent, stops, strict=False):  # without goals there is no stop either
+            during = tuple(s for s in states if goal.t_ns <= s.t_ns < stop_ns)
+            if during:
+                away = tuple(self._distance(state, goal) for state in during)
+                found.append(_Goal(goal.t_ns, stop_ns, during, away))
+        return found
+
+    def _distance(self, state: Delivery, goal: Delivery) -> float:
+        pairs = [(number_at(state.value, mine), number_at(goal.value, its)) for mine, its in self.fields.items()]
+        if any(a is None or b is None for a, b in pairs):
+            raise HarnessError(f"{self.topic} and {self.goals}: expected numbers at {', '.join(self.fields)}")
+        away = math.dist([a for a, _ in pairs if a is not None], [b for _, b in pairs if b is not None])
+        return math.inf if math.isnan(away) else away
+
+    def _flaw(self, goal: _Goal, jitter_ns: int) -> str:
+        """Describe how a goal was missed; empty if it was not."""
+        pairs = list(zip(goal.states, goal.distances, strict=True))
+        near = [(s, d) for s, d in pairs if d <= self.tolerance + _EDGE]
+        due_ns = goal.t_ns + self.within + jitter_ns
+        told = f"the goal of {moment(goal.t_ns)}"
+        if not near or near[0][0].t_ns > due_ns:
+            best = min(d for s, d in pairs if s.t_ns <= due_ns)
+            text = f"{told} was not reached within {span(self.within)}, the nearest was {number(best)} away"
+            return f"{text}, expected at most {number(self.tolerance)}"
+        left = next(((s, d) for s, d in pairs if s.t_ns > due_ns and d > self.tolerance + _EDGE), None)
+        if left is None or not self.stays:
+            return ""
+        text = f"{told} was left again: {number(left[1])} away at {moment(left[0].t_ns)}"
+        return f"{text}, expected at most {number(self.tolerance)}"
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the state, and its distance from the goal."""
+        away = [(s.t_ns, {_AWAY: d}) for g in self._goals(trace) for s, d in zip(g.states, g.distances, strict=True)]
+        plot = Plot(self.topic, rules={_AWAY: FieldRule(high=self.tolerance)})
+        panels = value_panels(plot, away, f"Distance from the goals on {self.goals}") if away else []
+        return Drawing((Plot(self.topic, tuple(self.fields)),), panels=tuple(panels))
+
+
+@dataclass(frozen=True, slots=True)
+class StaysInRange:
+    """A number in every message that the grader publishes on a topic lies in a range, its edges inside.
+
+    The topic is one of a simulation's, such as the pose of a robot that the student's node drives. A list of numbers,
+    such as the ranges of a laser scan, lies in the range if each of them does. NaN lies in none.
+
+    Attributes:
+        topic: Topic on which the simulation publishes.
+        field: Path of the number, or of the list of numbers.
+        low: Smallest value allowed; none if left out.
+        high: Largest value allowed; none if left out.
+        after: Messages before this time are not judged.
+    """
+
+    topic: Topic
+    field: Annotated[str, FieldOf("topic")]
+    low: FieldNumber | None = None
+    high: FieldNumber | None = None
+    after: DurationNs = 0
+
+    @property
+    def _rule(self) -> FieldRule:
+        low, high = (None if edge is None else edge + slack for edge, slack in ((self.low, -_EDGE), (self.high, _EDGE)))
+        return FieldRule(low=low, high=high)
+
+    @property
+    def _wanted(self) -> str:
+        return FieldRule(low=self.low, high=self.high).wanted
+
+    @property
+    def expected(self) -> str:
+        after = f" from {span(self.after)} on" if self.after else ""
+        return f"{self.field} on {self.topic} {self._wanted}{after}"
+
+    def judge(self, trace: Trace) -> Finding:
+        states = self._states(trace)
+        if not states:
+            after = f" after {span(self.after)}" if self.after else ""
+            return _cut_short(trace, f"{self.topic}: no simulation published anything there{after}")
+        each = [(state, self._numbers(state)) for state in states]
+        outside = [
+            (state, bad[0]) for state, values in each if (bad := [v for v in values if not self._rule.allows(v)])
+        ]
+        every = [v for _, values in each for v in values]
+        evidence: dict[str, object] = {"messages": len(states), "outside": len(outside)}
+        evidence |= {"min": min(every), "max": max(every)} if every else {}
+        if not outside:
+            seen = f"from {number(min(every))} to {number(max(every))}" if every else "without numbers"
+            reason = f"{self.topic}: {self.field} {seen} in {counted(len(states), 'message')}"
+            return met(f"{reason}, expected {self._wanted}", evidence)
+        state, value = outside[0]
+        reason = f"{moment(state.t_ns)}, {self.topic}: {self.field} is {number(value)}, expected {self._wanted}; "
+        reason += f"outside in {len(outside)} of {counted(len(states), 'message')}"
+        known = evidence | {"first_outside_s": seconds(state.t_ns)}
+        fault = first_fault(trace)
+        if fault is not None and fault.t_ns <= state.t_ns:
+            return faulted(fault, reason, known, last=True)
+        return not_met(reason, known, problem=ProblemKind.WRONG_VALUE)
+
+    def _states(self, trace: Trace) -> tuple[Delivery, ...]:
+        return tuple(d for d in delivered(trace, self.topic) if d.t_ns >= self.after)
+
+    def _numbers(self, state: Delivery) -> list[float]:
+        found = value_at(state.value, self.field)
+        values = [as_number(v) for v in (found if isinstance(found, (list, tuple)) else (found,))]
+        if any(value is None for value in values):
+            raise HarnessError(f"{self.topic}: expected a number at {self.field}, found none")
+        return [value for value in values if value is not None]
+
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the number with its range; of a list, the smallest and the largest."""
+        rule = FieldRule(low=self.low, high=self.high)
+        states = self._states(trace)
+        if not any(isinstance(value_at(state.value, self.field), (list, tuple)) for state in states):
+            return Drawing((Plot(self.topic, rules={self.field: rule}),))
+        kept = [(name, pick) for name, pick, edge in _EXTREMES if getattr(self, edge) is not None]
+        ends = [(s.t_ns, {name: pick(values) for name, pick in kept}) for s in states if (values := self._numbers(s))]
+        plot = Plot(self.topic, rules={name: rule for name, _ in kept})
+        return Drawing(panels=tuple(value_panels(plot, ends, f"{self.field} on {self.topic}")))
+
+
+def _cut_short(trace: Trace, what: str) -> Finding:
+    """Return no credit if a fault or a flood of the nodes has ended the recording early; raises HarnessError if not."""
+    limits = trace.marks("limit")
+    if limits:
+        return not_met(f"{what}: {limits[0].detail}", problem=ProblemKind.TOO_FEW)
+    crashed = explain_fault(trace, what, last=True)
+    if crashed is None:
+        raise HarnessError(what)
+    return crashed
