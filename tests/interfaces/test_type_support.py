@@ -203,7 +203,7 @@ message = Strings()
 message._string_value = 5
 try:
     publisher.publish(message)
-except AttributeError:
+except TypeError:
     faults += 10
 print(refused > 100, heard[0].string_value, faults)
 """

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import array
 import functools
-import os
 import re
 import struct
 import sys
@@ -186,14 +185,14 @@ def _wstring(body: bytes, offset: int, count: int, order: str) -> str:
 
 
 def _wide_text(value: str, order: str) -> bytes:
-    encoded = value.encode("utf-16-le")
+    encoded = str.encode(value, "utf-16-le")
     count = len(encoded) // 2
     return struct.pack(f"{order}{count}I", *struct.unpack(f"<{count}H", encoded))
 
 
 def _text(value: str) -> bytes:
     """A string as the C message holds it: up to its first zero."""
-    return value.encode().partition(b"\0")[0] + b"\0"
+    return str.encode(value).partition(b"\0")[0] + b"\0"
 
 
 def _array(code: str, value: Any, count: int | None, limit: int | None) -> bytes:
@@ -421,7 +420,7 @@ class _Compiler:
         message = self._name()
         self._made.append(f"{message} = new({self._name(message_class)})")
         if "_check_fields" in message_class.__slots__:
-            checked = os.getenv("ROS_PYTHON_CHECK_FIELDS", default="") == "1"
+            checked = getattr(sys.modules[message_class.__module__], "ros_python_check_fields", "") == "1"
             self._made.append(f"{message}._check_fields = {checked}")
         self._made += [f"{message}._{name} = {value}" for name, value in values]
         return message
