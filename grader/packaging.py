@@ -210,7 +210,7 @@ def _common(chosen: Chosen) -> dict[str, bytes]:
     # Numbered, because rubrics in different folders may share a name, and file names may be arbitrary.
     folders = {f"rubrics/{n}": path for n, path in enumerate(chosen.rubrics, start=1)}
     rubrics = {f"{folder}/rubric.yaml": path.read_bytes() for folder, path in folders.items()}
-    checks = {f"{folder}/{f.name}": f.content for folder, path in folders.items() for f in side_files(path)}
+    brought = {f"{folder}/{f.name}": f.content for folder, path in folders.items() for f in side_files(path)}
     settings = {"exercises": chosen.exercises, "rubrics": list(rubrics), "isolation": chosen.isolation}
     return {
         "prepare": integration("prepare"),
@@ -218,7 +218,7 @@ def _common(chosen: Chosen) -> dict[str, bytes]:
         "constraints.txt": pins().encode(),
         name: content,
         **rubrics,
-        **checks,
+        **brought,
     }
 
 

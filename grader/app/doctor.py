@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from grader.app.grade import Progress
+from grader.app.interface_packages import described
 from grader.app.observe import ObserveRequest, observe
 from grader.core.checkup import NO_SANDBOX, Checkup, Exchange, Fact, TierReport
 from grader.core.errors import EnvironmentFault, GraderError
@@ -40,7 +41,7 @@ def examine(progress: Progress) -> Checkup:
     """Find out what this machine can do; takes a few seconds."""
     progress("looking for ROS 2")
     ros, lack = _ros()
-    facts = (*software(ros), *lack, *system(), _archives())
+    facts = (*software(ros), *lack, *system(), _archives(), *_interfaces(ros))
     if ros is None:
         return Checkup(facts, None, (), "", "", Limits())
     progress("looking at the byte code")
@@ -66,6 +67,22 @@ def _archives() -> Fact:
     if is_installed():
         return Fact("archives", "zip and tar, .rar and .7z by libarchive")
     return Fact("archives", "zip and tar; .rar and .7z need libarchive", remedy=install_command())
+
+
+def _interfaces(ros: RosInstallation | None) -> tuple[Fact, ...]:
+    """Report whether interface packages can be built, and which ones are ready."""
+    if ros is None:
+        return ()
+    try:
+        ready = [package.name for package in described(()) if package.folder]
+    except (GraderError, ImportError) as error:
+        text = error.message if isinstance(error, GraderError) else str(error)
+        hint = (
+            f"install the generators: pip install ros-{ros.distro}-rosidl-generator-py ros-{ros.distro}-rosidl-parser"
+        )
+        return (Fact("interfaces", f"packages cannot be built here: {text}", fits=False, remedy=hint),)
+    text = "built from their definitions, without a compiler"
+    return (Fact("interfaces", f"{text}; ready: {', '.join(ready)}" if ready else text),)
 
 
 def _remedy(tiers: Sequence[TierReport]) -> str:

@@ -9,13 +9,13 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 import grader
+from grader.app.interface_packages import definitions, known_interfaces, provide
 from grader.app.request import GradeRequest, recording_digest, reproduction
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
-from grader.core.errors import EnvironmentFault, EvidenceError, SubmissionError
+from grader.core.errors import EvidenceError, SubmissionError
 from grader.core.exercise import Exercise, exercise_name
 from grader.core.releases import TRIED
 from grader.core.report import Environment, Report
@@ -25,7 +25,6 @@ from grader.core.trace import Trace
 from grader.execution.bag import Odometry, read_odometry
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
-from grader.execution.ros_installation import find_ros
 from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
@@ -33,9 +32,6 @@ from grader.rubrics.builtin import builtin_exercises, builtin_odometry, compiled
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import read_reaches, read_sources
 from grader.submissions.submission import stage_collected, stage_submission
-
-if TYPE_CHECKING:
-    from grader.rubrics.interfaces import Interfaces
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
@@ -105,10 +101,12 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         odometry = read_recording(request, exercises)
         seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
         environment = _environment(session)
-        kept = _kept(request, exercises, submission, odometry, seed, environment)
+        provided = provide(session, exercises, request.interfaces, submission.root)
+        submission = replace(submission, notes=(*submission.notes, *provided.problems))
+        kept = _kept(request, exercises, submission, odometry, seed, environment, provided.offered)
         done = {exercise for exercise, _ in kept}
         unrecorded = [exercise for exercise in exercises if exercise.id not in done]
-        jobs = plan_jobs(request, unrecorded, submission, odometry, seed)
+        jobs = plan_jobs(request, unrecorded, submission, odometry, seed, provided.folders)
         run = Run(
             submission=submission,
             traces=kept,
@@ -116,8 +114,10 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
             environment=environment,
             seed=seed,
             duration_s=time.perf_counter() - started,
-            notes=(*submission.notes, *_notes(request, session)),
+            notes=(*submission.notes, *_notes(request, session), *provided.notes),
             reproduce=reproduction(request, exercises, odometry, seed),
+            interfaces=provided.packages,
+            offered=provided.offered,
         )
         take = EarlyReports(exercises, jobs, run, on_partial_report).take if on_partial_report is not None else None
         checks = SpotChecks(request.spot_checks, seed, submission.digest, read_reaches(submission.root))
@@ -129,6 +129,7 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
             record = partial(_record_one, session, progress, RealTimeBudget(request.time_budget_s))
             traces = check(checks, jobs, traces, record, take or (lambda *_: None))
         run = replace(run, traces={**kept, **traces}, duration_s=time.perf_counter() - started)
+        run = replace(run, definitions=definitions(run.traces.values(), provided))
         if on_recorded is not None:
             on_recorded(run, exercises)
         return judge_run(exercises, run, pictures=pictures)
@@ -141,6 +142,7 @@ def _kept(  # noqa: PLR0913  all that a recording depends on
     odometry: Odometry | None,
     seed: int,
     environment: Environment,
+    interfaces: str,
 ) -> Mapping[Key, Trace]:
     """Return the kept recordings that this run would make again with the same software; none if one is damaged."""
     if request.recordings is None:
@@ -148,7 +150,7 @@ def _kept(  # noqa: PLR0913  all that a recording depends on
     from grader.app.kept_recordings import PlannedRun, kept_traces, recorded_alike  # noqa: PLC0415 - seldom needed
     from grader.execution.evidence.store import open_evidence  # noqa: PLC0415 - takes long, and is seldom needed
 
-    planned = PlannedRun(submission.digest, seed, "" if odometry is None else recording_digest(odometry))
+    planned = PlannedRun(submission.digest, seed, "" if odometry is None else recording_digest(odometry), interfaces)
     try:
         evidence = open_evidence(request.recordings)
         if evidence.manifest.environment != environment:
@@ -160,17 +162,6 @@ def _kept(  # noqa: PLR0913  all that a recording depends on
 
 def _record_one(session: RecordingSession, progress: Progress, budget: RealTimeBudget, job: Job) -> Trace:
     return session.recorder.record([replace(job, budget=budget)], progress)[0]
-
-
-@cache
-def installed_interfaces() -> Interfaces | None:
-    """Return the message, service and action types that nodes can use; None without ROS."""
-    from grader.rubrics.interfaces import Interfaces  # noqa: PLC0415 - takes long, as reading rubrics does
-
-    try:
-        return Interfaces(find_ros().share)
-    except EnvironmentFault:
-        return None
 
 
 def read_exercises(
@@ -187,7 +178,7 @@ def read_exercises(
     if request.rubrics:
         from grader.rubrics.loader import read_rubric  # noqa: PLC0415 - takes long; built-in rubrics are compiled
 
-        known = None if recorded else installed_interfaces()
+        known = None if recorded else known_interfaces(request.interfaces)
         read = partial(read_rubric, submissions=theirs, draw=request.draw, interfaces=known)
         exercises = [read(path) for path in request.rubrics]
     else:
@@ -213,15 +204,26 @@ def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odom
     return builtin_recording() if any(exercise.plays_odometry for exercise in exercises) else None
 
 
-def plan_jobs(
-    request: GradeRequest, exercises: Sequence[Exercise], submission: Submission, odometry: Odometry | None, seed: int
+def plan_jobs(  # noqa: PLR0913  each comes from a different stage
+    request: GradeRequest,
+    exercises: Sequence[Exercise],
+    submission: Submission,
+    odometry: Odometry | None,
+    seed: int,
+    interfaces: Sequence[Path] = (),
 ) -> dict[tuple[str, str], Job]:
-    """Plan the recordings, by exercise and scenario; scenarios with a missing file are left out."""
+    """Plan the recordings, by exercise and scenario; scenarios with a missing file are left out.
+
+    The interfaces are the folders of packages that are not installed.
+    """
     clock = planned_clock(request.clock)
     return {
         (exercise.id, scenario.id): Job(
             f"{exercise_name(exercise.number)}: {', '.join(scenario.processes)} ({scenario.id.replace('_', ' ')})",
-            plan_scenario(exercise.id, scenario, submission, seed=seed, odometry=odometry, clock=clock),
+            replace(
+                plan_scenario(exercise.id, scenario, submission, seed=seed, odometry=odometry, clock=clock),
+                interfaces=tuple(map(str, interfaces)),
+            ),
         )
         for exercise in exercises
         for scenario in exercise.scenarios

@@ -18,6 +18,7 @@ class PlannedRun:
     submission: str  # digest of the submission
     seed: int
     odometry: str  # digest of the /odom recording; empty if none is played
+    interfaces: str = ""  # digest of the interface packages of rubric and class; empty if there are none
 
 
 def recorded_alike(evidence: Evidence, exercises: Sequence[Exercise], planned: PlannedRun) -> tuple[Exercise, ...]:
@@ -26,7 +27,8 @@ def recorded_alike(evidence: Evidence, exercises: Sequence[Exercise], planned: P
     An exercise is used as a whole, because a spot check replaces all of its recordings together.
     """
     manifest = evidence.manifest
-    if (manifest.submission.digest, manifest.run.seed) != (planned.submission, planned.seed):
+    recorded = (manifest.submission.digest, manifest.run.seed, manifest.interfaces.offered)
+    if recorded != (planned.submission, planned.seed, planned.interfaces):
         return ()
     found = {file.wanted for file in manifest.submission.files}
     asked = {e.id: {r.scenario: r.asked for r in e.recordings} for e in manifest.exercises}

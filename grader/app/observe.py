@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.app.grade import Progress, builtin_recording
+from grader.app.interface_packages import provide
 from grader.app.seeds import PRACTICE
 from grader.core.errors import HarnessError, SubmissionError
 from grader.core.quantities import NS_PER_S
@@ -34,6 +35,7 @@ class ObserveRequest:
     odom_bag: Path | None = None  # an /odom recording to play; None for no odometry
     clock: str = "auto"  # `virtual`, `wall` or `auto`
     isolation: str = "auto"  # `auto` or `none`
+    interfaces: tuple[Path, ...] = ()  # folders with interface packages
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +66,8 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         submission = _stage(request.files, names, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
+        provided = provide(session, (), request.interfaces, submission.root)
+        plan = replace(plan, interfaces=tuple(map(str, provided.folders)))
         trace = session.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
     if trace.harness_problem:
         raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")

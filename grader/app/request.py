@@ -46,6 +46,7 @@ class GradeRequest:
     recordings: Path | None = None
     student: str = ""  # id of the student whose variant is graded; empty if nothing varies
     variant_key: Path | None = None  # file with the course key, as the user typed it; None if not given
+    interfaces: tuple[Path, ...] = ()  # folders with interface packages for the whole class
     draw: Draw | None = None  # supplies variant values; if None, rubrics with variants are refused
 
 
@@ -76,6 +77,8 @@ def command_words(request: GradeRequest, seed: int) -> tuple[str, ...]:
         words += ["--variant-key", str(request.variant_key)]
     if request.odom_bag is not None:
         words += ["--odom-bag", str(request.odom_bag)]
+    for folder in request.interfaces:
+        words += ["--interfaces", str(folder)]
     if request.clock != "auto":
         words += ["--clock", request.clock]
     if request.isolation != "auto":
@@ -109,6 +112,7 @@ def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -
         "isolation": request.isolation,
         "student": request.student,
         "variant_key": None if request.variant_key is None else str(request.variant_key),
+        **({"interfaces": [str(folder) for folder in request.interfaces]} if request.interfaces else {}),
         "variants": {e.id: dict(e.variant.values) for e in exercises if e.variant is not None},
     }
 
@@ -128,5 +132,6 @@ def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tup
         isolation=str(data.get("isolation", "auto")),
         student=student,
         variant_key=None if key is None else Path(str(key)),
+        interfaces=tuple(Path(str(folder)) for folder in data.get("interfaces", ())),
         draw=Recorded(Drawn(student, data.get("variants", {}))),
     )

@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from grader.app.grade import installed_interfaces
+from grader.app.interface_packages import known_interfaces
 from grader.core.errors import RubricError
 from grader.core.exercise import Criterion, Exercise
 from grader.core.quantities import duration
@@ -79,9 +79,9 @@ class Checked:
     warnings: tuple[str, ...]
 
 
-def check_rubric(path: Path) -> Checked:
-    """Check a rubric, and summarise it; raises RubricError with every mistake."""
-    exercise = read_rubric(path, draw=First(), interfaces=installed_interfaces())
+def check_rubric(path: Path, course: tuple[Path, ...] = ()) -> Checked:
+    """Check a rubric, which may use the interface packages of a course; raises RubricError with every mistake."""
+    exercise = read_rubric(path, draw=First(), interfaces=known_interfaces(course))
     where = shown(str(path), 500)
     odd = oddities(exercise, read_yaml(path.read_text(encoding="utf-8-sig")))
     return Checked(f"{where}: {_summary(exercise)}", tuple(f"{where}:{m.line}:{m.column}: {m.text}" for m in odd))

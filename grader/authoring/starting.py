@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
-from grader.app.grade import Progress, installed_interfaces
+from grader.app.grade import Progress
+from grader.app.interface_packages import known_interfaces
 from grader.app.observe import ObserveRequest, watch
 from grader.authoring.questions import Seen, parameters, questions
 from grader.authoring.skeleton import (
@@ -197,7 +198,7 @@ def _read(text: str) -> Exercise:
     with tempfile.TemporaryDirectory(prefix="grade-new-") as folder:
         path = Path(folder) / "rubric.yaml"
         path.write_text(text, encoding="utf-8")
-        return read_rubric(path, interfaces=installed_interfaces())
+        return read_rubric(path, interfaces=known_interfaces())
 
 
 def _window_s(trace: Trace, duration_s: float) -> float:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import grader
 from grader.app.grade import read_exercises, read_recording
+from grader.app.interface_packages import offered_digest
 from grader.app.request import GradeRequest, recording_digest
 from grader.app.seeds import kept_key
 from grader.classroom.adjustments import Adjustments, read_adjustments, with_criteria
@@ -128,6 +129,7 @@ def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Condi
         time_budget_s=grading.time_budget_s,
         spot_checks=grading.spot_checks,
         every=grading.every,
+        interfaces=offered_digest(grading.interfaces, exercises),
     )
 
 

@@ -238,6 +238,7 @@ class ClassRun:
             odom_bag=grading.odom_bag,
             conditions=self.conditions[entry.name],
             variant_key=grading.variant_key,
+            interfaces=grading.interfaces,
             workers=workers_for(len(os.sched_getaffinity(0)) // self._jobs),
             standalone=self.course.standalone,
             deadline_s=deadline_s(self.course.grading.time_budget_s),

@@ -43,6 +43,7 @@ class Task:
     collected: Path | None = None  # file with the submission as read on another machine; None to read it now
     # Path of the course key for the command that reproduces the run; the file is not read
     variant_key: Path | None = None
+    interfaces: tuple[Path, ...] = ()  # folders with interface packages for the whole class
     recordings: Path | None = None  # evidence whose recordings of unchanged exercises are used; None to record all
 
 

@@ -36,7 +36,8 @@ class Terms:
     recording: Files  # its files, by their paths below it; a recording in a single file has an empty path
     standalone: bool  # whether each HTML report includes its scripts
     deadline_s: float  # real time after which an attempt is killed
-    checks: Files = ()  # relative path and content of the rubrics' own check files
+    checks: Files = ()  # relative path and content of the files that rubrics and class bring
+    interfaces: tuple[bytes, ...] = ()  # relative paths of the folders with interface packages for the whole class
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,7 +54,7 @@ def kept_recordings(
         evidence = open_evidence(place / EVIDENCE)
     except EvidenceError:
         return None
-    planned = PlannedRun(digest, conditions.seed, conditions.recording)
+    planned = PlannedRun(digest, conditions.seed, conditions.recording, conditions.interfaces)
     reused = frozenset(exercise.id for exercise in recorded_alike(evidence, exercises, planned))
     return KeptRecordings(place / EVIDENCE, tuple(exercises), reused) if reused else None
 

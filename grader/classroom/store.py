@@ -270,6 +270,7 @@ class Conditions:
     variants: Drawn | None = None  # the student's variant values; None if nothing varies
     time_budget_s: float = TIME_BUDGET_S  # real time that all recordings of a submission may take together
     spot_checks: float = 0.0  # share of the class that is checked on the wall clock, from 0 to 1
+    interfaces: str = ""  # digest of the interface packages of rubrics and class; empty if there are none
 
     def key(self, submission: str) -> str:
         """Return the cache key of a result, given the digest of the submission."""
@@ -283,6 +284,8 @@ class Conditions:
         return self._digest(depends_on, submission)
 
     def _digest(self, depends_on: dict[str, Any], submission: str) -> str:
+        if not self.interfaces:
+            del depends_on["interfaces"]  # results of earlier versions know none
         # A changed share affects only submissions that are drawn with one share and not with the other.
         if is_drawn(depends_on.pop("spot_checks"), self.seed or 0, submission):
             depends_on["spot_check"] = True

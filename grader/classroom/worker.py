@@ -135,6 +135,7 @@ def request_for(task: Task) -> GradeRequest:
         collected=None if task.collected is None else read_collected(task.collected.read_bytes()),
         student=own.student if own is not None else "",
         variant_key=task.variant_key if own is not None else None,
+        interfaces=task.interfaces,
         draw=Recorded(own) if own is not None else None,
         recordings=task.recordings,
     )

@@ -13,6 +13,7 @@ from grader.cli.options import (
     PATH,
     complain,
     drawn_with,
+    interfaces_option,
     parse_share,
     print_result,
     require,
@@ -55,6 +56,7 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 )
 @click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which a student has a file.")
 @click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@interfaces_option
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw everybody's values from N.")
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key, not by the one kept in RESULTS.")
 @click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")

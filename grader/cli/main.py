@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import grader
-from grader.cli import batch, completion, export, rejudge, rubric, upload
+from grader.cli import batch, completion, export, interfaces, rejudge, rubric, upload
 from grader.cli.completion import complete_criterion, complete_exercise, complete_file, complete_output
 from grader.cli.options import (
     EVIDENCE,
@@ -24,6 +24,7 @@ from grader.cli.options import (
     complain,
     drawn_by,
     drawn_with,
+    interfaces_option,
     parse_outputs,
     parse_percent,
     parse_share,
@@ -132,6 +133,7 @@ class _Default(click.Command):
     help=f"Write a report ({', '.join(FORMATS)}), `-` is standard output; or keep evidence=FOLDER; repeatable.",
 )
 @click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@interfaces_option
 @click.option(
     "--min-score",
     type=float,
@@ -315,9 +317,17 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
 @click.option("--odom-bag", type=PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
 @click.option("--isolation", type=click.Choice(_TIERS), default="auto", envvar=_ISOLATION, help="As for grading.")
+@interfaces_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
 def _observe(  # noqa: PLR0913  one parameter an option
-    *, files: tuple[Path, ...], duration: float, odom_bag: Path | None, clock: str, isolation: str, as_json: bool
+    *,
+    files: tuple[Path, ...],
+    duration: float,
+    odom_bag: Path | None,
+    clock: str,
+    isolation: str,
+    interfaces: tuple[Path, ...],
+    as_json: bool,
 ) -> int:
     """Run nodes together, without a rubric, and say what they do.
 
@@ -326,7 +336,7 @@ def _observe(  # noqa: PLR0913  one parameter an option
     from grader.app import observe
     from grader.reporting.observed import render_summary, summary_to_json
 
-    request = observe.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation)
+    request = observe.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation, interfaces)
     with shown_progress(wanted=True) as progress:
         summary = observe.observe(request, progress)
     print_result(lambda: summary_to_json(summary), lambda _: render_summary(summary), as_json=as_json)
@@ -382,6 +392,7 @@ app.add_command(batch.command)
 app.add_command(upload.command)
 app.add_command(_explain)
 app.add_command(_doctor)
+app.add_command(interfaces.command)
 app.add_command(completion.command)
 app.add_command(export.command)
 app.add_command(rubric.command)

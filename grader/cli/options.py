@@ -43,6 +43,16 @@ time_budget_option = click.option(
 )
 
 
+#: Message definitions of a course.
+interfaces_option = click.option(
+    "--interfaces",
+    type=PATH,
+    metavar="FOLDER",
+    multiple=True,
+    help="Build the interface packages (msg, srv, action) in this folder for the nodes; repeatable.",
+)
+
+
 def audience_options(command: _Command) -> _Command:
     """Add the options `--audience` and `--as-of`."""
     day = click.option(

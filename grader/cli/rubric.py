@@ -6,7 +6,16 @@ from pathlib import Path
 
 import click
 
-from grader.cli.options import PATH, complain, print_for_programs, print_result, require, shown_progress, write_file
+from grader.cli.options import (
+    PATH,
+    complain,
+    interfaces_option,
+    print_for_programs,
+    print_result,
+    require,
+    shown_progress,
+    write_file,
+)
 from grader.core.checkup import TIERS
 from grader.core.errors import ALL_MET, NOT_ALL_MET, UNUSABLE, GraderError, RubricError
 
@@ -18,7 +27,8 @@ def command() -> None:
 
 @command.command(name="check")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
-def _check(*, files: tuple[Path, ...]) -> int:
+@interfaces_option
+def _check(*, files: tuple[Path, ...], interfaces: tuple[Path, ...]) -> int:
     """Say whether rubrics can be used, with line and column of every mistake, and what is odd about them.
 
     Exit code 2 if one of them cannot be used; what is merely odd is a warning.
@@ -29,7 +39,7 @@ def _check(*, files: tuple[Path, ...]) -> int:
     code = ALL_MET
     for path in files:
         try:
-            checked = check_rubric(path)
+            checked = check_rubric(path, interfaces)
         except RubricError as error:
             code = UNUSABLE
             for line in complaints(error):

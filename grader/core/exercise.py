@@ -231,9 +231,10 @@ class Exercise:
     files: tuple[str, ...]  # file names that a submission must contain, in order
     scenarios: tuple[Scenario, ...]  # its scenarios, in the order of recording
     criteria: tuple[Criterion, ...]  # its criteria, in order
-    digest: str  # `sha256:` digest of the rubric file and its own check files
+    digest: str  # `sha256:` digest of the rubric file and of the files that it brings
     by_request: bool = False  # whether it is graded only on request
     variant: Variant | None = None  # the values for this student; None if nothing varies
+    interfaces: tuple[str, ...] = ()  # paths of the folders with interface packages that the rubric brings
 
     @property
     def plays_odometry(self) -> bool:

@@ -117,6 +117,26 @@ class Reproduction:
 
 
 @dataclass(frozen=True, slots=True)
+class BroughtPackage:
+    """An interface package that a run used and that is not installed."""
+
+    name: str
+    origin: str  # who brought it: `rubric`, `class` (with `--interfaces`), `grader` or `submission`
+    digest: str  # of its definitions
+
+
+@dataclass(frozen=True, slots=True)
+class DescribedPackage:
+    """An interface package that nodes can use, for `grade interfaces`."""
+
+    name: str
+    origin: str  # as in `BroughtPackage`
+    digest: str  # of its definitions
+    types: tuple[str, ...]  # e.g. `lab_msgs/msg/Battery`, sorted
+    folder: str  # where its modules are kept; empty if the installed package of this name is used instead
+
+
+@dataclass(frozen=True, slots=True)
 class Report:
     """The result of grading one submission."""
 
@@ -136,6 +156,7 @@ class Report:
     pending: tuple[str, ...] = ()
     # Who reads it; students get no notes, digests or commands that only help whoever runs the grader
     audience: Audience = Audience.INSTRUCTOR
+    interfaces: tuple[BroughtPackage, ...] = ()  # the interface packages that are not installed, sorted by name
 
     @property
     def score(self) -> Fraction:

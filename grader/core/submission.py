@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grader.core.report import Environment, Reproduction
+from grader.core.report import BroughtPackage, Environment, Reproduction
 from grader.core.trace import Trace
 
 
@@ -38,6 +38,14 @@ class Submission:
 
 
 @dataclass(frozen=True, slots=True)
+class Definition:
+    """The definition of a message type: its text, including nested types, and its hash, which starts with `RIHS01_`."""
+
+    text: str
+    digest: str
+
+
+@dataclass(frozen=True, slots=True)
 class Run:
     """A submission with its recordings."""
 
@@ -50,6 +58,10 @@ class Run:
     duration_s: float = 0.0  # wall time of the run
     notes: tuple[str, ...] = ()  # sentences about the files and the machine that readers must know
     reproduce: Reproduction = field(default_factory=Reproduction)  # how to reproduce the recording and the report
+    interfaces: tuple[BroughtPackage, ...] = ()  # the interface packages that are not installed, sorted by name
+    offered: str = ""  # digest of all interface packages of rubric and class, used or not; empty if there are none
+    # Type of a recorded message -> its definition, for the types of these packages
+    definitions: Mapping[str, Definition] = field(default_factory=dict)
 
 
 def main_not_called(file: str, line: int = 0) -> str:

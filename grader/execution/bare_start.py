@@ -8,7 +8,6 @@ import os
 import signal
 import socket
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -24,18 +23,6 @@ from grader.student_host.packages import ENTRY_POINT, layout_of, never_true, pac
 MOST_BYTES = 1 << 20
 #: Modules whose functions only prepare the program when a file calls them at the top level.
 _SETTING_UP = frozenset({"sys", "os", "warnings", "random", "logging", "np", "numpy", "signal", "math"})
-#: A package that every full ROS installation has, but that no wheel provides.
-STAND_IN = "example_interfaces"
-_MAKE_STAND_IN = f"""
-import sys, types
-def _interface(name):
-    if name.startswith("_"):
-        raise AttributeError(name)
-    return type(name, (), {{}})
-for _name in ("", ".msg", ".srv", ".action"):
-    _module = sys.modules["{STAND_IN}" + _name] = types.ModuleType("{STAND_IN}" + _name)
-    _module.__path__, _module.__getattr__ = [], _interface
-"""
 _NODES = frozenset({"Node", "LifecycleNode"})
 
 
@@ -53,13 +40,13 @@ def bare_arguments(here: Path, root: str, file: str, given: PlannedStart | None 
     """
     given = given or PlannedStart(file)
     path = f"{root}/{file}"
-    missing = f"{_missing(here)}{_with_parameter_files(given)}"
+    setup = _with_parameter_files(given)
     plain = (*given.arguments, *(("--ros-args", *given.ros_arguments) if given.ros_arguments else ()))
     beside = str(PurePosixPath(path).parent)
     script = f"runpy.run_path({path!r}, run_name='__main__')"
     tree = _parsed(here / file)
     if tree is None:
-        return _by_import(script, [beside], path, missing, plain) if missing else ("-u", path, *plain)
+        return _by_import(script, [beside], path, setup, plain) if setup else ("-u", path, *plain)
     layout = layout_of(str(here), file)
     start = start_of(str(here), file, layout, tree, given.executable)
     folders = [f for f in dict.fromkeys((start.base, layout.base, *package_folders(str(here)))) if f]
@@ -68,16 +55,16 @@ def bare_arguments(here: Path, root: str, file: str, given: PlannedStart | None 
         seen.append(str(PurePosixPath(root).parent))
     if start.function:
         called = f"importlib.import_module({start.module!r}).{start.function}()"
-        return _by_import(f"sys.exit({called})" if start.way == ENTRY_POINT else called, seen, path, missing, plain)
+        return _by_import(f"sys.exit({called})" if start.way == ENTRY_POINT else called, seen, path, setup, plain)
     module = start.module or PurePosixPath(file).stem
     seen = seen if start.module else list(dict.fromkeys([beside, *(seen if layout.package is not None else ())]))
     if run := _help(tree, module):
-        return _by_import(run, seen, path, missing, plain)
+        return _by_import(run, seen, path, setup, plain)
     if start.module:
         return _by_import(
-            f"runpy.run_module({module!r}, run_name='__main__', alter_sys=True)", seen, path, missing, plain
+            f"runpy.run_module({module!r}, run_name='__main__', alter_sys=True)", seen, path, setup, plain
         )
-    return _by_import(script, seen, path, missing, plain) if missing or len(seen) > 1 else ("-u", path, *plain)
+    return _by_import(script, seen, path, setup, plain) if setup or len(seen) > 1 else ("-u", path, *plain)
 
 
 def _help(tree: ast.Module, module: str) -> str:
@@ -106,31 +93,12 @@ for _number, _text in enumerate({[text for _, text in given.parameter_files]!r})
 
 
 def _by_import(
-    run: str, folders: Sequence[str], path: str, missing: str, arguments: Sequence[str] = ()
+    run: str, folders: Sequence[str], path: str, setup: str, arguments: Sequence[str] = ()
 ) -> tuple[str, ...]:
     beside = str(PurePosixPath(path).parent)
     behind = "" if beside in folders else f"; sys.path.append({beside!r})"
     begin = f"import importlib, runpy, sys; sys.path[:1] = {list(folders)!r}; sys.argv[0] = {path!r}{behind}"
-    return ("-u", "-c", f"{missing}{begin}; {run}", *arguments)
-
-
-def _missing(here: Path) -> str:
-    """Return code that provides example_interfaces if a file names it and it is not installed; usually empty.
-
-    Tutorials import it without using it. In virtual time the host provides a stand-in.
-    """
-    if find_spec(STAND_IN) is not None or (here / STAND_IN).exists():
-        return ""
-    named = any(_names_stand_in(path) for path in here.rglob("*.py"))
-    return _MAKE_STAND_IN if named else ""
-
-
-def _names_stand_in(path: Path) -> bool:
-    try:
-        with path.open("rb") as file:
-            return STAND_IN.encode() in file.read(MOST_BYTES)
-    except OSError:
-        return False
+    return ("-u", "-c", f"{setup}{begin}; {run}", *arguments)
 
 
 def _parsed(path: Path) -> ast.Module | None:

@@ -137,6 +137,8 @@ class Plan:
         first_node_ns: When the first node of the bare processes is expected, from which their time is counted.
         starts: What processes are started with, where that is more than their file.
         publishers: The publishers that bare processes are expected to create; the grader subscribes before they do.
+        interfaces: Folders of modules of interface packages that are not installed, for the nodes and the grader alike;
+            each is in the folder of what was built with it.
     """
 
     scenario: str
@@ -162,6 +164,7 @@ class Plan:
     bare: bool = False
     first_node_ns: int = 0
     publishers: tuple[Endpoint, ...] = ()
+    interfaces: tuple[str, ...] = ()
     starts: tuple[PlannedStart, ...] = ()
 
     def start_of(self, process: str) -> PlannedStart:

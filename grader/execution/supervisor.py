@@ -81,6 +81,7 @@ class WorkerProcess:
     def __init__(self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], scratch: Path) -> None:
         self._domains = domains
         self.worn = False
+        self._interfaces: tuple[str, ...] = ()
         self._executable = os.fsencode(runtime.executable)
         self._pid = 0
         self._line, theirs = socket.socketpair()
@@ -103,8 +104,13 @@ class WorkerProcess:
             os.close(descriptor)
         theirs.close()
 
+    def suits(self, plan: Plan) -> bool:
+        """Return whether this worker has used no other interface packages than those of a plan."""
+        return self._interfaces in ((), plan.interfaces)
+
     def run(self, plan: Plan, budget: RealTimeBudget) -> Trace:
         """Run one plan; raises HarnessError if the worker fails, WorkerLostError if it has ended or times out."""
+        self._interfaces = plan.interfaces
         own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
         request = json.dumps({"plan": to_json(plan), **own}) + "\n"
         expected = f"worker: expected a trace of {plan.scenario}, found none"
@@ -271,6 +277,9 @@ class Recorder:
             worker = self._idle.get()
             usable = None
             try:
+                if worker is not None and not worker.suits(job.plan):
+                    self._discard(worker)
+                    worker = None
                 worker = worker or self._start()
                 trace = worker.run(job.plan, job.budget)
                 if worker.worn:

@@ -1,4 +1,4 @@
-"""Creates a run's temporary folder, and removes it and the leftovers of runs that were killed."""
+"""The folders that runs write to: a temporary one, whose leftovers are removed, and the user's own, which are kept."""
 
 from __future__ import annotations
 
@@ -22,6 +22,36 @@ FRESH_S = 60.0
 #: Where LTTng, a tracing library that ROS loads, leaves files for each user.
 SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - no file is created there
 TRACER_FILES = "lttng-ust-wait-*"
+
+
+#: The folder of the grader in folders that are a user's own.
+OWN = "rclpy-grader"
+
+
+def own_folder(*variables: str) -> Path | None:
+    """Return a folder that only this user can write to, created if needed; None if there is none.
+
+    It is in the folder that the first of these environment variables names, else in the user's `.cache`.
+    """
+    given = next(filter(None, map(os.environ.get, variables)), None)
+    with contextlib.suppress(OSError, RuntimeError):  # RuntimeError: a user without a home
+        folder = (Path(given) if given else Path.home() / ".cache") / OWN
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.lstat()
+        if stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & 0o022:
+            return folder
+    return None
+
+
+def kept_interfaces() -> Path | None:
+    """Return the user's folder for interface packages that were built, created if needed; None if there is none."""
+    folder = own_folder("XDG_CACHE_HOME")
+    if folder is None:
+        return None
+    place = folder / "interfaces"
+    with contextlib.suppress(OSError):
+        place.mkdir(mode=0o755, exist_ok=True)
+    return place if place.is_dir() else None
 
 
 @contextmanager

@@ -130,6 +130,7 @@ class Worker:
             budget_words: The reason to give when that is used up.
         """
         self._real_ns = self._starved_ns = 0
+        sys.path += [folder for folder in plan.interfaces if folder not in sys.path]  # installed packages come first
         limit_processor_time(plan.limits)
         started_ns = time.monotonic_ns()
         for _ in range(WALL_TRIES if plan.clock == "wall" else 1):
@@ -204,13 +205,14 @@ class Worker:
             "clock": plan.clock,
             "log_format": LOG_FORMAT,
             "python_paths": [str(p) for p in self._runtime.python_paths],
+            "interfaces": plan.interfaces,
             "limits": {"start_cpu_s": START_CPU_S, "wake_up_cpu_s": WAKE_UP_CPU_S, "blocked_s": BLOCKED_S},
             **told,
         }
         launcher = f"{self._isolation.host_seen_at}/launcher.py"
         arguments = ("-s", "-u", "-B", "-X", "utf8", launcher, json.dumps({**request, "fd": theirs.fileno()}))
         process = StudentProcess(
-            runtime=self._runtime,
+            runtime=_with_interfaces(self._runtime, plan),
             host_folder=Path(__file__).resolve().parents[1] / "student_host",
             submission=Path(plan.root),
             arguments=arguments,
@@ -248,9 +250,11 @@ class Worker:
     def _start_bare(self, plan: Plan, name: str, file: str, domain: int) -> NodeProcess:
         """Start a file without the grader's code in its process."""
         root = self._isolation.submission_seen_at or plan.root
+        runtime = _with_interfaces(self._runtime, plan)
         command = self._isolation.student_command(
             StudentProcess(
-                runtime=self._runtime,
+                # nothing in its process could add to sys.path, so these folders come before the installed packages
+                runtime=replace(runtime, python_paths=(*runtime.python_paths, *map(Path, plan.interfaces))),
                 host_folder=None,
                 submission=Path(plan.root),
                 arguments=bare_arguments(Path(plan.root), root, file, plan.start_of(name)),
@@ -262,6 +266,11 @@ class Worker:
         student = BareProcess.begin(name, root, command, plan.limits)
         student.file, student.places = file, Places(Path(plan.root))
         return student
+
+
+def _with_interfaces(runtime: PythonRuntime, plan: Plan) -> PythonRuntime:
+    """Return a runtime whose processes can also read what was built for a plan, modules and descriptions."""
+    return replace(runtime, read_paths=(*runtime.read_paths, *(Path(folder).parent for folder in plan.interfaces)))
 
 
 def _import_runners() -> Mapping[str, Callable[..., Runner]]:

@@ -161,5 +161,8 @@ def _generate(prefix: Path, share: Sequence[Path]) -> None:
 
 
 def _limit() -> None:
-    resource.setrlimit(resource.RLIMIT_CPU, (_PROCESSOR_S, _PROCESSOR_S))
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+    """Limit the process that generates, unless it has lower limits already."""
+    for which, wanted in ((resource.RLIMIT_CPU, _PROCESSOR_S), (resource.RLIMIT_AS, _MEMORY)):
+        _, most = resource.getrlimit(which)
+        value = wanted if most == resource.RLIM_INFINITY else min(wanted, most)
+        resource.setrlimit(which, (value, value))

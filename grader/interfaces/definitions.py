@@ -13,7 +13,7 @@ import math
 import re
 import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -147,6 +147,12 @@ class Interface:
 
 def _file(definition: Definition) -> str:
     return f"{definition.kind}/{definition.name}.{definition.kind}"
+
+
+def files_in(folders: Iterable[Path]) -> list[Path]:
+    """The files of all packages in some folders, sorted: definitions and manifests."""
+    patterns = (*(f"*.{kind}" for kind in KINDS), "package.xml")
+    return sorted({path for folder in folders for pattern in patterns for path in folder.rglob(pattern)})
 
 
 def find_packages(folder: Path) -> tuple[InterfacePackage, ...]:

@@ -14,15 +14,19 @@ from grader.judging.source import read, words
 ROS_PACKAGES = frozenset(
     words(
         "action_tutorials_interfaces angles catkin_pkg composition_interfaces cv_bridge domain_coordinator "
-        "example_interfaces image_geometry interactive_markers joint_state_publisher laser_geometry launch launch_ros "
+        "image_geometry interactive_markers joint_state_publisher laser_geometry launch launch_ros "
         "launch_testing launch_testing_ros launch_xml launch_yaml logging_demo map_msgs message_filters "
         "osrf_pycommon pcl_msgs pendulum_msgs PyKDL python_qt_binding qt_gui resource_retriever robot_state_publisher "
         "ros2action ros2bag ros2cli ros2component ros2doctor ros2interface ros2launch ros2lifecycle ros2node ros2param "
         "ros2pkg ros2run ros2service ros2topic rosbag2_interfaces rosbag2_py rosidl_runtime_py rqt_gui rqt_gui_py "
-        "sensor_msgs_py sros2 statistics_msgs tf2_geometry_msgs tf2_kdl tf2_msgs tf2_py tf2_ros tf2_sensor_msgs "
-        "tf2_tools topic_monitor turtlesim"
+        "sensor_msgs_py sros2 statistics_msgs tf2_geometry_msgs tf2_kdl tf2_py tf2_ros tf2_sensor_msgs "
+        "tf2_tools topic_monitor"
     )
 )
+
+
+#: Endings of the names of packages that hold nothing but interfaces.
+INTERFACES = ("_msgs", "_interfaces")
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,6 +49,7 @@ def judge_run(
         staff_notes=tuple(note for note in run.notes if note not in run.submission.notes),
         reproduce=run.reproduce,
         pending=tuple(exercise.id for exercise in exercises if exercise.id in pending),
+        interfaces=run.interfaces,
     )
 
 

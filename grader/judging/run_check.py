@@ -14,7 +14,7 @@ from grader.core.submission import Submission
 from grader.core.trace import Fault, FaultKind, Request, Response, Trace
 from grader.judging.checks import CHECKS
 from grader.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
-from grader.judging.installation import lacking_package
+from grader.judging.installation import INTERFACES, lacking_package
 from grader.judging.values import student_endpoints
 from grader.judging.wording import quote, span
 
@@ -101,6 +101,8 @@ def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sourc
         return answer
     text = f"{fault_place(lack.fault)}: {lack.name} is a package of ROS 2 that is not installed where this was graded"
     hint = f"grade again where {lack.name} is installed, or leave the import out if the program does not need it"
+    if lack.name.endswith(INTERFACES):
+        hint = f"grade again with --interfaces and the folder of {lack.name}, which has its definitions"
     return Answer(problem=f"{text}, which is no fault of the program", hint=hint, fault=lack.fault)
 
 

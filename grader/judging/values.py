@@ -20,7 +20,9 @@ P = ParamSpec("P")
 EXACT = 1e-6
 #: Largest difference between two clock readings of one moment.
 JITTER_NS = {ClockKind.VIRTUAL: 0, ClockKind.WALL: 50 * NS_PER_MS}
-_NUMERIC_TYPE = re.compile(r"std_msgs/msg/(Float(32|64)|U?Int(8|16|32|64)|Char)|sensor_msgs/msg/Temperature")
+_NUMERIC_TYPE = re.compile(
+    r"(std_msgs|example_interfaces)/msg/(Float(32|64)|U?Int(8|16|32|64)|Char)|sensor_msgs/msg/Temperature"
+)
 
 
 @dataclass(frozen=True, slots=True)

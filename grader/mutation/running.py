@@ -15,6 +15,7 @@ from pathlib import Path
 from libcst import ParserSyntaxError
 
 from grader.app.grade import Progress, plan_jobs, read_exercises, read_recording
+from grader.app.interface_packages import provide
 from grader.app.request import GradeRequest
 from grader.app.seeds import PRACTICE
 from grader.core.errors import RubricError
@@ -51,12 +52,13 @@ class TrialRunner:
     reference: Submission
     sources: Mapping[str, str]
     progress: Progress
+    interfaces: tuple[Path, ...] = ()  # folders of interface packages that are not installed
     traces: dict[str, Trace] = field(default_factory=dict)
     recordings: int = 0
 
     def grade(self, submission: Submission) -> tuple[TrialResult, dict[str, Trace]]:
         """Grade a complete submission; the traces are those of its scenarios."""
-        jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed)
+        jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed, self.interfaces)
         recorded = self.session.record(jobs, self.request.clock, self.progress)
         self.recordings += len(recorded)
         traces = {scenario: trace for (_, scenario), trace in recorded.items()}
@@ -83,7 +85,7 @@ class TrialRunner:
             done += len(chunk)
 
     def _jobs(self, candidate: Candidate, submission: Submission) -> Mapping[tuple[str, str], Job]:
-        jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed)
+        jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed, self.interfaces)
         concerned = {s.id for s in self.exercise.scenarios if candidate.file in s.processes}
         return {key: job for key, job in jobs.items() if key[1] in concerned}
 
@@ -161,6 +163,7 @@ def _bench(  # noqa: PLR0913  each comes from a different stage
         reference=reference,
         sources=_sources(reference, exercise),
         progress=progress,
+        interfaces=provide(session, [exercise], (), reference.root).folders,
         workers=options.jobs or 1,
     )
 

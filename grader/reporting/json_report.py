@@ -79,6 +79,7 @@ class ReportData(TypedDict):
     duration_s: float
     exercises: list[ExerciseData]
     reproduce: JsonObject
+    interfaces: NotRequired[list[JsonObject]]
 
 
 def report_to_json(report: Report) -> ReportData:
@@ -103,6 +104,7 @@ def report_to_json(report: Report) -> ReportData:
                 "rubrics": dict(report.reproduce.rubrics),
                 "recording": report.reproduce.recording or None,
             },
+            **({"interfaces": [asdict(package) for package in report.interfaces]} if report.interfaces else {}),
         }
     )
     return values

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
@@ -16,6 +16,7 @@ import msgspec
 from grader.core.errors import HarnessError
 from grader.core.quantities import FieldOf
 from grader.core.scenario import ActionGoal, MessageStream, NumberStream, ServiceCalls, ServiceServer, Stimulus
+from grader.core.submission import Definition
 from grader.judging.series import curve
 from grader.rubrics.mistakes import found, nearest
 from grader.rubrics.model import RubricShape
@@ -28,6 +29,29 @@ from grader.submissions.collected import listed, shown
 #: Arrays add 48, bounded sequences 96 and unbounded ones 144.
 _NESTED, _NUMBERS, _BOOLEAN, _TEXTS = 1, range(2, 13), 15, range(17, 23)
 _ARRAY, _SEQUENCE = 48, 96
+_BOUNDED, _UNBOUNDED = _SEQUENCE, 144
+_BOUNDED_TEXTS = (21, 22)
+#: The names of these types in .msg files; a char is an uint8 there.
+_PRIMITIVES: Mapping[int, str] = {
+    2: "int8",
+    3: "uint8",
+    4: "int16",
+    5: "uint16",
+    6: "int32",
+    7: "uint32",
+    8: "int64",
+    9: "uint64",
+    10: "float32",
+    11: "float64",
+    12: "float64",
+    13: "uint8",
+    14: "wstring",
+    15: "bool",
+    16: "byte",
+    **{number: "wstring" if number % 2 == 0 else "string" for number in range(17, 23)},
+}
+#: What separates the definitions of nested types from each other in the text of a message type.
+_RULE = "=" * 80
 #: The part of a service or action that a stimulus or a check holds the fields of.
 _SENT: Mapping[type[Stimulus], tuple[str, str]] = {
     MessageStream: ("values", ""),
@@ -37,12 +61,15 @@ _SENT: Mapping[type[Stimulus], tuple[str, str]] = {
 }
 _KINDS = {"msg": "message", "srv": "service", "action": "action"}
 _ORDERS = ("any_order", "in_order", "some_of")
+#: Builds the interface packages in some folders, and returns the folders with their type descriptions.
+Build = Callable[[Sequence[Path]], Sequence[Path]]
 _INDEX = re.compile(r"\[([0-9]+)\]")
 
 
 class _FieldType(msgspec.Struct):
     type_id: int
     capacity: int = 0
+    string_capacity: int = 0
     nested_type_name: str = ""
 
 
@@ -64,7 +91,17 @@ class Field(msgspec.Struct):
 
     def item(self, name: str) -> Field:
         """Return an element of a list as a field with a name of its own."""
-        return Field(name, _FieldType(self.element, 0, self.type.nested_type_name))
+        return Field(name, _FieldType(self.element, 0, self.type.string_capacity, self.type.nested_type_name))
+
+    @property
+    def declaration(self) -> str:
+        """The line of a .msg file that declares it."""
+        of = self.type
+        name = _PRIMITIVES.get(self.element) or of.nested_type_name.replace("/msg/", "/")
+        bound = f"<={of.string_capacity}" if self.element in _BOUNDED_TEXTS else ""
+        count = "<=" if _BOUNDED < of.type_id < _UNBOUNDED else ""
+        size = f"[{count}{of.capacity or ''}]" if self.is_list else ""
+        return f"{name}{bound}{size} {self.name}"
 
     @property
     def words(self) -> str:
@@ -85,20 +122,54 @@ class _Descriptions(msgspec.Struct):
     referenced_type_descriptions: list[_Description]
 
 
+class _Hash(msgspec.Struct):
+    type_name: str
+    hash_string: str
+
+
 class _File(msgspec.Struct):
     type_description_msg: _Descriptions
+    type_hashes: list[_Hash] = []
 
 
 class Interfaces:
-    """The types that are installed in some folders.
+    """The types that nodes can use.
 
     Args:
-        folders: The `share` folders of ROS installations; the first one that has a package counts.
+        folders: The `share` folders of ROS installations; the first folder that has a package counts.
+        shipped: Folders with the packages that ship with the grader; they count last.
+        build: Builds the interface packages in some folders, and returns the folders to look in.
     """
 
-    def __init__(self, folders: Sequence[Path]) -> None:
-        self._folders = folders
+    def __init__(self, folders: Sequence[Path], shipped: Sequence[Path] = (), build: Build | None = None) -> None:
+        self._all = (folders, shipped, build)
+        self._folders = (*folders, *shipped)
         self._types: dict[str, Mapping[str, Field] | None] = {}
+        self._hashes: dict[str, str] = {}
+
+    def including(self, folders: Sequence[Path]) -> Interfaces:
+        """Return these types and those of the interface packages in some folders; raises RubricError."""
+        known, shipped, build = self._all
+        return Interfaces((*known, *build(folders)), shipped, build) if build is not None and folders else self
+
+    def definition(self, type_: str) -> Definition | None:
+        """Return the definition of a message type, without comments and constants; None if it is not known."""
+        fields_ = self.fields(type_)
+        if fields_ is None or type_ not in self._hashes:
+            return None
+        nested, waiting = dict.fromkeys([type_]), [type_]
+        while waiting:
+            for field in (self.fields(waiting.pop()) or {}).values():
+                inner = field.type.nested_type_name
+                if inner and inner not in nested:
+                    nested[inner] = None
+                    waiting.append(inner)
+        texts = []
+        for name in nested:
+            header = "" if name == type_ else f"{_RULE}\nMSG: {name.replace('/msg/', '/')}\n"
+            lines = [field.declaration for field in (self.fields(name) or {}).values()]
+            texts.append(header + "".join(f"{line}\n" for line in lines))
+        return Definition("".join(texts), self._hashes[type_])
 
     def fields(self, type_: str) -> Mapping[str, Field] | None:
         """Return the fields of a type such as `std_srvs/srv/Trigger_Request`, by name; None if it is not installed."""
@@ -114,9 +185,11 @@ class Interfaces:
     def _read(self, file: Path) -> None:
         """Add the types that a type description file holds; one that cannot be read holds none."""
         try:
-            read = msgspec.json.decode(file.read_bytes(), type=_File).type_description_msg
+            data = msgspec.json.decode(file.read_bytes(), type=_File)
         except (OSError, msgspec.DecodeError):
             return
+        read = data.type_description_msg
+        self._hashes |= {known.type_name: known.hash_string for known in data.type_hashes}
         for one in (read.type_description, *read.referenced_type_descriptions):
             self._types[one.type_name] = {field.name: field for field in one.fields}
 

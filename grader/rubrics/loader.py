@@ -37,6 +37,7 @@ from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, fee
 from grader.rubrics.own_checks import (
     OwnFile,
     OwnSimulation,
+    definition_files,
     digest_of,
     load,
     load_simulations,
@@ -45,7 +46,7 @@ from grader.rubrics.own_checks import (
 )
 from grader.rubrics.run_options import RunShape
 from grader.rubrics.simulations import simulation_mistakes
-from grader.rubrics.types import CHECK_FILE, PROVIDED_FILE, PROVIDED_WORDS, build
+from grader.rubrics.types import CHECK_FILE, INTERFACE_FOLDER, PROVIDED_FILE, PROVIDED_WORDS, build
 from grader.rubrics.variants import (
     Draw,
     First,
@@ -257,11 +258,14 @@ def read_rubric(
     tree = _tree(path, content)
     files = own_files(path, _own_names(path, tree, "checks"), submissions)
     simulated = own_files(path, _own_names(path, tree, "simulations"), submissions, key="simulations")
-    others = own_files(path, _provided_names(path, tree), submissions, key="provided")
+    others = own_files(path, _own_names(path, tree, "provided"), submissions, key="provided")
     brought = _Brought(
         {**checks, **load(files, checks)}, load_simulations(simulated), {one.name: _provided(one) for one in others}
     )
-    digest = digest_of(content, tuple(dict.fromkeys((*files, *others, *simulated))))
+    definitions = definition_files(path, folders := _own_names(path, tree, "interfaces"), submissions)
+    digest = digest_of(content, tuple(dict.fromkeys((*files, *others, *simulated, *definitions))))
+    if interfaces is not None and folders:
+        interfaces = interfaces.including([path.parent / folder for folder in folders])
     if not has_variants(tree):
         return _exercise(path, tree, brought, digest, interfaces)
     options = options_of(_validated(path, tree, Variants))
@@ -342,24 +346,20 @@ def _exercise(
         criteria=criteria,
         digest=digest,
         by_request=rubric.exercise.by_request,
+        interfaces=tuple(str(path.parent / folder) for folder in rubric.interfaces),
     )
-
-
-def own_check_files(path: Path) -> tuple[OwnFile, ...]:
-    """Return the check files that a rubric names, without running them; raises RubricError like `read_rubric`."""
-    return own_files(path, _own_names(path, _tree(path, _content(path)), "checks"))
 
 
 def side_files(path: Path) -> tuple[OwnFile, ...]:
     """Return every file that a rubric names beside it, without running any; raises RubricError like `read_rubric`."""
     tree = _tree(path, _content(path))
-    checks, simulations = (_own_names(path, tree, key) for key in ("checks", "simulations"))
-    return own_files(path, (*checks, *simulations, *_provided_names(path, tree)))
+    files = (name for key in ("checks", "simulations", "provided") for name in _own_names(path, tree, key))
+    return (*own_files(path, tuple(files)), *definition_files(path, _own_names(path, tree, "interfaces")))
 
 
 def own_checks(path: Path) -> Mapping[str, type]:
     """Return a rubric's own checks by name, used or not; raises RubricError like `read_rubric`."""
-    return load(own_check_files(path), CHECKS)
+    return load(own_files(path, _own_names(path, _tree(path, _content(path)), "checks")), CHECKS)
 
 
 def _tree(path: Path, content: bytes) -> YamlTree:
@@ -371,23 +371,23 @@ def _tree(path: Path, content: bytes) -> YamlTree:
         _refuse(path, [error.mistake])
 
 
+_PYTHON = (CHECK_FILE, "a Python file in the rubric's folder such as my_checks.py")
+#: What a rubric may bring, by key: the pattern of a name, and what is expected.
+_OWN = {
+    "checks": _PYTHON,
+    "simulations": _PYTHON,
+    "provided": (PROVIDED_FILE, PROVIDED_WORDS),
+    "interfaces": (INTERFACE_FOLDER, "a folder beside the rubric such as interfaces"),
+}
+
+
 def _own_names(path: Path, tree: YamlTree, key: str) -> tuple[str, ...]:
-    """Return the files named under a key; raises RubricError for a name that leads elsewhere."""
-    names = named_files(tree.data, key)
-    wrong = [(n, name) for n, name in enumerate(names) if re.fullmatch(CHECK_FILE, name) is None]
+    """Return the files or folders named under a key; raises RubricError for a name that leads elsewhere."""
+    names, (pattern, expected) = named_files(tree.data, key), _OWN[key]
+    wrong = [(n, name) for n, name in enumerate(names) if re.fullmatch(pattern, name) is None]
     if wrong:
-        text = "expected a Python file in the rubric's folder such as my_checks.py, found"
+        text = f"expected {expected}, found"
         _refuse(path, [tree.at((key, n)).mistake(f"{text} `{shown(name)}`") for n, name in wrong])
-    return names
-
-
-def _provided_names(path: Path, tree: YamlTree) -> tuple[str, ...]:
-    """Return the named provided files; raises RubricError for a name that leads elsewhere."""
-    names = named_files(tree.data, "provided")
-    wrong = [(n, name) for n, name in enumerate(names) if re.fullmatch(PROVIDED_FILE, name) is None]
-    if wrong:
-        text = f"expected {PROVIDED_WORDS}, found"
-        _refuse(path, [tree.at(("provided", n)).mistake(f"{text} `{shown(name)}`") for n, name in wrong])
     return names
 
 

@@ -32,6 +32,7 @@ from grader.rubrics.types import (
     Choice,
     HandedIn,
     Id,
+    InterfaceFolder,
     LongDuration,
     Number,
     Points,
@@ -210,6 +211,9 @@ class RubricShape(Shape):
     )
     checks: tuple[CheckFile, ...] = Field(default=(), description="files of checks of one's own, beside the rubric")
     simulations: tuple[CheckFile, ...] = Field(default=(), description="files of simulations of one's own, as above")
+    interfaces: tuple[InterfaceFolder, ...] = Field(
+        default=(), description="folders beside the rubric with interface packages: msg, srv and action definitions"
+    )
     limits: LimitsShape = Field(default_factory=LimitsShape)
     feedback: FeedbackField | None = None
     variants: VariantsField = Field(default_factory=dict)

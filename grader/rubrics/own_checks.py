@@ -1,4 +1,4 @@
-"""Loads a rubric's own checks and simulations: Python files beside a rubric, which names them.
+"""Reads what a rubric brings in files beside it: checks, simulations, and definitions of messages.
 
 Checks run in the judging process. Simulations run in the worker, which gets the text of their file with each plan.
 """
@@ -20,6 +20,7 @@ from typing import Any
 
 from grader.core.author_files import line_of, run, words_of
 from grader.core.errors import RubricError
+from grader.interfaces.definitions import files_in
 from grader.rubrics.check_parameters import choice_model, simulation_shape
 from grader.simulation import loading
 from grader.simulation.participant import Simulation
@@ -34,9 +35,13 @@ _ID = re.compile(r"[a-z][a-z0-9_]*")
 _ALONE = "such a file may import the standard library, grader and what is installed, but no file beside it"
 
 
+#: Most files of interface packages that a rubric may bring.
+MOST_DEFINITIONS = 400
+
+
 @dataclass(frozen=True, slots=True)
 class OwnFile:
-    """A file that a rubric brings, with its name as written in the rubric: relative to it, with `/`."""
+    """A file that a rubric brings, with its name relative to the rubric, with `/`."""
 
     name: str
     path: Path
@@ -70,8 +75,26 @@ def own_files(
     return tuple(_own_file(rubric, name, never_in, f"{where} {shown(name)}") for name in dict.fromkeys(names))
 
 
+def definition_files(rubric: Path, folders: Sequence[str], never_in: Sequence[Path] = ()) -> tuple[OwnFile, ...]:
+    """Return the definitions of messages, services and actions in the folders that a rubric names, sorted by name.
+
+    Raises:
+        RubricError: A folder holds none or too many, or a file cannot be used; see `own_files`.
+    """
+    found: list[OwnFile] = []
+    for folder in dict.fromkeys(folders):
+        paths = files_in([rubric.parent / folder])
+        where = f"{shown(str(rubric), 500)}: interfaces:"
+        if not 0 < len(paths) <= MOST_DEFINITIONS:
+            text = f"{where} {shown(folder)}: expected a folder with 1 to {MOST_DEFINITIONS} definitions, found "
+            raise RubricError(f"{text}{len(paths) or 'none'}", "a package has its files in folders msg, srv and action")
+        names = [path.relative_to(rubric.parent).as_posix() for path in paths]
+        found += [_own_file(rubric, name, never_in, f"{where} {shown(name)}", least=0) for name in names]
+    return tuple(found)
+
+
 def named_files(data: object, key: str) -> tuple[str, ...]:
-    """Return the files named under a key of a rubric's data; the rubric's shape reports anything else."""
+    """Return the files or folders named under a key of a rubric's data; the rubric's shape reports anything else."""
     names = data.get(key) if isinstance(data, Mapping) else None
     return tuple(name for name in names if isinstance(name, str)) if isinstance(names, list) else ()
 
@@ -101,14 +124,14 @@ def load_simulations(files: Sequence[OwnFile]) -> dict[str, OwnSimulation]:
 
 
 def digest_of(rubric: bytes, files: Sequence[OwnFile]) -> str:
-    """Return the `sha256:` digest of a rubric and the files it names; without such files, that of the rubric alone."""
+    """Return the `sha256:` digest of a rubric and the files it brings; without such files, that of the rubric alone."""
     digest = hashlib.sha256(rubric)
     for file in files:
         digest.update(f"\0{file.name}\0{len(file.content)}\0".encode() + file.content)
     return f"sha256:{digest.hexdigest()}"
 
 
-def _own_file(rubric: Path, name: str, never_in: Sequence[Path], where: str) -> OwnFile:
+def _own_file(rubric: Path, name: str, never_in: Sequence[Path], where: str, least: int = 1) -> OwnFile:
     path = rubric.parent / name
     try:
         real = path.resolve(strict=True)
@@ -123,9 +146,9 @@ def _own_file(rubric: Path, name: str, never_in: Sequence[Path], where: str) -> 
         raise RubricError(f"{where}: expected a file in the rubric's folder, found one that is not")
     if theirs:
         text = f"{where}: expected a file that students cannot write, found one in {shown(str(theirs[0]))}"
-        raise RubricError(text, "keep rubrics and their checks apart from submissions")
-    if not content:
-        raise RubricError(f"{where}: expected 1 byte to {MAX_BYTES // 1024} KiB, found none or more")
+        raise RubricError(text, "keep rubrics and what they bring apart from submissions")
+    if not least <= len(content) or (not content and real.stat().st_size):
+        raise RubricError(f"{where}: expected {least} byte to {MAX_BYTES // 1024} KiB, found none or more")
     return OwnFile(name, path, content)
 
 

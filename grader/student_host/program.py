@@ -21,7 +21,6 @@ from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_processes
 from .packages import packages_of
-from .shadows import install_stand_ins
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
@@ -54,11 +53,13 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     """Run the file that a request names; never returns.
 
     Args:
-        request: `fd` of the socket, `root` and `file` of the submission, `clock`, `seed` (hex), `log_format`, `limits`.
+        request: `fd` of the socket, `root` and `file` of the submission, `clock`, `seed` (hex), `log_format`, `limits`,
+            and `interfaces`, the folders of interface packages that are not installed.
         host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
             hide one that it has imported.
     """
     prepared = host is not None
+    sys.path += request["interfaces"]  # installed packages come first
     host = host or Host(request["clock"])
     link, describer, time = host.link, host.describer, host.time
     link.open(request["fd"])
@@ -76,7 +77,6 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     elif not hides_modules(request):  # otherwise done when the program imports rclpy
         install_ros()
         preload(os.path.join(request["root"], request["file"]))
-    install_stand_ins()
     seed_randomness(request["seed"])
     os.register_at_fork(after_in_child=link.cut if request["clock"] == "wall" else lambda: originals.exit_now(70))
     start = link.ask(ready)

@@ -3,9 +3,6 @@
 A student's module may hide a module that Python or ROS needs. The host has already imported many modules, including
 rclpy. If a student's file has the name of one, the program starts without these modules, and rclpy is made virtual when
 the program imports it: each import finds the same module as without the host, and fails where it would fail.
-
-A stand-in for example_interfaces is provided if it is not installed: its names can be imported, but not used. Tutorials
-import it without using it. Every full ROS installation has it, but no wheel provides it.
 """
 
 from __future__ import annotations
@@ -64,19 +61,6 @@ ROS_PARTS = (
     "rclpy.time_source",
     "rclpy.utilities",
 )
-
-STAND_IN = "example_interfaces"
-_NUMBERS = ("Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64", "Float32", "Float64")
-#: Module -> its names, as in release 0.12 (Jazzy): https://github.com/ros2/example_interfaces
-INTERFACES = {
-    "msg": (
-        *_NUMBERS,
-        *(f"{name}MultiArray" for name in (*_NUMBERS, "Byte")),
-        *("Bool", "Byte", "Char", "Empty", "MultiArrayDimension", "MultiArrayLayout", "String", "WString"),
-    ),
-    "srv": ("AddTwoInts", "SetBool", "Trigger"),
-    "action": ("Fibonacci",),
-}
 
 
 class Shadows:
@@ -212,50 +196,3 @@ class _Doing(Loader):
         """Run the module, then call the function."""
         self._loader.exec_module(module)
         self._do()
-
-
-class _Missing(type):
-    """The metaclass of a stand-in for an interface: every use fails as the import would have."""
-
-    _TYPE_SUPPORT = None  # rclpy finds no type support here and calls the method below
-
-    @classmethod
-    def __import_type_support__(cls) -> None:
-        raise _missing()
-
-    def __getattr__(cls, name: str) -> Any:
-        if name.startswith("__"):
-            raise AttributeError(name)
-        raise _missing()
-
-    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
-        raise _missing()
-
-
-def _missing() -> ModuleNotFoundError:
-    return ModuleNotFoundError(f"No module named '{STAND_IN}'", name=STAND_IN)
-
-
-class StandIns(MetaPathFinder, Loader):
-    """The last importer: installed modules, and those of the submission, take precedence."""
-
-    def find_spec(self, fullname: str, path: object, target: object = None) -> ModuleSpec | None:
-        """Return the spec of a module of the package, or None for any other module."""
-        package, _, rest = fullname.partition(".")
-        if package != STAND_IN or (rest and rest not in INTERFACES):
-            return None
-        return ModuleSpec(fullname, self, is_package=not rest)
-
-    def create_module(self, spec: ModuleSpec) -> ModuleType | None:
-        """Let the interpreter create the module."""
-        return None
-
-    def exec_module(self, module: ModuleType) -> None:
-        """Fill a module with its names."""
-        for interface in INTERFACES.get(module.__name__.partition(".")[2], ()):
-            setattr(module, interface, _Missing(interface, (), {"__module__": module.__name__}))
-
-
-def install_stand_ins() -> None:
-    """Provide the stand-in for example_interfaces."""
-    sys.meta_path.append(StandIns())

@@ -30,7 +30,7 @@ from grader.core.submission import StudentFile, Submission
 from grader.core.trace import Trace
 from grader.judging.judge_run import judge_exercise
 from grader.packaging import Chosen, classroom50
-from grader.rubrics.loader import RubricMistakes, own_check_files, read_rubric
+from grader.rubrics.loader import RubricMistakes, read_rubric, side_files
 from grader.testing import TraceBuilder, judge
 
 FLOAT = "std_msgs/msg/Float32"
@@ -155,9 +155,7 @@ def test_the_digest_covers_the_file(tmp_path: Path) -> None:
     assert read_rubric(path).digest == before
     write_rubric(tmp_path, checks=CHECKS_FILE + "\n# another thought\n")
     assert read_rubric(path).digest != before
-    assert [(file.name, file.path) for file in own_check_files(path)] == [
-        ("pump_checks.py", tmp_path / "pump_checks.py")
-    ]
+    assert [(file.name, file.path) for file in side_files(path)] == [("pump_checks.py", tmp_path / "pump_checks.py")]
 
 
 def test_an_exception_leaves_the_criterion_undecided(tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.execution import bare_start
 from grader.execution.bare_start import bare_arguments
 from grader.execution.plan import PlannedStart
 
@@ -64,13 +63,6 @@ def test_a_file_in_a_package_is_run_as_its_module(tmp_path: Path) -> None:
     (package / "b.py").write_text("from .part import WORD\nprint(WORD, __name__)\n")
     assert ran(tmp_path, "src/robot/a.py") == "part robot.a"
     assert ran(tmp_path, "src/robot/b.py") == "part __main__"
-
-
-def test_interfaces_that_are_not_installed_can_be_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tutorials import them without using them; the host stands in for them as well."""
-    monkeypatch.setattr(bare_start, "find_spec", lambda name: None)
-    (tmp_path / "a.py").write_text("from example_interfaces.srv import AddTwoInts\nprint(AddTwoInts.__name__)\n")
-    assert ran(tmp_path, "a.py") == "AddTwoInts"
 
 
 GIVEN = PlannedStart(

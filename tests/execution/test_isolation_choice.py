@@ -25,6 +25,7 @@ from grader.execution.sandbox.choose import choose_isolation, inspect_tier, insp
 from grader.execution.sandbox.memory import Memory
 from grader.execution.sandbox.tiers import ISOLATING, Plain, isolation_from_name
 from grader.execution.sandbox.trial import NO_EXCHANGE
+from grader.execution.temp_dirs import OWN
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "from grader.cli.main import main; main()"
@@ -37,7 +38,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Tests remember nothing of each other, and nothing of the user's."""
     monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path / "cache" / memory.FOLDER
+    return tmp_path / "cache" / OWN
 
 
 def report(name: str = "bubblewrap", properties: tuple[Property, ...] = ALL_HOLD, **changes: Any) -> TierReport:

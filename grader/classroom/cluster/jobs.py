@@ -119,6 +119,7 @@ def write_task(terms: Terms, job: GradingJob, scratch: Path) -> Task:
         standalone=terms.standalone,
         deadline_s=terms.deadline_s,
         collected=collected,
+        interfaces=tuple(Path(os.fsdecode(name)) for name in terms.interfaces),
     )
 
 

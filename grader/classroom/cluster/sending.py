@@ -26,6 +26,7 @@ from grader.classroom.messages import (
 from grader.classroom.store import State, refused
 from grader.classroom.worker import PARTS
 from grader.core.errors import HarnessError, RecordingError, RubricError, SubmissionError
+from grader.interfaces.definitions import files_in
 from grader.rubrics.loader import side_files
 from grader.rubrics.variants import First
 from grader.submissions.submission import collect_submission
@@ -39,7 +40,8 @@ def terms_of(task: Task) -> Terms:
         conditions=replace(task.conditions, seed=None),  # each job has its own seed
         exercises=task.exercises,
         rubrics=tuple((travelling_name(path), _content(path)) for path in task.rubrics),
-        checks=tuple(checks_of(task.rubrics)),
+        checks=(*checks_of(task.rubrics), *_definitions(task.interfaces)),
+        interfaces=tuple(map(travelling_name, task.interfaces)),
         odom_bag=b"" if task.odom_bag is None else travelling_name(task.odom_bag),
         recording=() if task.odom_bag is None else _recording(task.odom_bag),
         standalone=task.standalone,
@@ -48,15 +50,22 @@ def terms_of(task: Task) -> Terms:
 
 
 def checks_of(rubrics: Sequence[Path]) -> Iterator[tuple[bytes, bytes]]:
-    """Yield the rubrics' own check files, which were validated when the rubrics were read."""
+    """Yield the files that the rubrics bring, which were validated when the rubrics were read."""
     for path in rubrics:
         for file in side_files(path):
             yield travelling_name(file.path), file.content
 
 
+def _definitions(folders: Sequence[Path]) -> Iterator[tuple[bytes, bytes]]:
+    """Yield the files of the class's interface packages."""
+    for path in files_in(folders):
+        yield travelling_name(path), _content(path)
+
+
 def files_wanted(task: Task) -> Sequence[str]:
     """Return the names of the files that the class of a task has to hand in."""
     asked = GradeRequest("", exercises=task.exercises, every=task.conditions.every, rubrics=task.rubrics, draw=First())
+    asked = replace(asked, interfaces=task.interfaces)
     return wanted_files(read_exercises(asked))
 
 

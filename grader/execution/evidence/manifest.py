@@ -20,9 +20,9 @@ from typing import Any
 import msgspec
 
 from grader.core.errors import EvidenceError
-from grader.core.report import Environment
+from grader.core.report import BroughtPackage, Environment
 from grader.core.scenario import Scenario
-from grader.core.submission import StudentFile
+from grader.core.submission import Definition, StudentFile
 
 #: Describes the run and lists its recordings; written last.
 MANIFEST = "evidence.json"
@@ -168,7 +168,15 @@ class KeptRun(_Strict, frozen=True):
     request: dict[str, Any]
 
 
-class Manifest(_Strict, frozen=True):
+class KeptInterfaces(_Strict, frozen=True):
+    """The interface packages that are not installed, and the definitions of the recorded message types among theirs."""
+
+    packages: tuple[BroughtPackage, ...] = ()
+    offered: str = ""  # digest of all packages of rubric and class, used or not
+    definitions: dict[str, Definition] = {}
+
+
+class Manifest(_Strict, frozen=True, omit_defaults=True):
     """Everything but the recordings; `files` lists what the grader wrote, `complete` is false while writing."""
 
     format: str
@@ -179,6 +187,7 @@ class Manifest(_Strict, frozen=True):
     environment: Environment
     exercises: tuple[KeptExercise, ...]
     sources: dict[str, str]
+    interfaces: KeptInterfaces = KeptInterfaces()
 
 
 def dump(manifest: Manifest) -> bytes:

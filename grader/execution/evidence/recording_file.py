@@ -26,6 +26,7 @@ from ruamel.yaml import YAML
 from grader.core.errors import EvidenceError
 from grader.core.quantities import NS_PER_S
 from grader.core.releases import DEFAULT
+from grader.core.submission import Definition
 from grader.core.trace import (
     Delivery,
     Fault,
@@ -62,40 +63,45 @@ class Unknown(ValueError):  # noqa: N818 - named after what the type or the byte
     """A message has a type without a known definition, or its bytes do not match the type."""
 
 
-@dataclass(frozen=True, slots=True)
-class Definition:
-    """The definition of a message type: its text, including nested types, and its hash."""
-
-    text: str
-    digest: str
-
-
 @lru_cache(maxsize=1)
 def _store() -> Any:
     return get_typestore(Stores[DEFAULT.messages])
 
 
+def definition(interface: str, brought: Mapping[str, Definition]) -> Definition:
+    """Return the definition of a message type; raises Unknown unless it is brought or one of ROS's common types."""
+    return brought[interface] if interface in brought else _common(interface)
+
+
 @lru_cache(maxsize=256)
-def definition(interface: str) -> Definition:
-    """Return the definition of a message type; raises Unknown if it is not one of ROS's common types."""
+def _common(interface: str) -> Definition:
     if interface not in _store().fielddefs:
         raise Unknown(interface)
     text, _ = _store().generate_msgdef(interface, ros_version=2)
     return Definition(text, _store().hash_rihs01(interface))
 
 
-def check_readable(interface: str, cdr: bytes) -> None:
-    """Check that other tools can decode a message; raises Unknown if they cannot."""
-    definition(interface)
+def check_readable(message: Message | Delivery, brought: Mapping[str, Definition]) -> None:
+    """Check that other tools can decode a message; raises Unknown if they cannot.
+
+    For a brought type that is left to the worker, which keeps no value of a malformed message: the definition may be a
+    student's, and a decoder of this process would be code that is generated from it.
+    """
+    interface = message.type
+    if interface in brought:
+        if not message.value:
+            raise Unknown(interface)
+        return
+    _common(interface)
     try:
-        _store().deserialize_cdr(cdr, interface)
+        _store().deserialize_cdr(message.cdr, interface)
     except Exception as error:  # a malformed message may fail anywhere in the generated decoder
         raise Unknown(interface) from error
 
 
 def encode(interface: str, value: Mapping[str, Any]) -> bytes:
     """Serialize a message with these fields, all others zero, as CDR; raises Unknown if they do not fit the type."""
-    definition(interface)
+    _common(interface)
     try:
         return bytes(_store().serialize_cdr(_built(interface, value), interface))
     except Exception as error:  # values that a message cannot hold fail anywhere in the generated encoder
@@ -154,11 +160,11 @@ class Shown:
     exact: bool = False  # whether `cdr` is exactly what was sent, as in the trace
 
 
-def shown(observations: tuple[Observation, ...]) -> Iterator[Shown]:
+def shown(observations: tuple[Observation, ...], brought: Mapping[str, Definition]) -> Iterator[Shown]:
     """Yield one message for each observation, in order."""
     for observation in observations:
         if isinstance(observation, (Message, Delivery)):
-            yield _message(observation)
+            yield _message(observation, brought)
         elif isinstance(observation, LogRecord):
             yield _log(observation)
         else:
@@ -171,13 +177,13 @@ def said(t_ns: int, topic: str, value: Any) -> Shown:
     return Shown(_clamped(t_ns), topic, STRING, "grader", encode(STRING, {"data": text}))
 
 
-def _message(message: Message | Delivery) -> Shown:
+def _message(message: Message | Delivery, brought: Mapping[str, Definition]) -> Shown:
     publisher = "student" if isinstance(message, Message) else "grader"
     t_ns = _clamped(message.t_ns)
     try:
         _check_name(message.topic)
         if message.cdr:
-            check_readable(message.type, message.cdr)
+            check_readable(message, brought)
             return Shown(t_ns, message.topic, message.type, publisher, message.cdr, exact=True)
         if not message.value:
             raise Unknown(message.type)  # its content was not kept; zeros would pass for it
@@ -238,6 +244,7 @@ class _Channels:
     """Registers topics and types with a writer as they appear, and counts messages."""
 
     writer: Writer
+    brought: Mapping[str, Definition]
     ids: dict[_Key, int] = field(default_factory=dict)
     schemas: dict[str, int] = field(default_factory=dict)
     counts: Counter[_Key] = field(default_factory=Counter)
@@ -252,26 +259,28 @@ class _Channels:
         self.writer.add_message(self.ids[key], t_ns, message.cdr, publish_time=t_ns, sequence=sequence)
 
     def _registered(self, topic: str, interface: str, publisher: str) -> int:
-        known = definition(interface)
+        known = definition(interface, self.brought)
         if interface not in self.schemas:
             self.schemas[interface] = self.writer.register_schema(interface, "ros2msg", known.text.encode())
         metadata = {"offered_qos_profiles": "", "topic_type_hash": known.digest, "publisher": publisher}
         return self.writer.register_channel(topic, "cdr", self.schemas[interface], metadata)
 
 
-def recording_bytes(trace: Trace, facts: Mapping[str, str], name: str) -> tuple[bytes, bytes]:
+def recording_bytes(
+    trace: Trace, facts: Mapping[str, str], name: str, brought: Mapping[str, Definition] | None = None
+) -> tuple[bytes, bytes]:
     """Convert a trace to an MCAP file, and the `metadata.yaml` that makes its folder a rosbag2 recording.
 
     The same trace gives the same bytes. The facts are digests, seed and environment of the run; the name of the file is
-    part of rosbag2's metadata.
+    part of rosbag2's metadata. Brought are the definitions of message types that are not installed.
     """
-    about = _about(trace, facts)
-    messages = [said(0, RUN, about), *shown(trace.observations)]
+    about, brought = _about(trace, facts), brought or {}
+    messages = [said(0, RUN, about), *shown(trace.observations, brought)]
     packed = pack(trace, [message.exact for message in messages[1:]])
     stream = io.BytesIO()
     writer = Writer(stream, compression=CompressionType.ZSTD)
     writer.start(profile="ros2", library=_LIBRARY)
-    channels = _Channels(writer)
+    channels = _Channels(writer, brought)
     for message in messages:
         channels.add(message)
     writer.add_attachment(0, 0, TRACE, "application/zstd", zstandard.compress(packed))
@@ -363,7 +372,7 @@ def _information(messages: Iterable[Shown], channels: _Channels, name: str, dist
         "version": ROSBAG2_VERSION,
         "storage_identifier": "mcap",
         **_span(times),
-        "topics_with_message_count": _topics(channels.counts),
+        "topics_with_message_count": _topics(channels),
         "compression_format": "",
         "compression_mode": "",
         "relative_file_paths": [name],
@@ -381,10 +390,10 @@ def _span(times: Sequence[int]) -> dict[str, Any]:
     }
 
 
-def _topics(counts: Mapping[_Key, int]) -> list[dict[str, Any]]:
+def _topics(channels: _Channels) -> list[dict[str, Any]]:
     """Return each topic with its type once, independent of the publisher."""
     sums: Counter[tuple[str, str]] = Counter()
-    for (topic, interface, _), count in counts.items():
+    for (topic, interface, _), count in channels.counts.items():
         sums[topic, interface] += count
     return [
         {
@@ -393,7 +402,7 @@ def _topics(counts: Mapping[_Key, int]) -> list[dict[str, Any]]:
                 "type": interface,
                 "serialization_format": "cdr",
                 "offered_qos_profiles": [],
-                "type_description_hash": definition(interface).digest,
+                "type_description_hash": definition(interface, channels.brought).digest,
             },
             "message_count": count,
         }

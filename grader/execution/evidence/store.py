@@ -63,7 +63,7 @@ def keep(folder: Path, run: Run, exercises: Sequence[Exercise], *, request: Mapp
     recordings: dict[tuple[str, str], bytes] = {}
     for (exercise, scenario), trace in run.traces.items():
         name = files.recording_name(exercise, scenario)
-        recording, metadata = recording_bytes(trace, _facts(run, exercise), Path(name).name)
+        recording, metadata = recording_bytes(trace, _facts(run, exercise), Path(name).name, run.definitions)
         written[name] = recording
         written[files.metadata_name(exercise, scenario)] = metadata
         recordings[exercise, scenario] = recording
@@ -146,6 +146,9 @@ def run_from(manifest: kept.Manifest, exercises: Sequence[Exercise], traces: Map
         reproduce=Reproduction(
             rubrics=tuple((exercise.id, exercise.digest) for exercise in exercises), recording=manifest.run.recording
         ),
+        interfaces=manifest.interfaces.packages,
+        offered=manifest.interfaces.offered,
+        definitions=manifest.interfaces.definitions,
     )
 
 
@@ -203,7 +206,7 @@ def _compare(
     """Raise EvidenceError if the messages of a recording differ from the trace that is judged."""
     facts = _kept_facts(evidence.manifest, owner)
     name = Path(files.recording_name(owner.id, trace.scenario)).name
-    same = recording_bytes(trace, facts, name)[0] == data
+    same = recording_bytes(trace, facts, name, evidence.manifest.interfaces.definitions)[0] == data
     if not same or place_of_trace(data) != (recording.at, recording.size):
         raise EvidenceError("expected a recording that shows what is judged, found one that shows something else")
 
@@ -274,6 +277,7 @@ def _manifest(
             for e in exercises
         ),
         sources=dict(run.sources),
+        interfaces=kept.KeptInterfaces(run.interfaces, run.offered, dict(run.definitions)),
     )
 
 

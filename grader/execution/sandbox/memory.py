@@ -20,9 +20,9 @@ from grader.core.checkup import PROPERTIES, TIERS, Property, TierReport
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.bubblewrap import SYSTEM_PROGRAMS
 from grader.execution.sandbox.properties import SETTINGS
+from grader.execution.temp_dirs import own_folder
 
 LARGEST = 64 << 10
-FOLDER = "rclpy-grader"
 #: What reading a file that anything may have happened to raises.
 UNUSABLE = (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError)
 
@@ -42,7 +42,7 @@ class Memory:
         for what, text in circumstances(ros):
             texts[what] = "\n".join((texts.get(what, ""), text))
         key = {what: _digest(text) for what, text in texts.items()}
-        folder = own_folder()
+        folder = own_folder("XDG_RUNTIME_DIR", "XDG_CACHE_HOME")
         # A user may alternate between several installations, so each has its own file.
         installation = _digest(f"{Path(__file__)} {ros.runtime.executable} {ros.prefix}")[:12]
         return cls(folder / f"sandbox-{tier}-{installation}.json" if folder else None, key)
@@ -104,18 +104,6 @@ def report_from_json(values: object) -> TierReport:
     if not all(type(text) is str for text in texts) or not all(type(flag) is bool for flag in flags):
         raise TypeError("texts and flags")
     return report
-
-
-def own_folder() -> Path | None:
-    """Return a folder that only this user can write to, created if needed; None if there is none."""
-    given = os.environ.get("XDG_RUNTIME_DIR") or os.environ.get("XDG_CACHE_HOME")
-    with contextlib.suppress(OSError, RuntimeError):  # RuntimeError: a user without a home
-        folder = (Path(given) if given else Path.home() / ".cache") / FOLDER
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = folder.lstat()
-        if stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & 0o022:
-            return folder
-    return None
 
 
 def circumstances(ros: RosInstallation) -> Iterator[tuple[str, str]]:

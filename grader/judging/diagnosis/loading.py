@@ -162,7 +162,8 @@ def _missing_module(crash: Crash) -> Clue | None:
         return Clue(hint) if wanted.lower() == "rclpy.node" else None
     if wanted.endswith(_MESSAGE_ENDINGS) or _gives_messages(crash.case.source, wanted):
         listed = ", ".join(PACKAGES[:5])
-        return Clue(f"the package {wanted} is not here; use messages of the standard packages: {listed}, ...")
+        hint = f"the package {wanted} is not here: hand in its folder with the definitions, grade with --interfaces"
+        return Clue(f"{hint} FOLDER, or use messages of the standard packages: {listed}, ...")
     if "." in wanted:
         return None
     return Clue(f"{wanted} is neither in the submission nor installed here: hand it in, or do without it")
