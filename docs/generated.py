@@ -251,9 +251,9 @@ _STYLE |= dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.
 def drawn(chart: Chart) -> bytes:
     """Return a chart as SVG, without a background."""
     with rc_context(_STYLE):
-        height = 5.0 if chart.square else 0.6 + 1.7 * len(chart.panels)
-        figure = MatplotlibFigure(figsize=(7.2, height), layout="constrained")
-        axes = figure.subplots(len(chart.panels), sharex=True, squeeze=False)[:, 0]
+        heights = [0.5 + 0.35 * len(panel.lanes) if panel.lanes else 1.7 for panel in chart.panels]
+        figure = MatplotlibFigure(figsize=(7.2, 5.0 if chart.square else 0.6 + sum(heights)), layout="constrained")
+        axes = figure.subplots(len(heights), sharex=True, squeeze=False, height_ratios=heights)[:, 0]
         for ax, panel in zip(axes, chart.panels, strict=True):
             _draw(ax, panel)
             for case in chart.cases:
@@ -284,10 +284,10 @@ def _draw(ax: Axes, panel: Panel) -> None:
         x, y = [p[0] for p in series.points], [p[1] for p in series.points]
         ax.plot(x, y, color=_COLOURS[series.tone.value], label=series.name, **_LOOKS[series.look.value])
     if panel.lanes:
-        ax.set_yticks(range(len(panel.lanes)), panel.lanes)
-        ax.invert_yaxis()
-    ax.set_ylabel(" ".join(filter(None, [panel.title, panel.unit and f"({panel.unit})"])))
-    ax.legend(loc="upper right", fontsize=7, frameon=False)
+        ax.set_yticks(range(len(panel.lanes)), panel.lanes, fontsize=7)
+        ax.set_ylim(len(panel.lanes) - 0.5, -0.5)
+    ax.set_title(" ".join(filter(None, [panel.title, panel.unit and f"({panel.unit})"])), loc="left", fontsize=9)
+    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5), fontsize=7, frameon=False)
 
 
 # --- exercises --------------------------------------------------------------------------------------------------------

@@ -40,9 +40,10 @@ from grader.judging.wording import counted, listed, number, quote, unit_of
 #: Maximum number of panels of a chart, of panels for one topic, of lines in a panel, and of rows for texts.
 _MOST_PANELS, _MOST_GROUPS, _MOST_LINES, _MOST_WORDS = 6, 3, 6, 5
 #: Of so many messages, spread over all, it is read which fields there are and which of them change.
-_SAMPLES, _MOST_FIELDS = 60, 200
+_SAMPLES, _MOST_FIELDS = 40, 200
 #: Of a list that is longer than this, the first, the middle and the last element are drawn.
 _SHORT_LIST = 6
+_NESTED = re.compile(r"[.\[]")
 #: With up to this many values, what is published is drawn as steps: it is a state, not a curve.
 _FEW_VALUES, _FEW_INPUTS = 4, 30
 #: Responses that take less than this have no panel for the time that they took.
@@ -252,7 +253,7 @@ def value_panels(plot: Plot, timed: Sequence[_Timed], head: str, prefix: str = "
         panel, words = _text_panel(path, timed, prefix, plot.rules.get(path))
         panels.append((panel, ""))
         said.append(words)
-    said += [_constants_said(fields.constants, chosen)] if fields.constants else []
+    said += [_constants_said(fields, chosen)] if fields.constants else []
     said += [f"expected: {quote(rules_text(plot.rules), 300)}"] if plot.rules else []
     said += [band.label for band in plot.bands]
     said += [f"not drawn: {listed([_label(p) for p in hidden])}"] if hidden else []
@@ -274,6 +275,7 @@ class _Fields:
     constants: dict[str, float] = field(default_factory=dict)
     bools: list[str] = field(default_factory=list)
     texts: list[str] = field(default_factory=list)
+    whole: bool = True  # whether all values were read, and not a sample
 
     @property
     def chosen(self) -> list[str]:
@@ -285,18 +287,22 @@ class _Fields:
 
 def _read(timed: Sequence[_Timed], wanted: Sequence[str]) -> _Fields:
     """Return which fields there are, by a sample; only those wanted, if any are."""
-    stride = max(1, len(timed) // _SAMPLES)
-    sample = [*timed[::stride], *timed[-1:]]
+    changes = [value for k, (_, value) in enumerate(timed) if not k or value != timed[k - 1][1]]
+    stride = max(1, -(-len(changes) // _SAMPLES))
     found: dict[str, list[object]] = {}
-    for _, value in sample:
+    for value in [*changes[::stride], *changes[-1:]]:
         if wanted:
             for path in wanted:
-                for inner, part in islice(parts_of({path: value_at(value, path)}, _places), _MOST_FIELDS):
+                whole = value_at(value, path)
+                if isinstance(whole, (int, float, str)):
+                    found.setdefault(path, []).append(whole)
+                    continue
+                for inner, part in islice(parts_of({path: whole}, _places), _MOST_FIELDS):
                     found.setdefault(inner, []).append(part)
         else:
             for path, part in islice(parts_of(value, _places), _MOST_FIELDS):
                 found.setdefault(path, []).append(part)
-    fields = _Fields()
+    fields = _Fields(whole=stride == 1)
     for path, values in found.items():
         known = next((v for v in values if v is not None), None)
         if isinstance(known, bool):
@@ -328,6 +334,8 @@ def _name(plot: Plot, path: str) -> str:
 
 
 def _values(path: str, timed: Sequence[_Timed]) -> list[tuple[int, object]]:
+    if not _NESTED.search(path):
+        return [(t_ns, value.get(path)) for t_ns, value in timed]
     return [(t_ns, value_at(value, path)) for t_ns, value in timed]
 
 
@@ -393,9 +401,10 @@ def _numbers_said(path: str, readings: Sequence[Reading]) -> str:
     return f"{label} from {number(low)} to {number(high)}{odd}" if low < high else f"{label} = {number(low)}{odd}"
 
 
-def _constants_said(constants: Mapping[str, float], drawn_: Sequence[str]) -> str:
-    rest = {path: value for path, value in constants.items() if path not in drawn_}
-    return f"never changing: {listed([f'{_label(p)} = {number(v)}' for p, v in rest.items()], 3)}" if rest else ""
+def _constants_said(fields: _Fields, chosen: Sequence[str]) -> str:
+    rest = [f"{_label(path)} = {number(v)}" for path, v in fields.constants.items() if path not in chosen]
+    how = "never changing" if fields.whole else "the same in every message of a sample"
+    return f"{how}: {listed(rest, 3)}" if rest else ""
 
 
 def _bool_panel(path: str, timed: Sequence[_Timed], prefix: str) -> Panel:

@@ -22,6 +22,7 @@ _MANY_FIELDS = 8
 _TEXT_LENGTH = 60
 #: Time and frame of a message, and the layout of an array: no values of a topic.
 _LEFT_OUT = frozenset({"header", "layout"})
+_PLAIN = frozenset({float, int, bool, str})
 
 Value = float | str
 
@@ -77,7 +78,9 @@ def parts_of(
         path = f"{prefix}{name}"
         if path in _LEFT_OUT:
             continue
-        if isinstance(inner, Mapping):
+        if type(inner) in _PLAIN:  # the common case, and abstract classes are slow to ask
+            yield path, inner
+        elif isinstance(inner, Mapping):
             yield from parts_of(inner, places, f"{path}.")
         elif isinstance(inner, (list, tuple)):
             yield from parts_of({str(n): inner[n] for n in places(len(inner))}, places, f"{path}.")

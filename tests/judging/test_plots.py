@@ -32,7 +32,7 @@ def made(check: Check, rec: Recording) -> Chart:
 
 
 def published(*values: dict[str, Any]) -> Recording:
-    rec = Recording(10)
+    rec = Recording(10.0 + len(values))
     for k, value in enumerate(values):
         rec.message(float(k), "/state", value, OTHER)
     return rec
@@ -48,6 +48,14 @@ def test_fields_that_change_are_drawn_and_the_others_are_told() -> None:
     (only,) = chart.panels
     assert [s.name for s in only.series] == ["a"]
     assert chart.about == "5 messages published on /state: a from 0 to 4; never changing: b = 7, c = 0."
+
+
+def test_a_field_that_changes_once_among_many_equal_messages_is_drawn() -> None:
+    """Equal neighbours are read as one, so that a short change is not overlooked."""
+    chart = made(CHECKS["publishes"]("/state", OTHER), published(*({"a": 5, "b": int(k == 777)} for k in range(1000))))
+    (line,) = chart.panels[0].series
+    assert line.name == "b"
+    assert (777, 1) in line.points
 
 
 def test_constants_are_drawn_where_nothing_changes() -> None:
@@ -205,7 +213,7 @@ def test_a_check_of_an_author_is_drawn_by_what_its_parameters_name() -> None:
 def test_a_flood_is_thinned_alike_for_all_lines() -> None:
     """The lines of a panel share their times, and together they are bounded."""
     rec = published(*({"v": {"a": k % 7, "b": -k, "c": k % 3}} for k in range(9_000)))
-    lines = made(CHECKS["publishes"]("/state", OTHER), rec.add()).panels[0].series
+    lines = made(CHECKS["publishes"]("/state", OTHER), rec).panels[0].series
     assert len({tuple(x for x, _ in line.points) for line in lines}) == 1
     assert sum(len(line.points) for line in lines) <= 3 * MOST_POINTS
 
