@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader.app.observe import ObserveRequest, observe
+from grader.core.errors import SubmissionError
 from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.core.trace import (
     ClockKind,
@@ -134,6 +135,44 @@ def test_a_file_of_a_package_may_import_the_package(tmp_path: Path) -> None:
     )
     summary = observe(ObserveRequest((node,), NS_PER_S, clock="virtual"), lambda _: None)
     assert ([r.text for r in summary.records], summary.faults) == (["from the package"], ())
+
+
+WORKSPACE = ROOT / "tests" / "packages" / "workspace"
+ROBOT = WORKSPACE / "src" / "robot"
+TARGETS = {
+    "a workspace": (WORKSPACE, ("robot/talker", "robot/listener"), ("/listener", "/talker")),
+    "a package": (ROBOT, ("robot/talker", "robot/listener"), ("/listener", "/talker")),
+    "an executable": (ROBOT / "talker", ("robot/talker",), ("/talker",)),
+    "a launch file": (
+        ROBOT / "launch" / "robot.launch.py",
+        ("robot.launch.py",),
+        ("/ears/listener", "/speaker"),
+    ),
+}
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(("path", "processes", "nodes"), TARGETS.values(), ids=TARGETS)
+def test_packages_are_observed(path: Path, processes: tuple[str, ...], nodes: tuple[str, ...]) -> None:
+    """Every layout that is graded, and the text says what ran."""
+    summary = observe(ObserveRequest((path,), 2 * NS_PER_S, clock="virtual"), lambda _: None)
+    assert (summary.processes, summary.nodes, summary.faults) == (processes, nodes, ())
+    assert render_summary(summary).startswith(f"{', '.join(processes)}: 2.0 s on the virtual clock\n")
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        (ROBOT / "talkr", "expected an executable (robot/talker or robot/listener), found none"),
+        (ROBOT / "launch", "expected a package or workspace with entry points, found none"),
+        (ROBOT / "config" / "talker.yaml", "expected a .py file, found none"),
+    ],
+)
+def test_what_cannot_be_observed_is_told_what_is_there(path: Path, said: str) -> None:
+    """Nothing is started."""
+    with pytest.raises(SubmissionError) as raised:
+        observe(ObserveRequest((path,), NS_PER_S), lambda _: None)
+    assert raised.value.message == f"{path}: {said}"
 
 
 def test_a_file_that_is_none_is_one_line() -> None:

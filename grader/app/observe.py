@@ -12,14 +12,16 @@ from grader.app.seeds import PRACTICE
 from grader.core.errors import HarnessError, SubmissionError
 from grader.core.quantities import NS_PER_S
 from grader.core.report import Summary
-from grader.core.scenario import OdometryStream, Scenario, Span
+from grader.core.scenario import OdometryStream, Scenario, Span, is_launch_file
 from grader.core.submission import Submission
 from grader.core.trace import Trace
 from grader.execution.bag import read_odometry
+from grader.execution.executables import executables
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import open_session, planned_clock
 from grader.execution.supervisor import Job
 from grader.judging.judge_run import summarise
+from grader.submissions.collected import listed
 from grader.submissions.submission import stage_submission
 
 #: When a given recording starts playing; before that the nodes receive no odometry.
@@ -30,7 +32,8 @@ ODOMETRY_AFTER_NS = NS_PER_S
 class ObserveRequest:
     """What to observe, and how."""
 
-    files: tuple[Path, ...]  # Python files; each runs in its own process
+    # Python files, launch files, packages, workspaces and executables as `FOLDER/NAME`; each runs in its own process
+    files: tuple[Path, ...]
     duration_ns: int = 10 * NS_PER_S  # how long they are observed
     odom_bag: Path | None = None  # an /odom recording to play; None for no odometry
     clock: str = "auto"  # `virtual`, `wall` or `auto`
@@ -48,14 +51,15 @@ class Watched:
 
 
 def observe(request: ObserveRequest, progress: Progress) -> Summary:
-    """Run the files together and summarise what they did."""
+    """Run the programs together and summarise what they did."""
     watched = watch(request, progress)
     return summarise(watched.trace, watched.processes, watched.isolation)
 
 
 def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None = None) -> Watched:
-    """Run the files together and return the trace; without a scenario, only the given recording is played."""
-    names = _names(request.files)
+    """Run the programs together and return the trace; without a scenario, only the given recording is played."""
+    targets = _targets(request.files)
+    names = [target.name for target in targets]
     if scenario is None:
         scenario = _undisturbed(request, names)
     plays = any(isinstance(stimulus, OdometryStream) for stimulus in scenario.stimuli)
@@ -63,7 +67,7 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
     if plays:
         odometry = builtin_recording() if request.odom_bag is None else read_odometry(request.odom_bag)
     with open_session(request.isolation, progress=progress) as session:
-        submission = _stage(request.files, names, session.folder)
+        submission = _stage(targets, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
         provided = provide(session, (), request.interfaces, submission.root)
@@ -79,34 +83,73 @@ def _undisturbed(request: ObserveRequest, names: list[str]) -> Scenario:
     return Scenario("observed", tuple(names), Span(request.duration_ns), (stream,) if request.odom_bag else ())
 
 
-def _names(files: tuple[Path, ...]) -> list[str]:
-    """Return the file names; raises SubmissionError for duplicates and for anything but .py files."""
-    for file in files:
-        if not file.is_file() or file.suffix != ".py":
-            raise SubmissionError(f"{file}: expected a .py file, found none", "name the files of the nodes to run")
-    names = [file.name for file in files]
+@dataclass(frozen=True, slots=True)
+class _Target:
+    """One process to run: a file, or an executable of a package."""
+
+    name: str  # file name, or `PACKAGE/EXECUTABLE`
+    folder: Path  # the folder of the file, or that of the packages
+    file: Path | None = None
+
+
+_WHAT = "name .py files, launch files, packages, workspaces or FOLDER/EXECUTABLE"
+
+
+def _targets(paths: tuple[Path, ...]) -> list[_Target]:
+    """Return what to run, in the given order; raises SubmissionError for duplicates and for anything else."""
+    targets = [target for path in paths for target in _of_path(path)]
+    names = [target.name for target in targets]
     for name in names:
         if names.count(name) > 1:
-            raise SubmissionError(f"{name}: expected different file names, found it twice", "rename one of them")
-    return names
+            raise SubmissionError(f"{name}: expected different names, found it twice", "rename one of them")
+    return targets
 
 
-def _stage(files: tuple[Path, ...], names: list[str], into: Path) -> Submission:
-    """Stage what the files may import: their package, or else their common folder; a single file may be alone."""
-    folder = Path(os.path.commonpath([file.resolve().parent for file in files]))
+def _of_path(path: Path) -> list[_Target]:
+    if path.is_file() and path.suffix == ".py":
+        return [_Target(path.name, path.resolve().parent, path)]
+    if path.is_dir():
+        found = [one for one in executables(path.resolve()) if one.file is not None]
+        if not found:
+            text = f"{path}: expected a package or workspace with entry points, found none"
+            raise SubmissionError(text, "name the files of the nodes to run, or add console_scripts to setup.py")
+        return [_Target(one.words, path.resolve()) for one in found]
+    here = path.resolve().parent
+    known = executables(here) if not path.exists() and here.is_dir() and path.suffix == "" else []
+    named = [one for one in known if one.name == path.name and one.file is not None]
+    if len(named) == 1:
+        return [_Target(named[0].words, here)]
+    if known:
+        names = listed([one.words for one in known[:_SHOWN]])
+        raise SubmissionError(
+            f"{path}: expected an executable ({names}), found {'several' if named else 'none'}", _WHAT
+        )
+    raise SubmissionError(f"{path}: expected a .py file, found none", _WHAT)
+
+
+#: The most executables that a message lists.
+_SHOWN = 12
+
+
+def _stage(targets: list[_Target], into: Path) -> Submission:
+    """Stage what the programs may import: their workspace or package, or else their common folder; one may be alone."""
+    names, files = [target.name for target in targets], [target.file for target in targets]
+    folder = Path(os.path.commonpath([target.folder for target in targets]))
     package = next((up for up in (folder, *folder.parents) if (up / "package.xml").is_file()), folder)
-    for place, root in enumerate(dict.fromkeys((package, folder))):
+    starts_others = any(map(is_launch_file, names)) and package.parent.name == "src"
+    for place, root in enumerate(dict.fromkeys((package.parent if starts_others else package, package, folder))):
         staged = into / f"submission_{place}"
         staged.mkdir()
         try:
             submission = stage_submission(str(root), names, staged)
         except SubmissionError:
-            if root == folder and len(files) > 1:
+            if root == folder and (len(files) > 1 or files[0] is None):
                 raise
             continue
         # A package may have several files of a name.
-        meant = [file.resolve().relative_to(root).as_posix() for file in files]
-        if root == folder or [submission.files[name].found for name in names] == meant:
+        found = [submission.files[name].found for name in names]
+        meant = [file and file.resolve().relative_to(root).as_posix() for file in files]
+        if root == folder or all(one == other or other is None for one, other in zip(found, meant, strict=True)):
             return submission
     alone = into / "alone"
     alone.mkdir()

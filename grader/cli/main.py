@@ -312,7 +312,7 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
 
 
 @click.command(name="observe")
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
+@click.argument("files", metavar="PROGRAM...", nargs=-1, required=True, type=PATH)
 @click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
 @click.option("--odom-bag", type=PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
@@ -331,6 +331,7 @@ def _observe(  # noqa: PLR0913  one parameter an option
 ) -> int:
     """Run nodes together, without a rubric, and say what they do.
 
+    A PROGRAM is a .py file, a launch file, a package or workspace with all its executables, or one as FOLDER/NAME.
     Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
     """
     from grader.app import observe

@@ -62,7 +62,7 @@ class Start:
             StartWay.ENTRY_POINT: f"as `ros2 run` does: the entry point {self.target}",
         }[self.way]
         given = f" with {self.arguments}" if self.arguments else ""
-        return f"{way}{given}{f' by {self.launched_by}' if self.launched_by else ''}"
+        return f"{way}{given}{f', started by {self.launched_by}' if self.launched_by else ''}"
 
 
 @dataclass(frozen=True, slots=True)

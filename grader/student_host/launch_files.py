@@ -540,7 +540,7 @@ class Node(Action):
                 return []
             return [[os.path.basename(path), _read(path)]]
         body = ", ".join(f"{json.dumps(name)}: {_yaml(value)}" for name, value in values.items())
-        return [["parameters", f"{json.dumps(target)}: {{ros__parameters: {{{body}}}}}\n"]]
+        return [[f"{{{body}}}", f"{json.dumps(target)}: {{ros__parameters: {{{body}}}}}\n"]]
 
 
 class LifecycleNode(Node):

@@ -54,7 +54,7 @@ def test_a_launch_file_starts_its_nodes(graded: Callable[..., ExerciseReport]) -
     notes = "\n".join(report.notes)
     assert f"{NODES}: run as `ros2 run` does: the entry point robot.nodes:talk with --ros-args" in notes
     listener = "src/robot/launch/listener.launch.py"
-    assert f"by {listener}:{line_of(listener, 'Node(')}" in notes
+    assert f"started by {listener}:{line_of(listener, 'Node(')}" in notes
     assert {start.process for start in report.starts} == {"robot.launch.py"}
 
 

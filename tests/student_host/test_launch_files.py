@@ -86,7 +86,7 @@ PARAMETERS = {
 def test_parameters_keep_their_types(described: Callable[..., Described], given: str, expected: str) -> None:
     """A text stays a text, and the text of a substitution is read as YAML, as launch_ros does."""
     nodes, _ = described(f"DeclareLaunchArgument('n', default_value='5'), Node(**TALKER, parameters=[{given}])")
-    assert nodes[0]["parameter_files"] == [["parameters", f'"/**": {{ros__parameters: {expected}}}\n']]
+    assert nodes[0]["parameter_files"] == [[expected, f'"/**": {{ros__parameters: {expected}}}\n']]
 
 
 def test_parameter_files_and_values_keep_their_order(described: Callable[..., Described]) -> None:
@@ -98,7 +98,7 @@ def test_parameter_files_and_values_keep_their_order(described: Callable[..., De
     )
     assert nodes[0]["parameter_files"] == [
         ["own.yaml", "/**: {ros__parameters: {rate: 2.0}}\n"],
-        ["parameters", '"/n/a": {ros__parameters: {"rate": 3.0}}\n'],
+        ['{"rate": 3.0}', '"/n/a": {ros__parameters: {"rate": 3.0}}\n'],
     ]
     assert nodes[1]["parameter_files"] == []
     assert [one["what"] for one in left_out] == ["the parameter file no.yaml, which is not there"]
