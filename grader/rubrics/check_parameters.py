@@ -169,7 +169,8 @@ def simulation_shape(name: str, kind: type, path: str = "", content: bytes = b""
     """
     hints = get_type_hints(kind, include_extras=True)
     fields: dict[str, Any] = {}
-    meanings = manual_of(kind).parameters
+    # a parameter is explained where it is written, which may be a base class
+    meanings = {k: words for base in reversed(kind.__mro__) for k, words in manual_of(base).parameters.items()}
     for field in dataclasses.fields(kind):
         if field.init:
             default = ... if _is_required(field) else None

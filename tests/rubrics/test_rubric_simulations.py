@@ -11,6 +11,7 @@ from grader.core.errors import RubricError
 from grader.core.scenario import Between, Choose, FieldSpec, Scenario, Simulated
 from grader.packaging import Chosen, classroom50
 from grader.rubrics.loader import read_rubric, side_files
+from grader.rubrics.schema import rubric_schema
 
 RUBRIC = """\
 schema: grader/rubric/v1
@@ -105,6 +106,14 @@ def test_a_built_in_simulation_needs_no_file(tmp_path: Path) -> None:
     rubric = RUBRIC.replace("simulations: [world.py]\n", "").replace("- simulation: {echo: {gain: 2.0}}", text)
     (stimulus,) = scenario(tmp_path, rubric).stimuli
     assert stimulus == Simulated("differential_drive", {"period": 20_000_000, "odometry": "/odometry"})
+
+
+def test_the_schema_explains_each_parameter() -> None:
+    """Also one that a base class explains."""
+    shapes = rubric_schema()["$defs"]
+    meanings = {k: v.get("description") for k, v in shapes["DifferentialDriveSimulation"]["properties"].items()}
+    assert meanings["x"] == "Start position, in m."
+    assert meanings["max_speed"] == "Largest speed, forward or backward, in m/s."
 
 
 @pytest.mark.parametrize(
