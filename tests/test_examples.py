@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from _pytest.mark import ParameterSet
 from archive import outcomes
+from click.testing import CliRunner
 from grading import grade_until_decided
 from ruamel.yaml import YAML
 
 from grader.app.request import GradeRequest
-from grader.execution.ros_installation import find_ros
-from grader.rubrics.interfaces import Interfaces
+from grader.cli import main
 from grader.rubrics.loader import read_rubric
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -56,7 +56,9 @@ def test_a_submission_gets_what_it_is_worth(name: str, folder: str) -> None:
 def test_an_example_is_whole(name: str) -> None:
     """A rubric without mistakes, three wrong submissions, and a page that says how to grade it."""
     folder = ROOT / "examples" / name
-    exercise = read_rubric(rubric(name), interfaces=Interfaces(find_ros().share))
+    checked = CliRunner().invoke(main.app, ["rubric", "check", str(rubric(name))])
+    assert (checked.exit_code, len(checked.output.splitlines())) == (0, 1), checked.output
+    exercise = read_rubric(rubric(name))
     assert exercise.id == name
     wrong = sorted(path.name for path in (folder / "wrong").iterdir())
     assert wrong == sorted(expected(name))
