@@ -210,7 +210,8 @@ class Interfaces:
         package, kind, _ = type_.split("/")
         packages = {name.partition("/")[0] for name in self.names}
         if package not in packages:
-            hint = nearest(package, packages) or f"install {package}, or source the ROS installation that has it"
+            bring = f"install {package}, or bring its definitions with `interfaces:` or --interfaces FOLDER"
+            hint = nearest(package, packages) or bring
             return where.mistake(f"expected an installed package, found `{package}`", hint)
         known = [name for name in self.of_kind(kind) if name.startswith(f"{package}/")]
         hint = nearest(type_, known) or (f"{package} has {listed([name.rpartition('/')[2] for name in known])}")
