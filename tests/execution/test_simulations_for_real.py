@@ -131,6 +131,57 @@ def test_a_loop_is_closed_and_is_the_same_in_each_run(tmp_path: Path) -> None:
     assert {outcome for outcome, _, _ in found[0].values()} == {Outcome.MET}, found[0]
 
 
+TURTLE = """\
+schema: grader/rubric/v1
+exercise: {id: follow, number: "1", title: Turtle}
+files: [follow.py]
+scenarios:
+  - id: alone
+    processes: [follow.py]
+    observe: {duration: 3 s}
+    stimuli:
+      - simulation: {turtle: {x: 2.0}}
+criteria:
+  - id: moved
+    title: Was moved, and drove on
+    points: 1
+    scenario: alone
+    check: {stays_in_range: {topic: /turtle1/pose, field: x, low: 9.5, high: 10.1, after: 2500 ms}}
+"""
+DRIVER = """\
+import rclpy
+from geometry_msgs.msg import Twist
+from rclpy.node import Node
+from turtlesim.msg import Pose
+from turtlesim.srv import TeleportAbsolute
+
+rclpy.init()
+node = Node("driver")
+commands = node.create_publisher(Twist, "/turtle1/cmd_vel", 10)
+client = node.create_client(TeleportAbsolute, "/turtle1/teleport_absolute")
+
+
+def drive(pose):
+    command = Twist()
+    command.linear.x = 1.0 if 9.0 <= pose.x < 10.0 else 0.0
+    commands.publish(command)
+
+
+node.create_subscription(Pose, "/turtle1/pose", drive, 10)
+client.wait_for_service()
+client.call_async(TeleportAbsolute.Request(x=9.0, y=3.0))
+rclpy.spin(node)
+"""
+
+
+def test_a_turtle_has_the_messages_of_turtlesim(tmp_path: Path) -> None:
+    """They come with the grader, also for the student's node."""
+    made = request(tmp_path, follow=DRIVER)
+    (tmp_path / "follow.yaml").write_text(TURTLE, encoding="utf-8")
+    found = verdicts(grade(made, lambda _: None, pictures=False))
+    assert {name: v.outcome for name, v in found.items()} == {"moved": Outcome.MET}, found
+
+
 @pytest.mark.long
 def test_a_loop_is_closed_on_the_wall_clock(tmp_path: Path) -> None:
     """With other times, and to the same end."""
