@@ -105,8 +105,8 @@ HOSTILE = {
     "raises": ("raise ValueError('no')", "ValueError: no"),
     "kills": ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "ended while it was evaluated"),
     "forks": (
-        "import os\n    for _ in range(5000):\n        try:\n            os.fork()\n        except OSError:\n            "
-        "os._exit(3)",
+        "import os\n    for _ in range(5000):\n        try:\n            os.fork()\n        except OSError:\n"
+        "            os._exit(3)",
         "ended while it was evaluated",
     ),
     "no_description": ("return None", "TypeError"),
