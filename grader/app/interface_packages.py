@@ -184,12 +184,12 @@ def provide(session: RecordingSession, exercises: Sequence[Exercise], course: Se
     used = needed([*(offer.package for offer in given), *named], ready)
     given += [Offer(package, GRADER) for package in used if package.name not in taken]
     brought = [BroughtPackage(offer.package.name, offer.origin, _digest([offer.package])) for offer in given]
-    builds = [_visible(built(used, ros).prefix, session)] if used else []
+    builds = [_copied(built(used, ros).prefix, session.folder)] if used else []
     own = _of_submission(session, root, [*used, *(package for package in ready if package not in used)])
+    builds += [_copied(folder, root.parent) for folder in own.builds]
     packages = tuple(sorted([*brought, *own.packages], key=lambda package: package.name))
-    return Provided(
-        packages, (*builds, *own.builds), offered_digest(course, exercises), tuple(_notes(packages)), own.problems
-    )
+    offered = offered_digest(course, exercises)
+    return Provided(packages, tuple(builds), offered, tuple(_notes(packages)), own.problems)
 
 
 def definitions(traces: Iterable[Trace], provided: Provided) -> dict[str, Definition]:
@@ -256,12 +256,9 @@ def _programs(root: Path) -> Iterator[bytes]:
             yield path.read_bytes()
 
 
-def _visible(folder: Path, session: RecordingSession) -> Path:
-    """Return a folder where the worker can read it: its view holds the kept ones, and the folder of the session."""
-    kept = kept_interfaces()
-    if kept is not None and folder.is_relative_to(kept):
-        return folder
-    copy = session.folder / "interfaces" / folder.name
+def _copied(folder: Path, into: Path) -> Path:
+    """Copy a built folder to where the worker may read it: it sees no kept folder, which holds those of others."""
+    copy = into / "interfaces" / folder.name
     if not copy.exists():
         shutil.copytree(folder, copy)
     return copy

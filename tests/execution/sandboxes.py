@@ -26,7 +26,6 @@ from grader.execution.sandbox.environment import runtime_environment
 from grader.execution.sandbox.exposure import closed_folders, view_of, worker_view
 from grader.execution.sandbox.protocol import Command, Isolation, StudentProcess
 from grader.execution.sandbox.tiers import FlatBubblewrap, Landlock, isolation_from_name
-from grader.execution.temp_dirs import kept_interfaces
 
 HOST = Path(grader.__file__).resolve().parent / "student_host"
 USER = 1000
@@ -172,8 +171,7 @@ def opened_start(ros: RosInstallation, *further: str) -> tuple[str, ...]:
     In one process after another and not beside each other, as bubblewrap would: whoever has another user than its
     parent does not die with it.
     """
-    built = filter(None, [kept_interfaces()])
-    paths = view_of((*ros.runtime.read_paths, ros.runtime.executable, *built)).bound
+    paths = view_of((*ros.runtime.read_paths, ros.runtime.executable)).bound
     script = ""
     for folder in reversed(closed_folders((*paths, HOST))):
         inside = sorted({path.relative_to(folder).parts[0] for path in paths if folder in path.parents})

@@ -17,7 +17,6 @@ from pathlib import Path, PurePath
 import grader
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.protocol import WorkerView
-from grader.execution.temp_dirs import kept_interfaces
 
 MOST_LINKS = 40  # what the kernel allows in one path
 
@@ -158,11 +157,10 @@ def secrets_within(bound: Iterable[Path], runtime: PythonRuntime) -> list[Path]:
 def worker_view(runtime: PythonRuntime, folder: Path) -> WorkerView:
     """Return the view of a worker: Python, ROS, the part of this package that it runs, and its working folder.
 
-    The working folder also contains the staged submissions. Interface packages are built after a worker has started.
+    The working folder also contains the staged submissions and copies of the interface packages that they use.
     """
     package = Path(grader.__file__).resolve().parent
-    built = tuple(filter(None, [kept_interfaces()]))
-    read = (*runtime.read_paths, runtime.executable, *runtime.library_paths, *runtime.python_paths, *built)
+    read = (*runtime.read_paths, runtime.executable, *runtime.library_paths, *runtime.python_paths)
     hidden = tuple(secrets_within(view_of(read).bound, runtime))
     own = tuple(package / name for name in ("__init__.py", "core", "simulation", "student_host", "execution"))
     return WorkerView(read, hidden, own, (folder,))
