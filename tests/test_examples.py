@@ -20,8 +20,8 @@ from grader.rubrics.loader import read_rubric
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = sorted(path.parent.name for path in (ROOT / "examples").glob("*/README.md"))
-#: The place of the first submission of an example that is left to the long run.
-LONG_FROM = 3
+#: The place of the first submission of an example that is left to the nightly run.
+NIGHTLY_FROM = 2
 
 
 def rubric(name: str) -> Path:
@@ -37,10 +37,10 @@ def expected(name: str) -> dict[str, dict[str, str]]:
 
 
 def submissions() -> Iterator[ParameterSet]:
-    """Yield each example with each of its submissions; the third mistake and further ones take long together."""
+    """Yield each example with each of its submissions; the second mistake and further ones are more of the same."""
     for name in EXAMPLES:
         for place, folder in enumerate(["reference", *(f"wrong/{wrong}" for wrong in expected(name))]):
-            marks = [pytest.mark.long] if place >= LONG_FROM else []
+            marks = [pytest.mark.nightly] if place >= NIGHTLY_FROM else []
             yield pytest.param(name, folder, id=f"{name}-{folder}", marks=marks)
 
 

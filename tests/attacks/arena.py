@@ -143,6 +143,7 @@ class Arena:
             "HOME": str(self.base / "home"),
             "TMPDIR": str(self.base / "tmp"),
             "XDG_RUNTIME_DIR": str(self.base / "runtime"),
+            "XDG_CACHE_HOME": str(self.base / "runtime"),  # the grader keeps message packages there
             "LANG": "C.UTF-8",
             "GITHUB_TOKEN": self.secret,
             "PYTHONDONTWRITEBYTECODE": "1",
