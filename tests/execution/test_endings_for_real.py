@@ -361,8 +361,8 @@ def test_a_spot_check_hears_what_a_short_lived_node_says(run: Callable[..., Trac
     """The subscription is there before the publisher, which is gone before a look at the graph would have shown it."""
     publisher = Endpoint("publisher", "/words", "std_msgs/msg/String", "/talker", 0, "reliable", "volatile")
     program = TALKER + "time.sleep(0.04)\nburst(publisher, 10)\nraise RuntimeError('over')"
-    # What is sent before discovery has finished is lost, as in reality: with the subscription one time in four, or two in
-    # three on a busy machine; without it, eleven in twelve.
+    # What is sent before discovery has finished is lost, as in reality: with the subscription one time in four,
+    # or two in three on a busy machine; without it, eleven in twelve.
     heard = (numbers(run(program, clock="wall", bare=True, publishers=(publisher,))) for _ in range(24))
     whole = islice((one for one in heard if one == list(range(10))), 4)
     assert len(list(whole)) == 4
