@@ -438,8 +438,8 @@ def test_a_worker_that_is_always_killed_decides_nothing(tmp_path: Path) -> None:
         def kill() -> None:
             while not done.wait(0.02):
                 for worker in workers_of(os.getpid()):
-                    with contextlib.suppress(ProcessLookupError):
-                        os.kill(worker, signal.SIGKILL)
+                    with contextlib.suppress(ProcessLookupError):  # the group: no child that was just made outlives it
+                        os.killpg(os.getpgid(worker), signal.SIGKILL)
 
         killer = threading.Thread(target=kill)
         killer.start()
