@@ -64,13 +64,6 @@ class Run:
     definitions: Mapping[str, Definition] = field(default_factory=dict)
 
 
-def main_not_called(file: str, line: int = 0) -> str:
-    """Return the note on a file in which nothing calls main(), with the line of main; 0 leaves it out."""
-    place = f"{file}:{line}" if line else file
-    problem = f"{place}: nothing calls main(), so `python3 {file}` would do nothing"
-    return f"{problem}; add: if __name__ == '__main__': main()"
-
-
 #: What to do with a notebook that was handed in.
 EXPORT_NOTEBOOK = "export it as a Python script (File > Save and Export Notebook As > Executable Script)"
 

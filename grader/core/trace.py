@@ -65,6 +65,13 @@ class Start:
         return f"{way}{given}{f', started by {self.launched_by}' if self.launched_by else ''}"
 
 
+def main_not_called(file: str, line: int = 0) -> str:
+    """Return the note on a file in which nothing calls main(), with the line of main; 0 leaves it out."""
+    place = f"{file}:{line}" if line else file
+    problem = f"{place}: nothing calls main(), so `python3 {file}` would do nothing"
+    return f"{problem}; add: if __name__ == '__main__': main()"
+
+
 @dataclass(frozen=True, slots=True)
 class Message:
     """One message that a student's node published."""

@@ -9,8 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from grader.core.submission import main_not_called
-from grader.core.trace import Start, StartWay
+from grader.core.trace import Start, StartWay, main_not_called
 
 #: The size limit of a file in a submission.
 MOST_BYTES = 8 << 20

@@ -7,7 +7,7 @@ import random
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from shlex import quote
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from grader.core.limits import Limits
 from grader.core.scenario import (
@@ -28,7 +28,6 @@ from grader.core.scenario import (
     is_launch_file,
     shortest,
 )
-from grader.core.submission import Submission
 from grader.core.trace import Endpoint
 from grader.execution.bag import Odometry, window
 from grader.execution.exchanges import (
@@ -45,6 +44,9 @@ from grader.execution.exchanges import (
     plan_server,
     plan_simulation,
 )
+
+if TYPE_CHECKING:
+    from grader.core.submission import Submission
 
 #: A number to publish, or the limit it lies just above (1) or just below (-1) in the student's own type.
 PlannedNumber = tuple[float, int]

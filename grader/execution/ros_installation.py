@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.machinery
-import importlib.metadata
 import importlib.util
 import os
 import platform
@@ -160,6 +159,8 @@ def _find_wheels() -> RosInstallation | None:
         python_paths=() if str(folder) in _isolated_path() else (folder,),
         environment={"ROS_DISTRO": distro, **NO_BOOTSTRAP},
     )
+    import importlib.metadata  # noqa: PLC0415 - takes long, and no worker needs it
+
     version = importlib.metadata.Distribution.at(wheel).version
     return RosInstallation(runtime, "wheels", distro, version, prefix, (prefix / "share",))
 
@@ -238,6 +239,8 @@ def _holds_rclpy(folder: Path) -> bool:
 
 
 def _version_of_rclpy(prefix: Path, folder: Path) -> str:
+    import importlib.metadata  # noqa: PLC0415 - takes long, and no worker needs it
+
     for distribution in importlib.metadata.distributions(name="rclpy", path=[str(folder)]):
         return distribution.version
     manifest = prefix / "share" / "rclpy" / "package.xml"

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 
 from grader.core.exercise import Check, Criterion, Exercise, Outcome, ProblemKind
 from grader.core.report import Verdict
-from grader.core.submission import Submission, main_not_called
-from grader.core.trace import Fault, Trace
+from grader.core.submission import Submission
+from grader.core.trace import Fault, Trace, main_not_called
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import RandomInRange
 from grader.judging.checks.rate import TopicRate
