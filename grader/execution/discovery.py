@@ -330,10 +330,7 @@ class Discovery:
             return students + self._services.ends_of("client", name)
         if kind != "client":
             return 0
-        return int(
-            self._services.serves(name, claim["type"])
-            or any((c["kind"], c["name"], c["type"]) == ("service", name, claim["type"]) for c in claims)
-        )
+        return int(self._services.serves(name, claim["type"]) or any(serves(c, name, claim["type"]) for c in claims))
 
     def look(self, now_ns: int) -> None:
         """Record the graph if it has changed."""

@@ -107,7 +107,7 @@ class ServiceEnds:
         return found
 
     def graph(self, nodes: list[tuple[str, str]]) -> tuple[ServiceEnd, ...]:
-        """Return the servers and clients of some nodes, sorted, without the services that every node has.
+        """Return the servers and clients of some nodes, sorted, without the servers that every node has.
 
         Args:
             nodes: Name and namespace of each node.
@@ -123,7 +123,7 @@ class ServiceEnds:
                     ServiceEnd(kind, service, interface, f"{space.rstrip('/')}/{name}")
                     for service, interfaces in looked(look, name, space)
                     for interface in interfaces
-                    if not interface.startswith(BACKGROUND_TYPES)
+                    if kind == "client" or not interface.startswith(BACKGROUND_TYPES)
                 ]
         return tuple(sorted(set(found), key=lambda end: (end.kind, end.service, end.type, end.node)))
 

@@ -53,6 +53,10 @@ class Ledger:
 
     def __init__(self) -> None:
         self.sent: Counter[str] = Counter()
+        #: The services that every node has, as long as nobody has called them: waiting for them would take a third of
+        #: an executor's time. How many are waited for by now; a wait set that was made before lacks the latest.
+        self._left_out: weakref.WeakSet[Any] = weakref.WeakSet()
+        self.included = 0
         self._expected: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
         self._kept: weakref.WeakKeyDictionary[Any, deque[Any]] = weakref.WeakKeyDictionary()
         self._heard_on: set[str] = set()
@@ -86,7 +90,17 @@ class Ledger:
             if endpoint.topic_name in self._heard_on:
                 self._successors.add(endpoint)
             self._heard_on.add(endpoint.topic_name)
+        if kind == "service" and _is_background(endpoint):
+            endpoint._executor_event = True  # executors leave it out, until a request is announced
+            self._left_out.add(endpoint)
         self.changed = True
+
+    def _include(self, receiver: Any) -> None:
+        """Let executors wait for a service that they have left out so far."""
+        if receiver in self._left_out:
+            self._left_out.remove(receiver)
+            receiver._executor_event = False
+            self.included += 1
 
     def forget(self, endpoint: Any) -> None:
         """Discard the expected messages of an endpoint that is being destroyed."""
@@ -174,7 +188,7 @@ class Ledger:
             {"kind": kind, "name": service_name(endpoint), "type": type_name(endpoint.srv_type)}
             for kind in ("client", "service")
             for endpoint in self.alive(kind)
-            if not type_name(endpoint.srv_type).startswith(BACKGROUND_SERVICES)
+            if kind == "client" or not _is_background(endpoint)
         ]
         claims += [claim for end in self._actions for claim in end.claims()]
         nodes = [node.get_fully_qualified_name() for node in self.nodes()]
@@ -204,6 +218,7 @@ class Ledger:
                 if isinstance(receiver, Receiver):
                     self._expected[receiver] = min(self._expected.get(receiver, 0) + count, receiver.depth)
                     continue
+                self._include(receiver)
                 depth = _depth(receiver)
                 expected = self._expected.get(receiver, 0) + min(count, depth)
                 self._expected[receiver] = expected
@@ -363,6 +378,11 @@ class Ledger:
         if kind == "topic":
             return [s for s in self.alive("subscription") if s.topic_name == name]
         return [e for e in self.alive("service" if kind == "request" else "client") if service_name(e) == name]
+
+
+def _is_background(endpoint: Any) -> bool:
+    """Return whether a service, or a client's, is of a type that every node serves."""
+    return type_name(endpoint.srv_type).startswith(BACKGROUND_SERVICES)
 
 
 def _valid(endpoint: Any) -> bool:

@@ -154,6 +154,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
             self._added: list[tuple[Callable[..., Any], Any]] = []
             self._timers: list[Any] = []
             self._receivers: list[int] = []
+            self._included = ledger.included
 
         def clear_entities(self) -> None:
             super().clear_entities()
@@ -230,7 +231,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
                         scheduler.pause(min(wakes, default=None), polls=True)
                     finally:
                         ledger.awaited.subtract(self._receivers)
-                if len(self._added) < self._capacity:
+                if len(self._added) < self._capacity or self._included != ledger.included:
                     return  # actions add their entities without these methods: let the executor rebuild the set
                 # Polling has removed everything that was not ready from the set.
                 super().clear_entities()

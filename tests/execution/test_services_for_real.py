@@ -156,6 +156,14 @@ def test_parameters_and_messages_of_fixed_types_reach_a_node(run: Callable[..., 
     assert said == [(1000, "a hello"), (1500, "a bye"), (2000, "b bye"), (2500, "b bye")]
 
 
+def test_the_services_that_every_node_has_answer_at_once(run: Callable[..., Trace]) -> None:
+    """Nodes leave them out of their waits until somebody calls; the caller is another process, or the same one."""
+    trace = run(("asked.py", "asker.py"), seconds=3, times=2)
+    logged = [(o.t_ns // NS_PER_MS, o.text) for o in trace.observations if isinstance(o, LogRecord)]
+    both = ("/asked/get_parameters: 3", "/asker/get_parameters: 4")
+    assert logged == [(at, text) for at in (1000, 2000) for text in both]
+
+
 def test_a_lifecycle_node_is_led_through_its_states(run: Callable[..., Trace]) -> None:
     """It publishes while it is active; what its state machine tells has its instant too."""
     asked: list[tuple[Any, int]] = [
