@@ -91,9 +91,15 @@ def takes_ordinary(reader: dict[str, Any]) -> bool:
     return reader["deadline_ns"] == 0 and not reader["manual"]
 
 
-def announce(arrivals: dict[str, int], channel: str, count: int) -> None:
-    """Add messages to those that are on their way to a process."""
-    arrivals[channel] = arrivals.get(channel, 0) + count
+#: The kinds of endpoints, and the channels on which they receive.
+ENDPOINTS = ("publisher", "subscription", "service", "client")
+CHANNELS = {"subscription": "topic", "service": "request", "client": "response"}
+
+
+def announce(student: NodeProcess, channel: str, count: int) -> None:
+    """Add messages to those that are on their way to a process, unless its end of the channel has no counterpart."""
+    if channel not in student.unmatched:
+        student.arrivals[channel] = student.arrivals.get(channel, 0) + count
 
 
 #: How long, in real time, to wait until a removed endpoint has left the graph.
@@ -177,10 +183,10 @@ class Discovery:
             for student in self._students
             if any(c["latched"] and compatible(writer, c) for c in readers_of(student, writer["name"]))
         }
-        arrivals = {student.name: student.arrivals for student in self._students}
+        students = {student.name: student for student in self._students}
         for (reader, topic, sender), count in served.items():
             if count and (reader, topic, sender) not in self._served:
-                announce(arrivals[reader], f"topic {topic}", count)
+                announce(students[reader], f"topic {topic}", count)
         self._served = set(served)
 
     def is_heard(self, topic: str) -> bool:
@@ -308,12 +314,13 @@ class Discovery:
             self._mark_dead(student)
             return
         student.nudged = True  # a match is an event that a node may have a callback for
-        missing = answer.get("missing")
-        student.unmatched = bool(missing)
+        missing = [str(end).partition(" ") for end in _listed(answer.get("missing"))]
+        student.unmatched = frozenset(f"{CHANNELS.get(kind, kind)} {name}" for kind, _, name in missing)
         if missing:
             self.patience.lose()
-        for name in filter(is_name, missing[:MOST_UNMATCHED] if isinstance(missing, list) else ()):
-            self._recorder.note(f"{student.name}: {name[:NAME_CHARACTERS]} was not matched in time")
+        for kind, _, name in missing:
+            if kind in ENDPOINTS and is_name(name):
+                self._recorder.note(f"{student.name}: {kind} {name[:NAME_CHARACTERS]} was not matched in time")
 
     def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
         kind, name = claim["kind"], claim["name"]
@@ -335,6 +342,10 @@ class Discovery:
     def look(self, now_ns: int) -> None:
         """Record the graph if it has changed."""
         self._recorder.look(self._graph_at(now_ns), self._observer.participants())
+
+
+def _listed(value: Any) -> list[Any]:
+    return value[:MOST_UNMATCHED] if isinstance(value, list) else []
 
 
 def _wanted(claims: list[dict[str, Any]]) -> Counter[Key]:

@@ -61,7 +61,7 @@ class NodeProcess:
         arrivals: Messages that are on their way to it and not yet announced to it, by channel.
         told: The counterparts that it has been told to wait for.
         renewed: Whether its endpoints have changed since then.
-        unmatched: Whether some of its endpoints had no counterparts when the wait for them timed out.
+        unmatched: The channels of its endpoints that had too few counterparts when the wait for them timed out.
         sees_graph: Whether its program queries the graph, as it reports.
         offers: The services, clients and parameters that it has reported.
         nudged: Whether it has to run again at this instant, because its endpoints were matched.
@@ -94,7 +94,7 @@ class NodeProcess:
     arrivals: dict[str, int] = field(default_factory=dict)
     told: dict[str, dict[str, list[int]]] = field(default_factory=dict)
     renewed: bool = False
-    unmatched: bool = False
+    unmatched: frozenset[str] = frozenset()
     sees_graph: bool = False
     offers: set[tuple[str, str, str]] = field(default_factory=set)
     nudged: bool = False

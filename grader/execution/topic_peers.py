@@ -143,7 +143,7 @@ class VirtualTopicPeers(TopicPeers):
         self._discovery.published[topic] += 1
         for student in self._students:
             if any(self._discovery.takes(reader, topic) for reader in readers_of(student, topic)):
-                announce(student.arrivals, f"topic {topic}", 1)
+                announce(student, f"topic {topic}", 1)
 
     def _asked(self, topic: str) -> list[tuple[str, bool]]:
         return [(reader["type"], reader["latched"]) for s in self._students for reader in readers_of(s, topic)]

@@ -285,7 +285,7 @@ class VirtualRunner(Runner):
                 self._discovery.kept[sender.name, name] += count if any(w["latched"] for w in writers) else 0
                 for student in self._students:
                     if any(compatible(w, r) for w in writers for r in readers_of(student, name)):
-                        announce(student.arrivals, channel, count)
+                        announce(student, channel, count)
             elif kind in ("request", "response"):
                 self._announce_exchange(kind, name, count)
 
@@ -294,7 +294,7 @@ class VirtualRunner(Runner):
         for student in self._students:
             ends = student.claims_of("service" if kind == "request" else "client", service)
             if not student.ended and ends:
-                announce(student.arrivals, f"{kind} {service}", count)
+                announce(student, f"{kind} {service}", count)
 
     def _hand_over(self) -> None:
         """Make every process wait for the messages on their way to it, because their sender is about to leave."""

@@ -130,7 +130,7 @@ class ScriptedStudent:
         self.nudged = False
         self.ended = False
         self.renewed = False
-        self.unmatched = False
+        self.unmatched: frozenset[str] = frozenset()
         self.sees_graph = False
         self.workload: ScriptedWorkload | None = None
         self.unsettled = ""

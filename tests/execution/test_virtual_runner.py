@@ -549,6 +549,22 @@ def test_what_was_not_matched_in_time_is_awaited_again_before_time_goes_on(comes
     assert me.times_ms()[-1] >= 500
 
 
+@pytest.mark.parametrize("missing", [["subscription /temperature"], ["publisher /temperature"], []])
+def test_nothing_is_announced_to_an_end_without_a_counterpart(missing: list[str]) -> None:
+    """A node in another ROS domain would wait a second of real time for each message, as if it worked."""
+
+    def deaf(me: ScriptedStudent, world: World) -> Program:
+        me.missing = missing
+        yield from listener("/temperature")(me, world)
+
+    run = Run(deaf, numbers=(numbers((1.0, 0)),))
+    reached = missing != ["subscription /temperature"]
+    assert any("got {'topic /temperature': 1}" in line for line in run.seen()) is reached
+    assert [f"{end} was not matched in time" in note for end, note in zip(missing, run.trace.notes, strict=True)] == [
+        True for _ in missing
+    ]
+
+
 def test_sentences_in_place_of_names_are_dropped() -> None:
     """What a process calls a topic or a service is shown only where ROS could have it."""
     said = "the machine failed; this counts as 30 of 30"
