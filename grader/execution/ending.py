@@ -28,6 +28,7 @@ _HUNG = {
     "alarm": "sets an alarm that rings in real time",
     "process": "starts another process, which runs in real time",
     "waiting": "waits for something outside the ROS graph",
+    "timed_event": "waits for a missed deadline or a lost liveliness, which the middleware times in real time",
 }
 #: Qualified names of classes and functions as Python writes them; free text does not match.
 _TYPE = re.compile(r"(?=.{1,200}$)[^\W\d]\w*(?:\.(?:<locals>|[^\W\d]\w*))*")

@@ -1,5 +1,7 @@
 """The virtual clock: the current time, and the rules by which time passes for a program that never blocks."""
 
+from bisect import bisect_left
+from collections import deque
 from collections.abc import Callable
 
 #: Virtual time starts at 2026-01-01 00:00:00 UTC.
@@ -20,6 +22,10 @@ LATE_NS = 1_000
 MESSAGES_AT_ONCE = 200
 
 
+#: How many pauses of the program are remembered, to tell when a message was sent.
+PAUSES = 10_000
+
+
 class VirtualClock:
     """The virtual time of one process; it advances only when the grader allows it."""
 
@@ -34,7 +40,23 @@ class VirtualClock:
         self._seen_ns = 0
         #: Whether a pause or a timer's period has begun at this moment, so that the work before it delays what follows.
         self.counted = False
+        #: Returns the system clock in nanoseconds since 1970, once rclpy is there to read it.
+        self.real_ns: Callable[[], int] = lambda: 0
+        #: The latest pauses: when each began in real time, in nanoseconds since 1970, and the virtual time then.
+        self._pauses: deque[tuple[int, int]] = deque(maxlen=PAUSES)
         self.let_time_pass: Callable[[int], None] = lambda until_ns: None
+
+    def pause(self) -> None:
+        """Note that the program begins to wait."""
+        self._pauses.append((self.real_ns(), self.now_ns))
+
+    def at(self, real_ns: int) -> int:
+        """Return the virtual time of a moment, in nanoseconds since 1970.
+
+        What others send while this program waits, they send at the time at which it continues.
+        """
+        index = bisect_left(self._pauses, real_ns, key=lambda pause: pause[0])
+        return self._pauses[index][1] if index < len(self._pauses) else self.now_ns
 
     def move_to(self, now_ns: int) -> None:
         """Set the time; it never goes back."""

@@ -88,6 +88,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
         install_alarms(watchdog.give_up_on_alarms)
         install_processes(watchdog.give_up_on_processes)
         time.give_up_outside = watchdog.give_up_on_waiting
+        time.give_up_on_events = watchdog.give_up_on_events
         Watch(link, request["root"]).install()
     ending = play(request, describer, link, install_ros)
     time.finish()

@@ -11,7 +11,7 @@ import functools
 import os
 import signal
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from typing import Any
 
 import rclpy.client
@@ -27,6 +27,7 @@ import rclpy.task
 import rclpy.time_source
 import rclpy.utilities
 from rclpy.clock import Clock, ClockType, ROSClock
+from rclpy.event_handler import QoSPublisherEventType, QoSSubscriptionEventType
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.time import Time
 
@@ -43,6 +44,12 @@ SHUTTING_DOWN = {
     signal.SIGINT: (_rclpy.SignalHandlerOptions.ALL, _rclpy.SignalHandlerOptions.SIGINT),
     signal.SIGTERM: (_rclpy.SignalHandlerOptions.ALL, _rclpy.SignalHandlerOptions.SIGTERM),
 }
+#: The events that the middleware times on the real clock; the numbers of the two kinds overlap.
+PUBLISHER_TIMES = (
+    QoSPublisherEventType.RCL_PUBLISHER_LIVELINESS_LOST,
+    QoSPublisherEventType.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED,
+)
+SUBSCRIPTION_TIMES = (QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED,)
 #: The methods with which nodes query the whole graph.
 GRAPH_LOOKS = (
     *("count_clients", "count_publishers", "count_services", "count_subscribers"),
@@ -55,11 +62,16 @@ GRAPH_LOOKS = (
 
 
 class RosClocks:
-    """Makes every clock of rclpy, whatever its type, a ROS clock whose time the grader sets."""
+    """Makes every clock of rclpy, whatever its type, a ROS clock whose time the grader sets.
+
+    Clocks of nodes with `use_sim_time` are left to rclpy, which sets them by the messages on /clock.
+    """
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock
         self._made: weakref.WeakSet[Clock] = weakref.WeakSet()
+        self._simulated: weakref.WeakSet[Clock] = weakref.WeakSet()
+        self._told: weakref.WeakKeyDictionary[Clock, Time] = weakref.WeakKeyDictionary()
 
     def new(self, cls: type[Clock] = Clock, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> Clock:
         """Replace `Clock.__new__`."""
@@ -78,24 +90,58 @@ class RosClocks:
 
     def move(self) -> None:
         """Set every clock to the virtual time, so that timers that are due become ready."""
-        handle = self._time()._time_handle
+        time = self._time()
         for made in list(self._made):
-            try:
-                with made.handle:
-                    made.handle.set_ros_time_override(handle)
-            except _rclpy.InvalidHandle:
-                continue
+            _set(made, time)
+
+    def simulates(self, clock: Clock) -> bool:
+        """Return whether messages on /clock set a clock."""
+        return clock in self._simulated
+
+    def simulate(self, clock: ROSClock, active: bool) -> None:
+        """Replace `ROSClock._set_ros_time_is_active`; a clock that no message has set yet is at 0."""
+        if active and clock in self._made:
+            self._made.discard(clock)
+            self._simulated.add(clock)
+            _set(clock, self._told.get(clock) or Time(clock_type=ClockType.ROS_TIME))
+        elif not active and clock in self._simulated:
+            self._simulated.discard(clock)
+            self._made.add(clock)
+            _set(clock, self._time())
+
+    def tell(self, clock: ROSClock, time: Time) -> None:
+        """Replace `ROSClock.set_ros_time_override`, which counts only while the clock is simulated."""
+        self._told[clock] = time
+        if clock in self._simulated:
+            _set(clock, time)
 
     def _time(self) -> Time:
         return Time(nanoseconds=self._clock.now_ns, clock_type=ClockType.ROS_TIME)
+
+
+_SYSTEM_CLOCK = _rclpy.Clock(_rclpy.ClockType.SYSTEM_TIME)
+
+
+def system_ns() -> int:
+    """Return the real system clock, which stamps messages, in nanoseconds since 1970."""
+    return int(_SYSTEM_CLOCK.get_now().nanoseconds)
+
+
+def _of_clock(clock: ROSClock, method: Callable[[ROSClock, Any], None], value: Any) -> None:
+    method(clock, value)
+
+
+def _set(clock: Clock, time: Time) -> None:
+    with contextlib.suppress(_rclpy.InvalidHandle), clock.handle:
+        clock.handle.set_ros_time_override(time._time_handle)
 
 
 def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock) -> None:
     """Replace rclpy's clocks and the functions that sleep on them."""
     Clock.__new__ = staticmethod(clocks.new)
     ROSClock.__new__ = staticmethod(lambda cls: clocks.new(cls, clock_type=ClockType.ROS_TIME))
-    ROSClock._set_ros_time_is_active = lambda self, enabled: None
-    ROSClock.set_ros_time_override = lambda self, time: None
+    ROSClock._set_ros_time_is_active = functools.partialmethod(_of_clock, clocks.simulate)
+    ROSClock.set_ros_time_override = functools.partialmethod(_of_clock, clocks.tell)
     rclpy.impl.rcutils_logger.Throttle.params["throttle_time_source_type"] = Clock()
 
     timer = rclpy.executors.Timer
@@ -118,8 +164,12 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
             raise rclpy.exceptions.NotInitializedException
         if until.clock_type != self._clock_type:
             raise ValueError("until's clock type does not match this clock's type")
-        while clock.now_ns < until.nanoseconds and context.ok():
-            scheduler.pause(until.nanoseconds)
+        if clocks.simulates(self):
+            while clocks.simulates(self) and now(self) < until and context.ok():
+                scheduler.pause(polls=True)
+        else:
+            while clock.now_ns < until.nanoseconds and context.ok():
+                scheduler.pause(until.nanoseconds)
         return bool(context.ok())
 
     Clock.now = looked_at
@@ -251,7 +301,13 @@ def replace_log(wrap: Callable[[Callable[..., Any]], Callable[..., Any]]) -> Non
     _rclpy.rclpy_logging_rcutils_log = wrap(_rclpy.rclpy_logging_rcutils_log)
 
 
-def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], None], leave: Callable[[], None]) -> None:
+def install_traffic(
+    ledger: Ledger,
+    clock: VirtualClock,
+    settle: Callable[[], None],
+    leave: Callable[[], None],
+    give_up: Callable[[], None],
+) -> None:
     """Count what is published and taken, and let the grader match every endpoint before it is used.
 
     Args:
@@ -259,8 +315,10 @@ def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], No
         clock: Notified of every message.
         settle: Yields to the grader at the same instant.
         leave: The same, but returns only after all sent messages have arrived; called before a sender is destroyed.
+        give_up: Called for an endpoint whose events the middleware times on the real clock.
     """
     _install_endpoints(ledger, settle, leave)
+    _watch_timed_events(give_up)
     in_a_row = 0
 
     def counted(name: str, handle: Any, send: Callable[[], Any]) -> Any:
@@ -340,18 +398,35 @@ def _counting_take(name: str, ledger: Ledger, clock: VirtualClock) -> Callable[.
     def counted_take(self: Any, receiver: Any) -> Any:
         clock.busy()
         if name == "_take_subscription" and (kept := ledger.kept(receiver)):
-            return _handing_over(receiver, kept.popleft())
-        taken = take(self, receiver)
+            return _handing_over(receiver, kept.popleft(), clock)
+        if name == "_take_subscription" and not _takes_message_only(receiver):
+            taken = _taken_with_info(receiver, clock)
+        else:
+            taken = take(self, receiver)
         ledger.took(receiver)
         return taken
 
     return counted_take
 
 
-def _handing_over(subscription: Any, found: tuple[Any, Any]) -> Callable[[], Any]:
-    """Return the coroutine function that an executor runs for a message taken ahead of time, as in rclpy itself."""
-    message_only = subscription._callback_type is rclpy.subscription.Subscription.CallbackType.MessageOnly
-    arguments = found[:1] if message_only else found
+def _takes_message_only(subscription: Any) -> bool:
+    return bool(subscription._callback_type is rclpy.subscription.Subscription.CallbackType.MessageOnly)
+
+
+def _taken_with_info(subscription: Any, clock: VirtualClock) -> Callable[[], Any] | None:
+    """Take a message for a callback that also wants its times, as an executor does."""
+    with contextlib.suppress(_rclpy.InvalidHandle), subscription.handle:
+        found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+        if found is not None:
+            return _handing_over(subscription, found, clock)
+    return None
+
+
+def _handing_over(subscription: Any, found: tuple[Any, Any], clock: VirtualClock) -> Callable[[], Any]:
+    """Return the coroutine function that an executor runs for a message, as in rclpy itself."""
+    message, info = found
+    times = {name: clock.at(info[name]) for name in ("source_timestamp", "received_timestamp") if name in info}
+    arguments = (message,) if _takes_message_only(subscription) else (message, {**info, **times})
 
     async def execute() -> None:
         await rclpy.executors.await_or_execute(subscription.callback, *arguments)
@@ -460,6 +535,24 @@ def leave_graph(ledger: Ledger) -> None:
         with contextlib.suppress(Exception):
             if context is not None:
                 context.try_shutdown()
+
+
+def _watch_timed_events(give_up: Callable[[], None]) -> None:
+    """Call `give_up` after an endpoint was created that has a callback for a missed deadline or a lost liveliness."""
+
+    def watching(cls: Any, events: Container[Any]) -> None:
+        make = cls.__init__
+
+        @functools.wraps(make)
+        def made(self: Any, *args: Any, **kwargs: Any) -> None:
+            make(self, *args, **kwargs)
+            if any(handler.event_type in events for handler in self.event_handlers):
+                give_up()
+
+        cls.__init__ = made
+
+    watching(rclpy.publisher.Publisher, PUBLISHER_TIMES)
+    watching(rclpy.subscription.Subscription, SUBSCRIPTION_TIMES)
 
 
 def _register(ledger: Ledger, kind: str, cls: Any, leave: Callable[[], None]) -> None:

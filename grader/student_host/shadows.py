@@ -47,6 +47,7 @@ ROS_PARTS = (
     "rclpy.clock",
     "rclpy.context",
     "rclpy.duration",
+    "rclpy.event_handler",
     "rclpy.executors",
     "rclpy.impl.implementation_singleton",
     "rclpy.impl.rcutils_logger",

@@ -55,10 +55,15 @@ class VirtualTime:
         times.install_sleep_and_clocks(self.scheduler, self.clock)
         #: Called before the program waits for something outside of virtual time.
         self.give_up_outside: Callable[[], None] = lambda: None
+        #: Called when the program has created an endpoint with a deadline to be watched.
+        self.give_up_on_events: Callable[[], None] = lambda: None
         threads.install_selectors(self.scheduler, self.clock, self._give_up_outside)
 
     def _give_up_outside(self) -> None:
         self.give_up_outside()
+
+    def _give_up_on_events(self) -> None:
+        self.give_up_on_events()
 
     def install_ros(self) -> None:
         """Import rclpy and make it virtual."""
@@ -67,9 +72,10 @@ class VirtualTime:
 
         self._ledger = Ledger()
         self._clocks = ros.RosClocks(self.clock)
+        self.clock.real_ns = ros.system_ns
         ros.install_clocks(self._clocks, self.scheduler, self.clock)
         ros.install_wait_sets(self.scheduler, self.clock, self._ledger)
-        ros.install_traffic(self._ledger, self.clock, self._settle, self.leave)
+        ros.install_traffic(self._ledger, self.clock, self._settle, self.leave, self._give_up_on_events)
         ros.install_looks(self.clock, self._ledger, self._settle)
         ros.install_own_signals(self._await_shutdown)
         times.install_wall_time(self.clock)
@@ -152,6 +158,7 @@ class VirtualTime:
         """
         if self._stopping:
             return
+        self.clock.pause()
         if wake_ns is not None and self._may_go_on(wake_ns):
             self._move_to(wake_ns)
             self._moved += 1

@@ -83,6 +83,10 @@ class Watchdog:
         """End the process, because it is about to wait for something outside of the ROS graph."""
         self._give_up("waiting", "outside")
 
+    def give_up_on_events(self) -> None:
+        """End the process, because the middleware tells it what happens in real time."""
+        self._give_up("timed_event", "outside")
+
     def _give_up(self, code: str, unsettled: str) -> None:
         """End the process; `code` is the reason, `unsettled` the reason for using the real clock, if there is one."""
         if self._stopped or not self._time.running:

@@ -44,6 +44,9 @@ ASSIGNED = {
     "__clock": "rclpy.clock:Clock",
     "_time_handle": "rclpy.time:Time",
     "_callback_type": "rclpy.subscription:Subscription",
+    "_executor_event": "rclpy.service:Service",
+    "event_handlers": "rclpy.publisher:Publisher",
+    "event_type": "rclpy.event_handler:EventHandler",
     "_parameters": "rclpy.node:Node",
 }
 #: Class written in C++ -> its methods and attributes; the empty name stands for functions and bare classes.

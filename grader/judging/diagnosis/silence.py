@@ -110,6 +110,27 @@ def _sets_domain(node: ast.Assign | ast.keyword) -> bool:
 
 
 @rule()
+def _simulated_time(case: Case) -> Clue | None:
+    """The node waits for simulated time, and nothing publishes it."""
+    published = any(e.topic == "/clock" for e in student_endpoints(case.trace, "publisher"))
+    if published or case.trace.deliveries("/clock") or not silent_topic(case):
+        return None
+    for source in case.sources.values():
+        setting = next((call for call in source.all(ast.Call) if _sets_simulated_time(call)), None)
+        if setting is not None:
+            hint = f"{source.code(setting)} makes timers wait for simulated time on /clock, which nothing publishes"
+            key = f"use_sim_time:{source.file}:{setting.lineno}"
+            return Clue(f"{hint}: take it out", source.place(setting), key=key)
+    return None
+
+
+def _sets_simulated_time(call: ast.Call) -> bool:
+    values = [*call.args, *(keyword.value for keyword in call.keywords)]
+    constants = [value.value for value in values if isinstance(value, ast.Constant)]
+    return "use_sim_time" in constants and any(value is True for value in constants)
+
+
+@rule()
 def _wrong_topic(case: Case) -> Clue | None:
     for kind, topic in (("publisher", silent_topic(case)), ("subscription", unheard_topic(case))):
         ends = student_endpoints(case.trace, kind)

@@ -1,0 +1,195 @@
+"""Nodes see the same of time on both clocks: simulated clocks, the times of messages, and timed events."""
+
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from grader.core.trace import ClockKind, FaultKind, OutputLine, Trace
+from grader.execution.recording_session import RecordingSession
+
+pytest.importorskip("rclpy")
+
+from hostile import record
+
+from grader.core.quantities import NS_PER_S
+from grader.execution.virtual_runner import OUTSIDE
+
+pytestmark = pytest.mark.ros
+
+BEFORE = """
+import threading, time
+import rclpy
+from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Int32
+
+rclpy.init()
+
+def say(text):
+    print(text, flush=True)
+"""
+#: Publishes simulated time on /clock, five times as fast as time passes.
+FAST_CLOCK = """
+node, count = Node("fast"), 0
+publisher = node.create_publisher(Clock, "/clock", 10)
+
+def publish():
+    global count
+    count += 1
+    told = Clock()
+    told.clock.sec, told.clock.nanosec = count // 2, count % 2 * 500_000_000
+    publisher.publish(told)
+
+node.create_timer(0.1, publish)
+rclpy.spin(node)
+"""
+SIMULATED = """
+node = Node("simulated", parameter_overrides=[Parameter("use_sim_time", value=True)])
+
+def simulated_ms():
+    return node.get_clock().now().nanoseconds // 1_000_000
+"""
+#: Publishes 1, 2, 3 and so on every 300 ms.
+COUNTER = """
+node, count = Node("counter"), 0
+publisher = node.create_publisher(Int32, "/count", 10)
+
+def publish():
+    global count
+    count += 1
+    publisher.publish(Int32(data=count))
+
+node.create_timer(0.3, publish)
+rclpy.spin(node)
+"""
+
+
+@pytest.fixture
+def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+    tmp_path.chmod(0o755)
+
+    def run_all(*programs: str, clock: str, **fields: Any) -> Trace:
+        whole = [BEFORE + textwrap.dedent(program) for program in programs]
+        trace = record(studio, tmp_path / "s", *whole, clock=clock, duration_ns=4 * NS_PER_S, **fields)
+        assert trace.harness_problem == ""
+        return trace
+
+    return run_all
+
+
+def said(trace: Trace, process: str = "a.py") -> list[tuple[float, str]]:
+    """Return what a program wrote, with the time in seconds."""
+    lines = [o for o in trace.observations if isinstance(o, OutputLine) and o.process == process]
+    return [(round(line.t_ns / NS_PER_S, 3), line.text) for line in lines]
+
+
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+def test_a_simulated_clock_follows_the_messages_on_clock(run: Callable[..., Trace], clock: str) -> None:
+    """Timers, rates and sleeps of a node with use_sim_time are as fast as /clock; the wall clock only starts later."""
+    program = """
+    node.create_timer(1.0, lambda: say(f"timer {simulated_ms()}"))
+    threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+    rate = node.create_rate(0.5)
+    for _ in range(2):
+        rate.sleep()
+        say(f"rate {simulated_ms()}")
+    node.get_clock().sleep_for(Duration(seconds=3))
+    say(f"slept {simulated_ms()}")
+    time.sleep(60)
+    """
+    found = said(run(SIMULATED + textwrap.dedent(program), FAST_CLOCK, clock=clock))
+    others = [(at, text) for at, text in found if not text.startswith("timer")]
+    assert [text for _, text in others] == ["rate 2000", "rate 4000", "slept 7000"]
+    assert [text for _, text in found if text.startswith("timer")][:10] == [f"timer {n}000" for n in range(1, 11)]
+    first = others[0][0]
+    assert [round(at - first, 1) for at, _ in others] == [0, 0.4, 1.0]
+    if clock == "virtual":
+        assert first == 0.4
+
+
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+def test_without_messages_on_clock_a_simulated_clock_stands_still(run: Callable[..., Trace], clock: str) -> None:
+    """The classical mistake: use_sim_time without a simulation. No timer fires, until the parameter is taken back."""
+    program = """
+    node.create_timer(0.2, lambda: say("timer"))
+    for _ in range(4):
+        rclpy.spin_once(node, timeout_sec=0.5)
+    say(f"now {simulated_ms()}")
+    node.set_parameters([Parameter("use_sim_time", value=False)])
+    say(f"real {simulated_ms() > 1_000_000_000_000}")
+    rclpy.spin(node)
+    """
+    found = said(run(SIMULATED + textwrap.dedent(program), clock=clock))
+    assert [text for _, text in found[:3]] == ["now 0", "real True", "timer"]
+    assert all(at >= 2 for at, _ in found)
+    assert len(found) > 8
+
+
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+def test_callbacks_are_told_when_their_messages_were_sent(run: Callable[..., Trace], clock: str) -> None:
+    """Also if the program sleeps meanwhile, and if it sent them itself."""
+    program = """
+    node = Node("late")
+    began_ns = node.get_clock().now().nanoseconds
+    own = node.create_publisher(Int32, "/own", 10)
+    ages = []
+
+    def heard(message, info):
+        age_ns = node.get_clock().now().nanoseconds - info["source_timestamp"]
+        received_later_ns = info["received_timestamp"] - info["source_timestamp"]
+        ages.append((message.data, round(age_ns / 1e9, 1), received_later_ns < 100_000_000))
+
+    node.create_subscription(Int32, "/count", heard, 10)
+    node.create_subscription(Int32, "/own", heard, 10)
+    while not ages:
+        rclpy.spin_once(node)
+    own.publish(Int32(data=100))
+    time.sleep(0.7)
+    for _ in range(9):
+        rclpy.spin_once(node, timeout_sec=0.0)
+    say(str(sorted(ages)))
+    rclpy.spin(node)
+    """
+    ((_, text),) = said(run(program, COUNTER, clock=clock))
+    assert text == "[(1, 0.0, True), (2, 0.4, True), (3, 0.1, True), (100, 0.7, True)]"
+
+
+def test_a_watched_deadline_needs_the_wall_clock(run: Callable[..., Trace]) -> None:
+    """The middleware times deadlines itself; virtual time would never miss one, and says so."""
+    program = """
+    node = Node("deadline")
+    qos = QoSProfile(depth=10, deadline=Duration(seconds=0.5))
+    node.create_subscription(
+        Int32, "/x", lambda _: None, qos, event_callbacks=SubscriptionEventCallbacks(deadline=lambda _: say("missed"))
+    )
+    publisher = node.create_publisher(Int32, "/x", qos)
+    publisher.publish(Int32())
+    rclpy.spin(node)
+    """
+    virtual = run(program, clock="virtual")
+    assert (virtual.clock_reason, [fault.kind for fault in virtual.faults()]) == (OUTSIDE, [FaultKind.HUNG])
+    wall = run(program, clock="wall")
+    assert wall.clock is ClockKind.WALL
+    assert {text for _, text in said(wall)} == {"missed"}
+
+
+def test_events_that_time_does_not_bring_stay_in_virtual_time(run: Callable[..., Trace]) -> None:
+    """A deadline that nobody watches, and callbacks for what discovery finds."""
+    program = """
+    node = Node("matched")
+    qos = QoSProfile(depth=10, deadline=Duration(seconds=5))
+    events = SubscriptionEventCallbacks(matched=lambda e: say(f"matched {e.current_count}"), liveliness=lambda _: None)
+    node.create_subscription(Int32, "/count", lambda m: say(f"heard {m.data}"), 10, event_callbacks=events)
+    node.create_publisher(Int32, "/x", qos)
+    rclpy.spin(node)
+    """
+    trace = run(program, COUNTER, clock="virtual")
+    assert said(trace)[:3] == [(0.0, "matched 1"), (0.3, "heard 1"), (0.6, "heard 2")]
+    assert trace.clock_reason == ""
