@@ -25,6 +25,7 @@ from grader.core.trace import Trace
 from grader.execution.bag import Odometry, read_odometry
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
+from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
@@ -89,7 +90,10 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
     """
     started = time.perf_counter() if started is None else started
     # What cannot be removed now is removed with the folder of the session.
-    with TemporaryDirectory(prefix="submission-", dir=session.folder, ignore_cleanup_errors=True) as folder:
+    with (
+        TemporaryDirectory(prefix="submission-", dir=session.folder, ignore_cleanup_errors=True) as folder,
+        TemporaryDirectory(prefix="installed-", dir=session.folder, ignore_cleanup_errors=True) as prefix,
+    ):
         progress("reading the submission")
         exercises = read_exercises(request)
         request = replace(request, exercises=exercise_ids(request.exercises, exercises))
@@ -106,7 +110,8 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         kept = _kept(request, exercises, submission, odometry, seed, environment, provided.offered)
         done = {exercise for exercise, _ in kept}
         unrecorded = [exercise for exercise in exercises if exercise.id not in done]
-        jobs = plan_jobs(request, unrecorded, submission, odometry, seed, provided.folders)
+        prefixes = install_shares(submission.root, Path(prefix), session.ros)
+        jobs = plan_jobs(request, unrecorded, submission, odometry, seed, provided.folders, prefixes)
         run = Run(
             submission=submission,
             traces=kept,
@@ -211,10 +216,11 @@ def plan_jobs(  # noqa: PLR0913  each comes from a different stage
     odometry: Odometry | None,
     seed: int,
     interfaces: Sequence[Path] = (),
+    prefixes: str = "",
 ) -> dict[tuple[str, str], Job]:
     """Plan the recordings, by exercise and scenario; scenarios with a missing file are left out.
 
-    The interfaces are the folders of packages that are not installed.
+    The interfaces are the folders of packages that are not installed; the prefixes are what `install_shares` returns.
     """
     clock = planned_clock(request.clock)
     return {
@@ -223,6 +229,7 @@ def plan_jobs(  # noqa: PLR0913  each comes from a different stage
             replace(
                 plan_scenario(exercise.id, scenario, submission, seed=seed, odometry=odometry, clock=clock),
                 interfaces=tuple(map(str, interfaces)),
+                prefixes=prefixes,
             ),
         )
         for exercise in exercises

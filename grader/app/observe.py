@@ -19,6 +19,7 @@ from grader.execution.bag import read_odometry
 from grader.execution.executables import executables
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import open_session, planned_clock
+from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
 from grader.judging.judge_run import summarise
 from grader.submissions.collected import listed
@@ -71,7 +72,8 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
         provided = provide(session, (), request.interfaces, submission.root)
-        plan = replace(plan, interfaces=tuple(map(str, provided.folders)))
+        prefixes = install_shares(submission.root, session.folder / "installed", session.ros)
+        plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)
         trace = session.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
     if trace.harness_problem:
         raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")

@@ -80,6 +80,7 @@ class NodeProcess:
         arguments: What its program is given on the command line.
         launched_by: The launch file that it comes from, with its line; empty if it comes from none.
         places: The files of the submission.
+        prefix: The folder below which its packages are installed; empty if it has none.
         start_told: How its file is started, as it reported before it ran any of the student's code.
         reached: Names of audit events that its program raised, as it reports.
     """
@@ -113,6 +114,7 @@ class NodeProcess:
     arguments: str = ""
     launched_by: str = ""
     places: Places = field(default_factory=lambda: Places(None))
+    prefix: str = ""
     start_told: Start | None = None
     reached: list[str] = field(default_factory=list)
     _pending: bytes = b""
@@ -323,7 +325,8 @@ class NodeProcess:
         ]
 
     def _anywhere(self, text: str) -> str:
-        """Remove the submission's folder from a text, because it differs from run to run."""
+        """Remove the folders of the submission and of its prefix from a text, because they differ from run to run."""
+        text = text.replace(f"{self.prefix}/", "") if self.prefix else text
         return text.replace(f"{self.root}/", "")
 
     def death(self, t_ns: int) -> Fault:

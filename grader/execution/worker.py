@@ -212,7 +212,7 @@ class Worker:
         launcher = f"{self._isolation.host_seen_at}/launcher.py"
         arguments = ("-s", "-u", "-B", "-X", "utf8", launcher, json.dumps({**request, "fd": theirs.fileno()}))
         process = StudentProcess(
-            runtime=_with_interfaces(self._runtime, plan),
+            runtime=_with_packages(self._runtime, plan),
             host_folder=Path(__file__).resolve().parents[1] / "student_host",
             submission=Path(plan.root),
             arguments=arguments,
@@ -239,7 +239,7 @@ class Worker:
         finally:
             theirs.close()
         student.file, student.places, student.arguments = file, Places(Path(plan.root)), start.words
-        student.launched_by = start.launched_by
+        student.launched_by, student.prefix = start.launched_by, _own_prefix(plan)
         return student
 
     def _starter(self, clock: str) -> Starter:
@@ -250,7 +250,7 @@ class Worker:
     def _start_bare(self, plan: Plan, name: str, file: str, domain: int) -> NodeProcess:
         """Start a file without the grader's code in its process."""
         root = self._isolation.submission_seen_at or plan.root
-        runtime = _with_interfaces(self._runtime, plan)
+        runtime = _with_packages(self._runtime, plan)
         command = self._isolation.student_command(
             StudentProcess(
                 # nothing in its process could add to sys.path, so these folders come before the installed packages
@@ -264,13 +264,22 @@ class Worker:
             plan.limits,
         )
         student = BareProcess.begin(name, root, command, plan.limits)
-        student.file, student.places = file, Places(Path(plan.root))
+        student.file, student.places, student.prefix = file, Places(Path(plan.root)), _own_prefix(plan)
         return student
 
 
-def _with_interfaces(runtime: PythonRuntime, plan: Plan) -> PythonRuntime:
-    """Return a runtime whose processes can also read what was built for a plan, modules and descriptions."""
-    return replace(runtime, read_paths=(*runtime.read_paths, *(Path(folder).parent for folder in plan.interfaces)))
+def _own_prefix(plan: Plan) -> str:
+    return plan.prefixes.partition(":")[0]
+
+
+def _with_packages(runtime: PythonRuntime, plan: Plan) -> PythonRuntime:
+    """Return a runtime whose processes also find what was built or installed for a plan."""
+    own = [Path(folder).parent for folder in plan.interfaces]
+    if not plan.prefixes:
+        return replace(runtime, read_paths=(*runtime.read_paths, *own))
+    own.append(Path(_own_prefix(plan)))
+    environment = {**runtime.environment, "AMENT_PREFIX_PATH": plan.prefixes}
+    return replace(runtime, read_paths=(*runtime.read_paths, *own), environment=environment)
 
 
 def _import_runners() -> Mapping[str, Callable[..., Runner]]:

@@ -174,9 +174,23 @@ def _given(folder: str) -> dict[str, Any]:
     """Return the keyword arguments of setup() in the setup.py of a folder; none if it is unreadable."""
     try:
         with open(os.path.join(folder, "setup.py"), "rb") as source:
-            return given_to_setup(ast.parse(source.read()))
+            return given_to_setup(ast.parse(source.read()), folder)
     except (OSError, SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
         return {}
+
+
+def data_files(folder: str) -> list[tuple[str, list[str]]] | None:
+    """Return the folders below the prefix and the files that setup.py installs to them; None if that is not known."""
+    given = _given(folder).get("data_files")
+    if not isinstance(given, list):
+        return None
+    found: list[tuple[str, list[str]]] = []
+    for pair in given:
+        target, files = pair if isinstance(pair, list) and len(pair) == 2 else (None, None)
+        if not isinstance(target, str) or not isinstance(files, list) or not all(isinstance(f, str) for f in files):
+            return None
+        found.append((target, files))
+    return found
 
 
 def console_scripts(folder: str) -> list[tuple[str, str, str]]:

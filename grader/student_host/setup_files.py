@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import glob
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
@@ -17,13 +19,17 @@ _OF_DICTS = frozenset({"items", "keys", "values"})
 _MAKING: Mapping[str, Callable[[Any], Any]] = {"list": list, "sorted": sorted, "str": str, "tuple": list}
 
 
-def given_to_setup(tree: ast.Module) -> dict[str, Any]:
+def given_to_setup(tree: ast.Module, folder: str) -> dict[str, Any]:
     """Return the keyword arguments of setup(), as far as they can be evaluated; unknown values are None.
+
+    Args:
+        tree: The parsed file.
+        folder: Its folder, which the patterns of `glob` are relative to.
 
     Raises:
         ValueError: The file exceeds a limit.
     """
-    reader = _Reader()
+    reader = _Reader(folder)
     reader.run(tree.body)
     return reader.given
 
@@ -31,7 +37,8 @@ def given_to_setup(tree: ast.Module) -> dict[str, Any]:
 class _Reader:
     """Evaluates the statements of a setup.py, as far as they use strings, lists and dictionaries."""
 
-    def __init__(self) -> None:
+    def __init__(self, folder: str) -> None:
+        self._folder = folder
         self.given: dict[str, Any] = {}
         self._known: dict[str, Any] = {}
         self._steps = 0
@@ -131,6 +138,10 @@ class _Reader:
             self.given = self.given or named
             return None
         values = [item for argument in node.args for item in self._elements(argument)]
+        if _name(node.func) in ("glob", "iglob") and values and isinstance(values[0], str):
+            return self._matching(values[0])
+        if isinstance(node.func, ast.Attribute) and _dotted(node.func) in ("path.join", "os.path.join"):
+            return os.path.join(*values) if values and all(isinstance(value, str) for value in values) else None
         if isinstance(node.func, ast.Attribute):
             return _method(self._value(node.func.value), node.func.attr, values, named)
         name = _name(node.func)
@@ -138,6 +149,20 @@ class _Reader:
             return {**(values[0] if values and isinstance(values[0], dict) else {}), **named}
         known = len(values) == 1 and isinstance(values[0], (str, list))
         return _MAKING[name](values[0]) if name in _MAKING and known else None
+
+    def _matching(self, pattern: str) -> list[str] | None:
+        """Return the files below the folder that match a pattern; None for a pattern that could match others."""
+        parts = pattern.split("/")
+        if os.path.isabs(pattern) or ".." in parts or "**" in parts:
+            return None
+        return sorted(glob.glob(pattern, root_dir=self._folder))
+
+
+def _dotted(node: ast.expr) -> str:
+    if isinstance(node, ast.Attribute):
+        before = _dotted(node.value)
+        return f"{before}.{node.attr}" if before else ""
+    return node.id if isinstance(node, ast.Name) else ""
 
 
 def _method(of: Any, name: str, values: list[Any], named: dict[str, Any]) -> Any:
