@@ -9,6 +9,9 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, settings
 
+from grader.core.errors import EnvironmentFault
+from grader.execution.ros_installation import RosInstallation, find_ros
+
 #: The markers of tests that `-m fast` leaves out.
 NOT_FAST = ("ros", "browser", "sandbox", "slow", "long", "nightly")
 
@@ -37,6 +40,15 @@ def strict_log(request: pytest.FixtureRequest) -> Iterator[None]:
     logging.getLogger("grader").addHandler(handler)
     yield
     logging.getLogger("grader").removeHandler(handler)
+
+
+@pytest.fixture(scope="module")
+def ros() -> RosInstallation:
+    """The ROS of this machine."""
+    try:
+        return find_ros()
+    except EnvironmentFault as fault:
+        pytest.skip(fault.message)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -110,7 +110,7 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         kept = _kept(request, exercises, submission, odometry, seed, environment, provided.offered)
         done = {exercise for exercise, _ in kept}
         unrecorded = [exercise for exercise in exercises if exercise.id not in done]
-        prefixes = install_shares(submission.root, Path(prefix), session.ros)
+        prefixes = install_shares(submission.root, Path(prefix), session.ros) if unrecorded else ()
         jobs = plan_jobs(request, unrecorded, submission, odometry, seed, provided.folders, prefixes)
         run = Run(
             submission=submission,
@@ -216,7 +216,7 @@ def plan_jobs(  # noqa: PLR0913  each comes from a different stage
     odometry: Odometry | None,
     seed: int,
     interfaces: Sequence[Path] = (),
-    prefixes: str = "",
+    prefixes: tuple[str, ...] = (),
 ) -> dict[tuple[str, str], Job]:
     """Plan the recordings, by exercise and scenario; scenarios with a missing file are left out.
 

@@ -91,8 +91,7 @@ def takes_ordinary(reader: dict[str, Any]) -> bool:
     return reader["deadline_ns"] == 0 and not reader["manual"]
 
 
-#: The kinds of endpoints, and the channels on which they receive.
-ENDPOINTS = ("publisher", "subscription", "service", "client")
+#: The channels on which endpoints receive.
 CHANNELS = {"subscription": "topic", "service": "request", "client": "response"}
 
 
@@ -319,7 +318,7 @@ class Discovery:
         if missing:
             self.patience.lose()
         for kind, _, name in missing:
-            if kind in ENDPOINTS and is_name(name):
+            if (kind == "publisher" or kind in CHANNELS) and is_name(name):
                 self._recorder.note(f"{student.name}: {kind} {name[:NAME_CHARACTERS]} was not matched in time")
 
     def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:

@@ -141,8 +141,8 @@ class Plan:
         publishers: The publishers that bare processes are expected to create; the grader subscribes before they do.
         interfaces: Folders of modules of interface packages that are not installed, for the nodes and the grader alike;
             each is in the folder of what was built with it.
-        prefixes: The AMENT_PREFIX_PATH of the nodes, with the folder of what the submission's packages share at the
-            beginning; empty if it has none.
+        prefixes: The AMENT_PREFIX_PATH of the nodes, first the folder of what the submission's packages share; empty if
+            it has none.
     """
 
     scenario: str
@@ -169,7 +169,7 @@ class Plan:
     first_node_ns: int = 0
     publishers: tuple[Endpoint, ...] = ()
     interfaces: tuple[str, ...] = ()
-    prefixes: str = ""
+    prefixes: tuple[str, ...] = ()
     starts: tuple[PlannedStart, ...] = ()
 
     def start_of(self, process: str) -> PlannedStart:

@@ -239,7 +239,7 @@ class Worker:
         finally:
             theirs.close()
         student.file, student.places, student.arguments = file, Places(Path(plan.root)), start.words
-        student.launched_by, student.prefix = start.launched_by, _own_prefix(plan)
+        student.launched_by, student.prefix = start.launched_by, next(iter(plan.prefixes), "")
         return student
 
     def _starter(self, clock: str) -> Starter:
@@ -264,22 +264,16 @@ class Worker:
             plan.limits,
         )
         student = BareProcess.begin(name, root, command, plan.limits)
-        student.file, student.places, student.prefix = file, Places(Path(plan.root)), _own_prefix(plan)
+        student.file, student.places = file, Places(Path(plan.root))
+        student.prefix = next(iter(plan.prefixes), "")
         return student
-
-
-def _own_prefix(plan: Plan) -> str:
-    return plan.prefixes.partition(":")[0]
 
 
 def _with_packages(runtime: PythonRuntime, plan: Plan) -> PythonRuntime:
     """Return a runtime whose processes also find what was built or installed for a plan."""
-    own = [Path(folder).parent for folder in plan.interfaces]
-    if not plan.prefixes:
-        return replace(runtime, read_paths=(*runtime.read_paths, *own))
-    own.append(Path(_own_prefix(plan)))
-    environment = {**runtime.environment, "AMENT_PREFIX_PATH": plan.prefixes}
-    return replace(runtime, read_paths=(*runtime.read_paths, *own), environment=environment)
+    own = (*(Path(folder).parent for folder in plan.interfaces), *map(Path, plan.prefixes[:1]))
+    path = {"AMENT_PREFIX_PATH": ":".join(plan.prefixes)} if plan.prefixes else {}
+    return replace(runtime, read_paths=(*runtime.read_paths, *own), environment={**runtime.environment, **path})
 
 
 def _import_runners() -> Mapping[str, Callable[..., Runner]]:

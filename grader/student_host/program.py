@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import ctypes
+import functools
 import gc
 import importlib
 import os
@@ -85,10 +86,9 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
     if isinstance(time, VirtualTime) and watchdog is not None:
         watchdog.start()
-        install_alarms(watchdog.give_up_on_alarms)
-        install_processes(watchdog.give_up_on_processes)
-        time.give_up_outside = watchdog.give_up_on_waiting
-        time.give_up_on_events = watchdog.give_up_on_events
+        install_alarms(functools.partial(watchdog.give_up_outside, "alarm"))
+        install_processes(functools.partial(watchdog.give_up_outside, "process"))
+        time.give_up_outside = watchdog.give_up_outside
         Watch(link, request["root"]).install()
     ending = play(request, describer, link, install_ros)
     time.finish()

@@ -11,7 +11,7 @@ import functools
 import os
 import signal
 import weakref
-from collections.abc import Callable, Container
+from collections.abc import Callable
 from typing import Any
 
 import rclpy.client
@@ -44,12 +44,14 @@ SHUTTING_DOWN = {
     signal.SIGINT: (_rclpy.SignalHandlerOptions.ALL, _rclpy.SignalHandlerOptions.SIGINT),
     signal.SIGTERM: (_rclpy.SignalHandlerOptions.ALL, _rclpy.SignalHandlerOptions.SIGTERM),
 }
-#: The events that the middleware times on the real clock; the numbers of the two kinds overlap.
-PUBLISHER_TIMES = (
-    QoSPublisherEventType.RCL_PUBLISHER_LIVELINESS_LOST,
-    QoSPublisherEventType.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED,
-)
-SUBSCRIPTION_TIMES = (QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED,)
+#: Kind of endpoint -> the events that the middleware times on the real clock; the numbers of the two kinds overlap.
+TIMED_EVENTS = {
+    "publisher": (
+        QoSPublisherEventType.RCL_PUBLISHER_LIVELINESS_LOST,
+        QoSPublisherEventType.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED,
+    ),
+    "subscription": (QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED,),
+}
 #: The methods with which nodes query the whole graph.
 GRAPH_LOOKS = (
     *("count_clients", "count_publishers", "count_services", "count_subscribers"),
@@ -317,8 +319,7 @@ def install_traffic(
         leave: The same, but returns only after all sent messages have arrived; called before a sender is destroyed.
         give_up: Called for an endpoint whose events the middleware times on the real clock.
     """
-    _install_endpoints(ledger, settle, leave)
-    _watch_timed_events(give_up)
+    _install_endpoints(ledger, settle, leave, give_up)
     in_a_row = 0
 
     def counted(name: str, handle: Any, send: Callable[[], Any]) -> Any:
@@ -424,9 +425,11 @@ def _taken_with_info(subscription: Any, clock: VirtualClock) -> Callable[[], Any
 
 def _handing_over(subscription: Any, found: tuple[Any, Any], clock: VirtualClock) -> Callable[[], Any]:
     """Return the coroutine function that an executor runs for a message, as in rclpy itself."""
-    message, info = found
-    times = {name: clock.at(info[name]) for name in ("source_timestamp", "received_timestamp") if name in info}
-    arguments = (message,) if _takes_message_only(subscription) else (message, {**info, **times})
+    arguments: tuple[Any, ...] = found[:1]
+    if not _takes_message_only(subscription):
+        info = found[1]
+        times = {name: clock.at(info[name]) for name in ("source_timestamp", "received_timestamp") if name in info}
+        arguments += ({**info, **times},)
 
     async def execute() -> None:
         await rclpy.executors.await_or_execute(subscription.callback, *arguments)
@@ -434,7 +437,9 @@ def _handing_over(subscription: Any, found: tuple[Any, Any], clock: VirtualClock
     return execute
 
 
-def _install_endpoints(ledger: Ledger, settle: Callable[[], None], leave: Callable[[], None]) -> None:
+def _install_endpoints(
+    ledger: Ledger, settle: Callable[[], None], leave: Callable[[], None], give_up: Callable[[], None]
+) -> None:
     kinds = {
         "publisher": rclpy.publisher.Publisher,
         "subscription": rclpy.subscription.Subscription,
@@ -442,7 +447,7 @@ def _install_endpoints(ledger: Ledger, settle: Callable[[], None], leave: Callab
         "service": rclpy.service.Service,
     }
     for kind, cls in kinds.items():
-        _register(ledger, kind, cls, leave)
+        _register(ledger, kind, cls, leave, give_up)
         _report_departures_first(ledger, f"create_{kind}", settle)
     note_nodes(ledger.add_node)
     _report_departures_first(ledger, "__init__", settle)
@@ -537,30 +542,15 @@ def leave_graph(ledger: Ledger) -> None:
                 context.try_shutdown()
 
 
-def _watch_timed_events(give_up: Callable[[], None]) -> None:
-    """Call `give_up` after an endpoint was created that has a callback for a missed deadline or a lost liveliness."""
-
-    def watching(cls: Any, events: Container[Any]) -> None:
-        make = cls.__init__
-
-        @functools.wraps(make)
-        def made(self: Any, *args: Any, **kwargs: Any) -> None:
-            make(self, *args, **kwargs)
-            if any(handler.event_type in events for handler in self.event_handlers):
-                give_up()
-
-        cls.__init__ = made
-
-    watching(rclpy.publisher.Publisher, PUBLISHER_TIMES)
-    watching(rclpy.subscription.Subscription, SUBSCRIPTION_TIMES)
-
-
-def _register(ledger: Ledger, kind: str, cls: Any, leave: Callable[[], None]) -> None:
+def _register(ledger: Ledger, kind: str, cls: Any, leave: Callable[[], None], give_up: Callable[[], None]) -> None:
     make, destroy = cls.__init__, cls.destroy
+    timed = TIMED_EVENTS.get(kind, ())
 
     def registered(self: Any, *args: Any, **kwargs: Any) -> None:
         make(self, *args, **kwargs)
         ledger.add(kind, self)
+        if timed and any(handler.event_type in timed for handler in self.event_handlers):
+            give_up()
 
     def destroyed(self: Any) -> None:
         leave()

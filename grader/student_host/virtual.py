@@ -53,17 +53,9 @@ class VirtualTime:
         threads.install_threads(self.scheduler, self.clock, report_fault)
         times.install_looks(self.clock)
         times.install_sleep_and_clocks(self.scheduler, self.clock)
-        #: Called before the program waits for something outside of virtual time.
-        self.give_up_outside: Callable[[], None] = lambda: None
-        #: Called when the program has created an endpoint with a deadline to be watched.
-        self.give_up_on_events: Callable[[], None] = lambda: None
-        threads.install_selectors(self.scheduler, self.clock, self._give_up_outside)
-
-    def _give_up_outside(self) -> None:
-        self.give_up_outside()
-
-    def _give_up_on_events(self) -> None:
-        self.give_up_on_events()
+        #: Called with a reason before the program waits for something outside of virtual time.
+        self.give_up_outside: Callable[[str], None] = lambda reason: None
+        threads.install_selectors(self.scheduler, self.clock, lambda: self.give_up_outside("waiting"))
 
     def install_ros(self) -> None:
         """Import rclpy and make it virtual."""
@@ -75,7 +67,9 @@ class VirtualTime:
         self.clock.real_ns = ros.system_ns
         ros.install_clocks(self._clocks, self.scheduler, self.clock)
         ros.install_wait_sets(self.scheduler, self.clock, self._ledger)
-        ros.install_traffic(self._ledger, self.clock, self._settle, self.leave, self._give_up_on_events)
+        ros.install_traffic(
+            self._ledger, self.clock, self._settle, self.leave, lambda: self.give_up_outside("timed_event")
+        )
         ros.install_looks(self.clock, self._ledger, self._settle)
         ros.install_own_signals(self._await_shutdown)
         times.install_wall_time(self.clock)

@@ -60,7 +60,7 @@ class Watchdog:
             blocked_s = blocked_s + INTERVAL_S if idle else 0.0
             used_before = used
             if blocked_s > self._blocked_s:
-                self._give_up("blocked", "outside")
+                self.give_up_outside("blocked")
 
     def _sleeps(self) -> bool:
         """Return whether the thread that should run is asleep in the kernel, as opposed to waiting for a processor."""
@@ -71,21 +71,9 @@ class Watchdog:
         except OSError:
             return False
 
-    def give_up_on_alarms(self) -> None:
-        """End the process, because it is about to set an alarm, which works in real time."""
-        self._give_up("alarm", "outside")
-
-    def give_up_on_processes(self) -> None:
-        """End the process, because it is about to start another process, which runs in real time."""
-        self._give_up("process", "outside")
-
-    def give_up_on_waiting(self) -> None:
-        """End the process, because it is about to wait for something outside of the ROS graph."""
-        self._give_up("waiting", "outside")
-
-    def give_up_on_events(self) -> None:
-        """End the process, because the middleware tells it what happens in real time."""
-        self._give_up("timed_event", "outside")
+    def give_up_outside(self, code: str) -> None:
+        """End the process, because it is about to wait for something outside of virtual time; `code` says for what."""
+        self._give_up(code, "outside")
 
     def _give_up(self, code: str, unsettled: str) -> None:
         """End the process; `code` is the reason, `unsettled` the reason for using the real clock, if there is one."""

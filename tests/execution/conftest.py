@@ -8,9 +8,7 @@ import pytest
 from hostile import staging
 from sandboxes import make_submission
 
-from grader.core.errors import EnvironmentFault
 from grader.execution.recording_session import RecordingSession, open_session
-from grader.execution.ros_installation import RosInstallation, find_ros
 
 
 @pytest.fixture(scope="module")
@@ -18,15 +16,6 @@ def studio() -> Iterator[RecordingSession]:
     """The strongest sandbox of this machine, with warm workers."""
     with open_session("auto") as studio:
         yield staging(studio)
-
-
-@pytest.fixture(scope="module")
-def ros() -> RosInstallation:
-    """The ROS of this machine."""
-    try:
-        return find_ros()
-    except EnvironmentFault as fault:
-        pytest.skip(fault.message)
 
 
 @pytest.fixture

@@ -560,9 +560,7 @@ def test_nothing_is_announced_to_an_end_without_a_counterpart(missing: list[str]
     run = Run(deaf, numbers=(numbers((1.0, 0)),))
     reached = missing != ["subscription /temperature"]
     assert any("got {'topic /temperature': 1}" in line for line in run.seen()) is reached
-    assert [f"{end} was not matched in time" in note for end, note in zip(missing, run.trace.notes, strict=True)] == [
-        True for _ in missing
-    ]
+    assert all(f"{end} was not matched in time" in note for end, note in zip(missing, run.trace.notes, strict=True))
 
 
 def test_sentences_in_place_of_names_are_dropped() -> None:
