@@ -23,6 +23,7 @@ from grader.core.quantities import GIB, MIB, NS_PER_S, duration
 from grader.core.scenario import is_launch_file
 from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Trace
 from grader.execution.bare_start import BareProcess, bare_arguments
+from grader.execution.beside import files_beside
 from grader.execution.codec import from_json, trace_to_json
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.execution.launching import Launched, evaluated, expanded, renamed, unstarted
@@ -223,6 +224,8 @@ class Worker:
                 "PYTHONHASHSEED": HASH_SEED,
             },
             pass_fds=(theirs.fileno(),),
+            beside=Path(plan.root, file).parent,
+            copied=files_beside(Path(plan.root), file),
         )
         try:
             if told or not self._isolation.can_enter:  # a fork of the starter has imported rclpy, which takes no part
@@ -260,6 +263,8 @@ class Worker:
                 arguments=bare_arguments(Path(plan.root), root, file, plan.start_of(name)),
                 environment={"ROS_DOMAIN_ID": str(domain)},
                 pass_fds=(),
+                beside=Path(plan.root, file).parent,
+                copied=files_beside(Path(plan.root), file),
             ),
             plan.limits,
         )

@@ -51,7 +51,13 @@ class Sandbox:
     start_as: tuple[str, ...] = ()
 
     def student(
-        self, code: str, *, limits: Limits | None = None, pass_fds: tuple[int, ...] = (), **variables: str
+        self,
+        code: str,
+        *,
+        limits: Limits | None = None,
+        pass_fds: tuple[int, ...] = (),
+        copied: tuple[str, ...] = (),
+        **variables: str,
     ) -> Command:
         """Return the command of a student's process that runs some code."""
         process = StudentProcess(
@@ -61,6 +67,8 @@ class Sandbox:
             arguments=("-s", "-u", "-c", code),
             environment={"ROS_DOMAIN_ID": DOMAIN, **variables},
             pass_fds=pass_fds,
+            beside=self.submission,
+            copied=copied,
         )
         return self.isolation.student_command(process, limits or Limits())
 

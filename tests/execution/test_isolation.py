@@ -155,6 +155,25 @@ print(json.dumps([sorted(filter(writes, everywhere)), os.getcwd(), os.environ["H
     assert said(sandbox.run(code)) == [scratch, "/tmp/work", "/tmp/home", "/tmp/home/log"]
 
 
+def test_the_working_directory_has_copies_that_a_student_may_change(any_tier: Sandbox) -> None:
+    """The files that were handed in stay as they are, and the copies leave no descriptor open."""
+    (any_tier.submission / "deep" / "er").mkdir(parents=True)
+    for name, text in {"settings.txt": "20", "deep/er/table.csv": "1,2"}.items():
+        (any_tier.submission / name).write_text(text)
+    for path in (any_tier.submission / "deep", *any_tier.submission.rglob("*")):
+        path.chmod(0o755 if path.is_dir() else 0o644)
+    code = """
+import json, os
+before = [open(name).read() for name in ("settings.txt", "deep/er/table.csv")]
+for name in ("settings.txt", "deep/er/table.csv", "deep/own.txt"):
+    open(name, "w").write("changed")
+print(json.dumps([before, sorted(os.listdir()), open("deep/er/table.csv").read(), len(os.listdir("/proc/self/fd"))]))
+"""
+    found = said(any_tier.run(code, copied=("deep/er/table.csv", "settings.txt")))
+    assert found == [["20", "1,2"], ["deep", "settings.txt"], "changed", 4]
+    assert (any_tier.submission / "settings.txt").read_text() == "20"
+
+
 def test_nothing_a_student_writes_is_seen_outside(sandbox: Sandbox) -> None:
     """Scratch folders are private: a marker in /tmp and /dev/shm is not on the machine."""
     marker = f"marker-{secrets.token_hex(8)}"

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import ClassVar
 
 from grader.core.errors import EnvironmentFault
@@ -156,16 +156,17 @@ class Bubblewrap:
             make_readable(process.submission)
         environment = student_environment(process, HOME)
         filter_fd = _memory_file("filter", seccomp.student_filter())
+        copies, copied_fds = _copies(process)
         options = [
             *self._namespaces(TO_CHANGE_USER),
             *("--clearenv", "--chdir", str(WORK), "--seccomp", str(filter_fd)),
             *(word for setting in environment.items() for word in ("--setenv", *setting)),
-            *self._files(process, limits),
+            *self._files(process, limits, copies),
         ]
         options_fd = _memory_file("options", b"".join(os.fsencode(option) + b"\0" for option in options))
         argv = (str(self.bwrap), "--args", str(options_fd), "--", *self._entry(limits))
         argv += (str(process.runtime.executable), *process.arguments)
-        opened = (filter_fd, options_fd)
+        opened = (filter_fd, options_fd, *copied_fds)
         return Command(argv, {}, (*process.pass_fds, *opened), opened)
 
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
@@ -173,14 +174,15 @@ class Bubblewrap:
         if self.as_root:
             make_readable(process.submission)
         status_read, status_write = os.pipe()
+        copies, copied_fds = _copies(process)
         options = [
             *self._namespaces(()),
             *("--clearenv", "--as-pid-1", "--json-status-fd", str(status_write), "--seccomp"),
             str(filter_fd := _memory_file("filter", seccomp.student_filter())),
-            *self._files(process, limits, ("--ro-bind", str(self.cat), str(PLACEHOLDER))),
+            *self._files(process, limits, (*copies, "--ro-bind", str(self.cat), str(PLACEHOLDER))),
         ]
         options_fd = _memory_file("options", b"".join(os.fsencode(option) + b"\0" for option in options))
-        opened = (filter_fd, options_fd, status_write)
+        opened = (filter_fd, options_fd, status_write, *copied_fds)
         argv = (str(self.bwrap), "--args", str(options_fd), "--", str(PLACEHOLDER))
         own: dict[str, object] = {"RLIMIT_NPROC": limits.processes, "RLIMIT_RTPRIO": 0}
         restrictions = start_request(
@@ -242,6 +244,20 @@ class Bubblewrap:
         options += more
         # bubblewrap's /dev is a tmpfs without a size limit, which its owner could fill.
         return [*options, "--remount-ro", "/dev", "--remount-ro", "/"]
+
+
+def _copies(process: StudentProcess) -> tuple[list[str], list[int]]:
+    """Return the options that copy files into the working directory, and the descriptors that they name."""
+    options: list[str] = []
+    opened: list[int] = []
+    for folder in sorted(
+        {parent for file in process.copied for parent in PurePosixPath(file).parents} - {PurePosixPath()}
+    ):
+        options += ["--perms", "0777", "--dir", str(WORK / folder)]
+    for file in process.copied:
+        opened.append(os.open(process.beside / file, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC))
+        options += ["--perms", "0666", "--file", str(opened[-1]), str(WORK / file)]
+    return options, opened
 
 
 def _kernel() -> tuple[int, ...]:

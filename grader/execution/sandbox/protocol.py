@@ -24,6 +24,9 @@ class StudentProcess:
     arguments: tuple[str, ...]
     environment: Mapping[str, str]  # variables beyond those of the sandbox and the runtime
     pass_fds: tuple[int, ...]  # descriptors that the process inherits besides 0, 1 and 2, with the same numbers
+    # The folder whose files the working directory holds copies of, and these files, relative to it
+    beside: Path = Path()
+    copied: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +68,7 @@ class PreparedSandbox:
 def start_request(folder: str, **further: object) -> dict[str, object]:
     """Return the request of `start.prepare` that enters a folder, and puts further restrictions on the process."""
     nothing: dict[str, object] = {"made": False, "scratch": 0, "limits": {}, "user": None, "processes": 0}
+    nothing |= {"beside": "", "copied": ()}
     return {"folder": folder, **nothing, "confinement": None, "filter": "", **further}
 
 

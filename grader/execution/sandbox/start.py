@@ -1,7 +1,8 @@
 """Starts a program in a sandbox without namespaces: limits, a temporary folder, Landlock and seccomp.
 
 Usage: start.py JSON PROGRAM [ARGUMENT ...]. The object has `folder`, the working directory; `made`, whether to create
-it before the start and delete it after the end; `scratch`, its maximum size in bytes if it is created, 0 for unlimited;
+it before the start and delete it after the end; `beside` and `copied`, a folder, and files in it that it gets copies of
+when it is created; `scratch`, its maximum size in bytes if it is created, 0 for unlimited;
 `limits`, by their names in `resource`; `user`, [user, group] to run as, or null; `processes`, how many processes and
 threads may be added to those that the user has already, 0 for unlimited; and `confinement`, null or an object of `read`
 and `devices`, paths that may be read, or also written; `hidden`, folders among them that may not be read; `tcp`,
@@ -109,6 +110,21 @@ def enter_folder(request: dict[str, Any]) -> None:
             os.chown(os.path.join(folder, part), *request["user"])
     clean_up_after_end(folder, request["scratch"])
     os.chdir(os.path.join(folder, "work"))
+    for file in request["copied"]:
+        copy(os.path.join(request["beside"], file), file, request["user"])
+
+
+def copy(source: str, file: str, user: list[int] | None) -> None:
+    """Copy a file to a path below the working directory, for another user if one is given."""
+    parts = file.split("/")
+    for folder in ("/".join(parts[:number]) for number in range(1, len(parts))):
+        with contextlib.suppress(FileExistsError):
+            os.mkdir(folder, mode=0o700)
+            if user:
+                os.chown(folder, *user)
+    shutil.copyfile(source, file, follow_symlinks=False)
+    if user:
+        os.chown(file, *user)
 
 
 def limit(which: int, value: int, beyond: int = 0) -> None:

@@ -191,7 +191,7 @@ class Plain(_OnSharedNetwork):
         """Return the command that starts a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, PLAIN_NAME)
         folder = Path(tempfile.gettempdir()) / f"grade-student-{secrets.token_hex(8)}"
-        start = start_command(str(folder), made=True, limits=by_resource(limits))
+        start = start_command(str(folder), made=True, limits=by_resource(limits), **copies(process))
         environment = student_environment(process, folder / "home")
         environment |= loopback_only(environment)
         argv = (*start, str(process.runtime.executable), *process.arguments)
@@ -210,6 +210,11 @@ class Ground:
 def start_command(folder: str, **further: Any) -> tuple[str, ...]:
     """Return the beginning of a command line; the program and its arguments follow. See `start_request`."""
     return (sys.executable, "-I", "-S", str(HERE / "start.py"), json.dumps(start_request(folder, **further)))
+
+
+def copies(process: StudentProcess) -> dict[str, object]:
+    """Return what a request says about the files that the working directory gets copies of."""
+    return {"beside": str(process.beside), "copied": process.copied}
 
 
 def loopback_only(environment: Mapping[str, str]) -> dict[str, str]:
@@ -248,6 +253,7 @@ def sandboxed_command(process: StudentProcess, limits: Limits, ground: Ground) -
     start = start_command(
         str(folder),
         made=True,
+        **copies(process),
         scratch=limits.scratch_bytes,
         limits={**by_resource(limits), "RLIMIT_RTPRIO": 0, "RLIMIT_MSGQUEUE": 0},
         processes=limits.processes,
