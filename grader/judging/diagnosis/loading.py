@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from grader.core.exercise import Location
 from grader.core.submission import EXPORT_NOTEBOOK
-from grader.core.trace import Fault, FaultKind
+from grader.core.trace import Fault, FaultKind, StartWay
 from grader.judging.diagnosis.names import MODULES, PACKAGES, PLAIN_MODULES, ROS_1, ROS_1_CALLS, closest, import_of
 from grader.judging.diagnosis.rules import Clue, Crash, crash_rule
 from grader.judging.source import Function, Source, chain, covers, last_name, parameters
@@ -39,6 +39,11 @@ _SAYINGS: Sequence[tuple[str, str]] = (
 #: A key that every notebook has, and how many lines of a file are searched for it.
 _NOTEBOOK, _NOTEBOOK_LINES = re.compile(r'^\{\s*"(?:cells|metadata|nbformat)"\s*:|"cell_type"\s*:'), 200
 _MAGIC = re.compile(r"^\s*(?:%{1,2}\w|!\w)")
+#: Functions that start another program, of subprocess, asyncio and os.
+_STARTERS = frozenset(
+    {"Popen", "run", "call", "check_call", "check_output", "create_subprocess_exec"}
+    | {f"{kind}{ending}" for kind in ("exec", "spawn") for ending in ("l", "le", "lp", "lpe", "v", "ve", "vp", "vpe")}
+)
 _MESSAGE_ENDINGS = ("_msgs", "_msg", "_interfaces", "_interface", "_srvs", "_srv", "_actions")
 
 
@@ -188,6 +193,21 @@ def _cannot_import(crash: Crash) -> Clue | None:
     if right and not right.startswith(f"from {module} "):
         return Clue(f"{name} is elsewhere: {right}")
     return Clue(f"from {module} import {near}, not {name}") if near else None
+
+
+@crash_rule(r"^FileNotFoundError: \[Errno 2\] No such file or directory: '([^']+)'", in_file=False)
+def _missing_file(crash: Crash) -> Clue | None:
+    path, source = crash.found[1], crash.source
+    name = quote(path, 60)
+    if any(last_name(n.func) in _STARTERS and covers(n, crash.line) for n in source.all(ast.Call)):
+        return Clue(f"the program {name} is not there where submissions run, only Python and ROS are: do without it")
+    if path.startswith("/"):
+        return Clue(f"{name} is a path of one computer: hand the file in beside the program, and open it by its name")
+    ways = {start.way for start in crash.case.trace.starts if start.process == crash.case.process}
+    if ways - {StartWay.SCRIPT}:
+        hint = f"`ros2 run` starts a program in any folder: let setup.py install {name} with data_files"
+        return Clue(f"{hint}, and open it in the folder that get_package_share_directory returns")
+    return Clue(f"{name} is not in the submission: hand it in, in the folder of the program")
 
 
 @crash_rule(r"^(?:NameError|UnboundLocalError).*name '(\w+)' is not defined")
