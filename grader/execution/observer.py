@@ -30,7 +30,7 @@ from grader.execution.console import TEXT_CHARACTERS, Logged
 from grader.execution.interfaces import message_class, plain_fields
 from grader.execution.padding import without_padding
 from grader.execution.service_ends import BACKGROUND_TYPES, ServiceEnds, looked
-from grader.student_host.originals import wait_until
+from grader.student_host.originals import unread_bytes, wait_until
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -342,16 +342,6 @@ def _make_node(domain: int) -> Node:
 
 def _subscribing(message: Any, topic: str, qos: QoSProfile) -> Callable[[Node], Any]:
     return lambda node: node.create_subscription(message, topic, _nothing, qos, raw=True)
-
-
-def unread_bytes() -> int:
-    """Return the number of unread bytes in all UDP sockets of this network namespace, from /proc/net/udp (proc(5))."""
-    unread = 0
-    for name in ("udp", "udp6"):
-        with contextlib.suppress(OSError):
-            rows = Path("/proc/net", name).read_text(encoding="ascii").splitlines()[1:]
-            unread += sum(int(row.split()[4].partition(":")[2], 16) for row in rows)
-    return unread
 
 
 def other_threads_run() -> bool:

@@ -7,6 +7,7 @@ import functools
 import os
 import signal
 import weakref
+from collections.abc import Callable
 from typing import Any
 
 from . import originals
@@ -14,8 +15,10 @@ from .link import Link
 
 #: How long, in real time, a new publisher waits for its first subscription before its first message.
 MATCH_S = 2.0
-#: How long, in real time, to wait until a publisher's messages have arrived before it is destroyed.
+#: How long, in real time, to wait until what was sent has arrived before its sender is destroyed.
 ACKNOWLEDGED_S = 0.5
+#: How long the other side may take to pass on a request or a response that it has read: nothing tells when it has.
+TAKEN_S = 0.03
 
 
 class WallTime:
@@ -29,17 +32,20 @@ class WallTime:
         self._link = link
         self._publishing: weakref.WeakSet[Any] = weakref.WeakSet()
         self._patience: Any = None
+        self._exchanged = False
         self.domain = 0
 
     def install_ros(self) -> None:
         """Make every publisher wait for a subscription before its first message, as if it joined a running system."""
+        import rclpy.client
         import rclpy.publisher
+        import rclpy.service
         from rclpy.duration import Duration
 
         from . import ros
         from .ledger import BACKGROUND
 
-        publish, destroy = rclpy.publisher.Publisher.publish, rclpy.publisher.Publisher.destroy
+        publish = rclpy.publisher.Publisher.publish
         matched, time = self._publishing, self
         self._patience = Duration(seconds=ACKNOWLEDGED_S)
 
@@ -47,21 +53,32 @@ class WallTime:
         def publish_when_matched(self: Any, msg: Any) -> Any:
             if self not in matched and self.topic_name not in BACKGROUND:
                 # In another domain there are no subscriptions: waiting would only delay the program.
-                deadline = originals.perf_counter() + (
-                    MATCH_S if _domain_of(self, ros.MADE_NODES, time.domain) == time.domain else 0.0
-                )
-                while self.get_subscription_count() == 0 and originals.perf_counter() < deadline:
-                    originals.sleep(0.001)
+                if _domain_of(self, ros.MADE_NODES, time.domain) == time.domain:
+                    originals.wait_until(self.get_subscription_count, MATCH_S, pause_s=0.001)
                 matched.add(self)
             return publish(self, msg)
 
-        @functools.wraps(destroy)
-        def destroy_when_heard(publisher: Any) -> None:
-            self._leave()
-            destroy(publisher)
+        def when_heard(destroy: Callable[..., None]) -> Callable[..., None]:
+            @functools.wraps(destroy)
+            def destroy_when_heard(sender: Any) -> None:
+                self._leave()
+                destroy(sender)
+
+            return destroy_when_heard
+
+        def noting(send: Callable[..., Any]) -> Callable[..., Any]:
+            @functools.wraps(send)
+            def noted(*args: Any, **kwargs: Any) -> Any:
+                self._exchanged = True
+                return send(*args, **kwargs)
+
+            return noted
 
         rclpy.publisher.Publisher.publish = publish_when_matched
-        rclpy.publisher.Publisher.destroy = destroy_when_heard
+        for sender in (rclpy.publisher.Publisher, rclpy.client.Client, rclpy.service.Service):
+            sender.destroy = when_heard(sender.destroy)
+        rclpy.client.Client.call_async = noting(rclpy.client.Client.call_async)
+        rclpy.service.Service.send_response = noting(rclpy.service.Service.send_response)
         ros.note_nodes()
         ros.install_departures(self._leave)
 
@@ -70,6 +87,10 @@ class WallTime:
         for publisher in list(self._publishing):
             with contextlib.suppress(Exception):  # it has been destroyed, or its context has been shut down
                 publisher.wait_for_all_acked(self._patience)
+        if self._exchanged:
+            self._exchanged = False
+            originals.wait_until(lambda: not originals.unread_bytes(), ACKNOWLEDGED_S)
+            originals.sleep(TAKEN_S)
 
     def finish(self) -> None:
         """Wait until published messages have arrived, before the publishers are freed with the student's modules."""

@@ -313,8 +313,9 @@ LEAVES = {
 }
 
 
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
 @pytest.mark.parametrize("ending", LEAVES.values(), ids=LEAVES)
-def test_a_server_that_answers_and_leaves_has_answered(run: Callable[..., Trace], ending: str) -> None:
+def test_a_server_that_answers_and_leaves_has_answered(run: Callable[..., Trace], ending: str, clock: str) -> None:
     """Its response reaches the grader, and another student's client."""
     program = f"""
 rclpy.init()
@@ -331,23 +332,25 @@ while not answered:
 time.sleep(1)
 """
     calls = PlannedCalls("/status", "std_srvs/srv/Trigger", 500 * MS, NS_PER_S, 1, ({},))
-    assert len(run(program, calls=(calls,)).responses("/status", "student")) == 1
+    assert len(run(program, calls=(calls,), clock=clock).responses("/status", "student")) == 1
     client = "rclpy.init()\nasker.node = Node('asker')\nclient = asker.node.create_client(Trigger, '/status')\n"
     client += "client.wait_for_service()\nasker.ask(client)\n"
-    assert [line.text for line in run(program, ASKING + client).lines()] == ["n0"]
+    assert [line.text for line in run(program, ASKING + client, clock=clock).lines()] == ["n0"]
 
 
-def test_a_client_that_asks_and_leaves_has_asked(run: Callable[..., Trace]) -> None:
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+@pytest.mark.parametrize("ending", ["node.destroy_node()", "client.destroy()", "os._exit(0)"])
+def test_a_client_that_asks_and_leaves_has_asked(run: Callable[..., Trace], ending: str, clock: str) -> None:
     server = PlannedServer("/status", "std_srvs/srv/Trigger", 0, 0, 0, cycle=False, answers=0, responses=ANSWERS)
-    program = """
+    program = f"""
         rclpy.init()
         node = Node('asker')
         client = node.create_client(Trigger, '/status')
         client.wait_for_service()
         client.call_async(Trigger.Request())
-        node.destroy_node()
+        {ending}
         """
-    assert len(run(program, servers=(server,)).requests("/status", "student")) == 1
+    assert len(run(program, servers=(server,), clock=clock).requests("/status", "student")) == 1
 
 
 def test_the_wall_clock_loses_nothing_either(run: Callable[..., Trace]) -> None:
