@@ -55,7 +55,7 @@ _ATTRIBUTES = _words(
     "__traceback__ tb_next relativeCreated"
 )
 #: Built-in functions that run code or look up names at run time.
-_BUILTINS = _words("exec eval compile __import__ globals locals vars dir memoryview breakpoint id")
+_BUILTINS = _words("exec eval compile __import__ globals locals vars dir memoryview breakpoint id hash")
 #: Functions that classify an object; applied to a module's function, they reveal that it was replaced.
 _ASKING = _words("type repr str isinstance issubclass hasattr getattr setattr delattr callable hash format")
 #: Parts of string literals that name paths or settings of the process.
@@ -81,8 +81,12 @@ _CALENDARS = _words(
     "time.strftime time.ctime time.asctime time.localtime time.gmtime email.utils.formatdate datetime.date.today"
 )
 _TOLD = _words("strftime isoformat isocalendar isoweekday weekday timetuple ctime")
-#: Clock differences that programs do not act on.
-_TINY_S = 1e-3
+#: Clock differences that programs do not act on, in seconds and in nanoseconds.
+_TINY_S, _TINY_NS = 1e-3, 1_000_000
+#: What reads a clock or a time in nanoseconds, by the last part of its name.
+_IN_NS = _words("time_ns monotonic_ns perf_counter_ns nanoseconds")
+#: Functions that show in which order a set holds its elements, which differs between starts of Python.
+_ORDERING = _words("list tuple iter enumerate str repr zip")
 #: A number between these, in seconds or nanoseconds since 1970, is a date that a program compares with.
 _DATES = ((1.5e9, 2.5e9), (1.5e18, 2.5e18))
 
@@ -152,6 +156,8 @@ def _computed(source: Source) -> Iterator[str]:
             yield f"{name} of {_named_by_text(call, source)}"
         elif name in _ASKING and any(_of_module(argument, source) for argument in call.args):
             yield f"{name} of a function"
+        elif name in _ORDERING and any(_is_set(argument) for argument in call.args):
+            yield "the order of a set"
         elif name.endswith("environ.items") or (name in ("dict", "list", "sorted", "len") and _takes_environ(call)):
             yield "os.environ"
 
@@ -201,6 +207,12 @@ def _of_module(node: ast.expr, source: Source) -> bool:
     return not called and name.partition(".")[0] in source.aliases and name.rpartition(".")[2][:1].islower()
 
 
+def _is_set(node: ast.expr) -> bool:
+    return isinstance(node, (ast.Set, ast.SetComp)) or (
+        isinstance(node, ast.Call) and chain(node.func) in ("set", "frozenset") and bool(node.args)
+    )
+
+
 def _takes_environ(call: ast.Call) -> bool:
     return any(chain(argument).endswith("environ") for argument in call.args)
 
@@ -210,8 +222,11 @@ def _timing(source: Source) -> Iterator[str]:
     clocks = {clock for node in source.names() if (clock := _CLOCKS.get(source.resolved(node)))}
     if len(clocks) > 1:
         yield "two clocks"
-    if any(_compares(node, source) for node in source.nodes):
+    times = Times(source)
+    if any(_compares(node, source, times) for node in source.nodes):
         yield "a clock that is compared"
+    if any(_collects(node, times) for node in source.nodes):
+        yield "a clock that is read again and again"
     for loop in source.all(ast.While):
         inside = list(ast.walk(loop))
         looks = any(isinstance(n, (ast.Attribute, ast.Name)) and source.resolved(n) in _CLOCKS for n in inside)
@@ -220,7 +235,59 @@ def _timing(source: Source) -> Iterator[str]:
             yield "a loop that counts"
 
 
-def _compares(node: ast.AST, source: Source) -> bool:
+class Times:
+    """The expressions of a file that hold a time that was read from a clock, also by the names that they are given.
+
+    Args:
+        source: The file.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        given = [
+            (node.value, target)
+            for node in source.nodes
+            if isinstance(node, (ast.Assign, ast.AnnAssign, ast.NamedExpr)) and node.value is not None
+            for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
+        ]
+        self._names: set[str] = set()
+        self._in_ns: set[str] = set()
+        while True:
+            known = len(self._names) + len(self._in_ns)
+            self._names |= {chain(target) for value, target in given if self.holds(value)} - {""}
+            self._in_ns |= {chain(target) for value, target in given if self.holds_ns(value)} - {""}
+            if len(self._names) + len(self._in_ns) == known:
+                return
+
+    def holds(self, node: ast.AST) -> bool:
+        """Return whether a time is part of an expression."""
+        return any(self._reads(n) or chain(n) in self._names for n in ast.walk(node))
+
+    def holds_ns(self, node: ast.AST) -> bool:
+        """Return whether an expression is a time in nanoseconds, or a difference of such times."""
+        inside = list(ast.walk(node))
+        if any(isinstance(n, (ast.Div, ast.FloorDiv, ast.Mult)) for n in inside) or not self.holds(node):
+            return False
+        return any(chain(n).rpartition(".")[2] in _IN_NS or chain(n) in self._in_ns for n in inside)
+
+    def _reads(self, node: ast.AST) -> bool:
+        return _is_clock(node, self._source) or (
+            isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "now"
+        )
+
+
+def _collects(node: ast.AST, times: Times) -> bool:
+    """Return whether an expression reads a clock in a loop, or tells how many different times it holds."""
+    if isinstance(node, (ast.ListComp, ast.SetComp, ast.GeneratorExp)):
+        return times.holds(node.elt)
+    return (
+        isinstance(node, ast.Call)
+        and chain(node.func) in ("set", "frozenset")
+        and any(times.holds(argument) for argument in node.args)
+    )
+
+
+def _compares(node: ast.AST, source: Source, times: Times) -> bool:
     """Return whether a date is compared, or a clock in a way that merely waiting for time to pass never needs."""
     if isinstance(node, (ast.Subscript, ast.Attribute)):
         return _is_date(node.value, source) and (
@@ -235,8 +302,11 @@ def _compares(node: ast.AST, source: Source) -> bool:
     if any(_is_clock(side, source) for side in sides) and numbers:
         return True
     exact = any(isinstance(op, (ast.Eq, ast.NotEq, ast.In, ast.NotIn)) for op in node.ops)
-    looks = any(_is_clock(inner, source) for side in sides for inner in ast.walk(side))
-    return looks and (exact or any(0 < abs(n) < _TINY_S for n in numbers))
+    named = any(isinstance(s, ast.Constant) and (s.value is None or isinstance(s.value, (str, bool))) for s in sides)
+    if any(times.holds_ns(side) for side in sides):
+        return (exact and not named) or any(0 < abs(n) < _TINY_NS for n in numbers)
+    looks = any(times.holds(side) for side in sides)
+    return looks and ((exact and not named) or any(0 < abs(n) < _TINY_S for n in numbers))
 
 
 def _is_clock(node: ast.AST, source: Source) -> bool:
