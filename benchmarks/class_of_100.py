@@ -9,11 +9,8 @@ two jobs. What a submission of one kind costs is measured on classes of that kin
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
 import os
 import random
-import resource
 import shutil
 import subprocess
 import sys
@@ -24,6 +21,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from counting import counted, counts
+
 ROOT = Path(__file__).resolve().parent.parent
 GRADE = str(Path(sys.executable).with_name("grade"))
 REFERENCE = ROOT / "reference_solutions"
@@ -31,7 +30,6 @@ FILES = ("velocity_publisher.py", "odom_subscriber.py", "temperature_sensor.py",
 #: What a class consists of, in percent.
 SHARES = {"correct": 55, "wrong": 27, "broken": 13, "hostile": 5}
 SEED = 20
-PR_SET_CHILD_SUBREAPER = 36
 #: How often the memory of all processes is looked at.
 PAUSE_S = 0.25
 
@@ -95,22 +93,21 @@ def make_class(folder: Path, wanted: Sequence[str]) -> None:
 
 def cost_of(submissions: Path, jobs: int) -> Cost:
     """Grade a class and return what that took; its results are thrown away."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as results:
-        command = [GRADE, "batch", str(submissions), "-o", results, "--jobs", str(jobs), "--no-progress"]
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as batch:
+        written = Path(results) / "counts"
+        folder = str(Path(results) / "class")
+        command = [GRADE, "batch", str(submissions), "-o", folder, "--jobs", str(jobs), "--no-progress"]
+        with subprocess.Popen(
+            counted(command, written), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        ) as batch:
             memory = Memory(batch.pid)
             said = batch.communicate()[1]
             peak_mib = memory.stop()
-    took_s = time.perf_counter() - started
-    with contextlib.suppress(ChildProcessError):
-        while True:
-            os.wait()  # for those whose parents were ended; see `main`
-    if batch.returncode not in (0, 1, 3):
-        raise SystemExit(f"grade batch ended with {batch.returncode}: {said}")
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    processor_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        took_s = time.perf_counter() - started
+        if batch.returncode not in (0, 1, 3):
+            raise SystemExit(f"grade batch ended with {batch.returncode}: {said}")
+        processor_s = counts(written).processor_s
     return Cost(len(list(submissions.iterdir())), jobs, took_s, processor_s, peak_mib)
 
 
@@ -169,8 +166,6 @@ def resident_kib(pid: int) -> int:
 def main() -> None:
     """Print the table."""
     quick = "--quick" in sys.argv[1:]
-    # A worker is ended, not waited for by its students' processes: they become ours, and their time counts.
-    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     small, large = (4, 8) if quick else (25, 100)
     alone = 2 if quick else 12
     print(f"{'class':<16} {'size':>5} {'jobs':>5} {'a minute':>12} {'processor each':>16}   peak memory")

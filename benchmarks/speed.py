@@ -1,46 +1,211 @@
-"""Measures how fast grading is: the whole process, virtual against real seconds, and exercise 1 against the wall clock.
+"""Measures how fast grading is, beside a plain start of a node, and prints one table; also beside another `grade`.
 
-Usage: python benchmarks/speed.py [RUNS]      ratios and medians of RUNS runs (5) in one go; run it on an idle machine
+Usage: python benchmarks/speed.py [--runs N] [--against COMMAND] [--class] [--keep FILE [--warn FILE]]
+
+Medians of N runs (5), in turn with those of the other command. --class adds classes of 100 and 300, which take minutes.
+A plain start is a Python process that imports rclpy, makes a node with one publisher, logs once and ends. Processor
+time is that of all processes together. Run it on an idle machine; processor times and ratios say most.
+
+--keep measures only one small run instead, and writes it to FILE as JSON: its processor time in plain starts, and its
+instructions where `perf` can count them. --warn compares it with such a FILE, and warns of what grew by a fifth.
 """
 
 from __future__ import annotations
 
-import resource
+import argparse
+import json
+import shlex
+import shutil
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from class_of_100 import kinds, make_class
+from counting import counted, counts
+
 ROOT = Path(__file__).resolve().parent.parent
-GRADE = [str(Path(sys.executable).with_name("grade"))]
+GRADE = str(Path(sys.executable).with_name("grade"))
+PLAIN_START = """
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+rclpy.init()
+node = Node("plain")
+node.create_publisher(String, "/plain", 10)
+node.get_logger().info("started")
+node.destroy_node()
+rclpy.shutdown()
+"""
 #: Virtual seconds that the scenarios of the three exercises observe: 10 + 24 + 12.2 + 17 + 20.2.
 OBSERVED_S = 10.0 + 24.0 + 12.2 + 17.0 + 20.2
+EXERCISE_1 = ("reference_solutions", "--exercise", "velocity_publisher")
+FIVE_SECONDS = ("--rubric", str(ROOT / "benchmarks" / "five_seconds.yaml"), "--clock", "wall")
+#: Submissions that are judged from their text alone.
+TEXTS = {"syntax error": "def main(:\n", "empty file": ""}
+#: Submissions that are judged again at a time.
+COPIES = 200
+#: A measure that grew by more than this factor is warned of.
+GROWTH = 1.2
+Row = tuple[str, str, Callable[[str], float]]
 
 
-def seconds(*arguments: str) -> float:
-    """Return the wall time of one `grade` process."""
-    started = time.perf_counter()
-    subprocess.run([*GRADE, *arguments], check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
-    return time.perf_counter() - started
+@dataclass(frozen=True)
+class Cost:
+    """What a command took: real time and processor time of all its processes, in seconds, and instructions."""
+
+    wall_s: float
+    processor_s: float
+    instructions: int | None = None
+
+
+def cost_of(*command: str, codes: Sequence[int] = (0,)) -> Cost:
+    """Run a command in the folder of the project and return what it took; ends with its words at another exit code."""
+    with tempfile.TemporaryDirectory() as folder:
+        written = Path(folder) / "counts"
+        started = time.perf_counter()
+        done = subprocess.run(
+            counted(command, written),
+            check=False,
+            cwd=ROOT,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        wall_s = time.perf_counter() - started
+        if done.returncode not in codes:
+            raise SystemExit(f"{shlex.join(command)} ended with {done.returncode}: {done.stderr}")
+        found = counts(written)
+    return Cost(wall_s, found.processor_s, found.instructions)
+
+
+def graded(grade: str, *arguments: str) -> Cost:
+    """Return what one run of a `grade` command took."""
+    return cost_of(*shlex.split(grade), *arguments, codes=(0, 1, 2, 3))
+
+
+def rejudged_a_second(grade: str) -> float:
+    """Return how many submissions a command judges again in a second of processor time, its own start included."""
+    with tempfile.TemporaryDirectory() as folder:
+        first = Path(folder) / "first"
+        graded(grade, "reference_solutions", "-o", f"evidence={first}")
+        for number in range(COPIES):
+            shutil.copytree(first, Path(folder) / "class" / str(number))
+        return COPIES / graded(grade, "rejudge", str(Path(folder) / "class"), "--jobs", "1").processor_s
+
+
+def rows(place: Path, *, classes: bool) -> list[Row]:
+    """Return what is measured: a name, a unit, and a function of the `grade` command."""
+    found: list[Row] = [
+        ("grade reference_solutions, processor", "s", lambda grade: graded(grade, "reference_solutions").processor_s),
+        ("the same, real time", "s", lambda grade: graded(grade, "reference_solutions").wall_s),
+        ("virtual in a real second", "s", lambda grade: OBSERVED_S / graded(grade, "reference_solutions").wall_s),
+        ("exercise 1, real time", "s", lambda grade: graded(grade, *EXERCISE_1).wall_s),
+        (
+            "wall clock of 5 s / virtual time",
+            "",
+            lambda grade: graded(grade, *EXERCISE_1, *FIVE_SECONDS).wall_s / graded(grade, *EXERCISE_1).wall_s,
+        ),
+    ]
+    for what, text in TEXTS.items():
+        folder = place / what
+        folder.mkdir()
+        (folder / "velocity_publisher.py").write_text(text)
+        arguments = (str(folder), *EXERCISE_1[1:])
+        found.append((f"{what}, real time", "s", lambda grade, a=arguments: graded(grade, *a).wall_s))  # type: ignore[misc]
+    found += [
+        ("--help, real time", "s", lambda grade: graded(grade, "--help").wall_s),
+        ("--version, real time", "s", lambda grade: graded(grade, "--version").wall_s),
+        ("judged again in a second of processor", "", rejudged_a_second),
+    ]
+    if classes:
+        for size in (100, 300):
+            make_class(place / str(size), list(kinds(size)))
+        found += [
+            ("class of 100, processor of each", "s", lambda grade: class_of(grade, place, 100, 1).processor_s / 100),
+            ("class of 300, 2 jobs, real time", "s", lambda grade: class_of(grade, place, 300, 2).wall_s),
+        ]
+    return found
+
+
+def class_of(grade: str, place: Path, size: int, jobs: int) -> Cost:
+    """Return what a class took; its results are thrown away."""
+    with tempfile.TemporaryDirectory() as results:
+        return graded(grade, "batch", str(place / str(size)), "-o", results, "--jobs", str(jobs))
+
+
+def plain_start() -> Cost:
+    """Return what a plain start took, on the ROS that the grader would use."""
+    from grader.execution.ros_installation import find_ros  # noqa: PLC0415  only the environment of this Python has it
+    from grader.execution.sandbox.environment import runtime_environment  # noqa: PLC0415
+
+    runtime = find_ros().runtime
+    with tempfile.TemporaryDirectory() as home:
+        environment = {**runtime_environment(runtime), "HOME": home}
+        variables = (f"{name}={value}" for name, value in environment.items())
+        return cost_of("/usr/bin/env", "-i", *variables, str(runtime.executable), "-c", PLAIN_START)
+
+
+def compare(runs: int, against: str, *, classes: bool) -> None:
+    """Print the table."""
+    commands = [GRADE, *([against] if against else [])]
+    with tempfile.TemporaryDirectory() as folder:
+        starts = [plain_start() for _ in range(runs)]
+        start = Cost(statistics.median(s.wall_s for s in starts), statistics.median(s.processor_s for s in starts))
+        print(f"plain start: {start.processor_s:.2f} s of processor time, {start.wall_s:.2f} s of real time")
+        print(f"{'':38} {'here':>9} {'starts':>7}" + (f" {'other':>9} {'starts':>7} {'ratio':>6}" if against else ""))
+        for what, unit, measure in rows(Path(folder), classes=classes):
+            values: dict[str, list[float]] = {command: [] for command in commands}
+            for _ in range(1 if what.startswith("class") else runs):
+                for command in commands:
+                    values[command].append(measure(command))
+            medians = [statistics.median(values[command]) for command in commands]
+            one = start.processor_s if "processor" in what else start.wall_s
+            starts_of = [f"{m / one:7.1f}" if unit and "virtual" not in what else f"{'':7}" for m in medians]
+            cells = [f"{m:9.2f} {s}" for m, s in zip(medians, starts_of, strict=True)]
+            ratio = f" {medians[0] / medians[1]:6.2f}" if against else ""
+            print(f"{f'{what}, {unit}' if unit else what:38} {' '.join(cells)}{ratio}", flush=True)
+
+
+def small_run(runs: int) -> dict[str, float | None]:
+    """Return the measures of a small run that are worth keeping; None for what cannot be counted here."""
+    costs = [(graded(GRADE, *EXERCISE_1), plain_start()) for _ in range(runs)]
+    ratios = [run.processor_s / start.processor_s for run, start in costs]
+    return {"plain_starts": round(statistics.median(ratios), 3), "instructions": costs[-1][0].instructions}
+
+
+def warnings(now: Mapping[str, float | None], before: Mapping[str, float | None]) -> Sequence[str]:
+    """Return a sentence for each measure that has grown by more than a fifth."""
+    both = ((what, now.get(what), before.get(what)) for what in now)
+    return [
+        f"{what} of a small run: {new:.6g}, and {old:.6g} before"
+        for what, new, old in both
+        if new and old and new > GROWTH * old
+    ]
 
 
 def main() -> None:
-    """Print the measurements."""
-    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 5
-    whole = [seconds("reference_solutions") for _ in range(runs)]
-    one = ["reference_solutions", "--exercise", "velocity_publisher"]
-    five = [*one, "--rubric", str(ROOT / "benchmarks" / "five_seconds.yaml"), "--clock", "wall"]
-    ratios = []
-    for _ in range(runs):
-        virtual, wall = seconds(*one), seconds(*five)
-        ratios.append(wall / virtual)
-    peak_mib = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-    median = statistics.median(whole)
-    print(f"grade reference_solutions: median {median:.2f} s of {', '.join(f'{s:.2f}' for s in whole)} s")
-    print(f"virtual seconds observed / wall seconds: {OBSERVED_S / median:.1f}")
-    print(f"exercise 1, wall clock with a 5 s window / virtual time with 10 s: median {statistics.median(ratios):.1f}")
-    print(f"largest process: {peak_mib:.0f} MiB")
+    """Print the table, or keep the small run."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=5, metavar="N")
+    parser.add_argument("--against", default="", metavar="COMMAND")
+    parser.add_argument("--class", action="store_true", dest="classes")
+    parser.add_argument("--keep", type=Path, metavar="FILE")
+    parser.add_argument("--warn", type=Path, metavar="FILE")
+    arguments = parser.parse_args()
+    if arguments.keep is None:
+        compare(arguments.runs, arguments.against, classes=arguments.classes)
+        return
+    now = small_run(arguments.runs)
+    arguments.keep.write_text(json.dumps(now) + "\n", encoding="utf-8")
+    print(json.dumps(now))
+    if arguments.warn is not None:
+        for warning in warnings(now, json.loads(arguments.warn.read_text(encoding="utf-8"))):
+            print(f"::warning title=Grading got slower::{warning}")
 
 
 if __name__ == "__main__":
