@@ -35,6 +35,8 @@ _TYPE = re.compile(r"(?=.{1,200}$)[^\W\d]\w*(?:\.(?:<locals>|[^\W\d]\w*))*")
 _FUNCTION = re.compile(r"(?=.{1,100}$)(?:<(?:module|lambda|listcomp|setcomp|dictcomp|genexpr)>|[^\W\d]\w*)")
 #: The C++ runtime writes this before it aborts a process that is out of memory.
 NO_MEMORY = b"std::bad_alloc"
+#: What C++ writes when a thread cannot be started; the resource monitor may not have seen the threads before it.
+NO_THREAD = b"std::system_error"
 #: A process that aborts with at least this share of its allowed threads has hit the limit.
 NEARLY_ALL = 0.9
 #: A process that receives SIGXCPU below this share of its processor time has sent the signal itself.
@@ -185,7 +187,7 @@ def limit_behind(signal: str, last_words: bytes, most_threads: int, used_ns: int
         return f"stopped at {size(limits.scratch_bytes)} in one folder"
     if signal == "SIGABRT" and NO_MEMORY in last_words:
         return f"{_by(signal)} after it wrote {NO_MEMORY.decode()} (the limit is {limits.memory_words()})"
-    if signal == "SIGABRT" and most_threads >= NEARLY_ALL * limits.processes:
+    if signal == "SIGABRT" and (NO_THREAD in last_words or most_threads >= NEARLY_ALL * limits.processes):
         return f"{_by(signal)} (the limit is {limits.processes_words()})"
     return ""
 

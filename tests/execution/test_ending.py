@@ -70,6 +70,13 @@ def test_other_errors_stay_as_they_are() -> None:
             "wrote std::bad_alloc (the limit is 200 MiB of memory",
         ),
         ("SIGABRT", b"", 49, 0, "ended by SIGABRT (the limit is 50 processes and threads)"),
+        (
+            "SIGABRT",
+            b"terminate called after throwing an instance of 'std::system_error'",
+            20,
+            0,
+            "ended by SIGABRT (the limit is 50 processes and threads)",
+        ),
         ("SIGABRT", b"", 20, 0, ""),
         ("SIGKILL", b"std::bad_alloc", 50, 0, ""),
     ],
