@@ -1,5 +1,7 @@
 """Whatever holds a node up in reality sends it to the wall clock, and nothing else does; on real nodes."""
 
+import hashlib
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -43,6 +45,18 @@ WAITS = {
     ),
     "signal": ("", "import signal\nsignal.sigtimedwait([signal.SIGUSR1], 0.1)"),
 }
+
+
+def library_call(seconds: float) -> str:
+    """Return code that computes in a library for about so long, however fast this machine is."""
+    started = time.process_time()
+    hashlib.pbkdf2_hmac("sha256", b"x", b"y", TRIED)
+    iterations = round(TRIED * seconds / (time.process_time() - started))
+    return f"import hashlib\nhashlib.pbkdf2_hmac('sha256', b'x', b'y', {iterations})"
+
+
+#: Iterations whose time is measured; they take 20 to 60 ms.
+TRIED = 100_000
 WORK = {
     "computing": ("", "end = os.times().user + 0.07\nwhile os.times().user < end: pass"),
     "hidden": (
@@ -53,7 +67,7 @@ WORK = {
         """,
         "end = os.times().user + 0.07\nwhile os.times().user < end: pass",
     ),
-    "library": ("import hashlib", "import hashlib\nhashlib.pbkdf2_hmac('sha256', b'x', b'y', 300_000)"),
+    "library": ("import hashlib", library_call(0.1)),
 }
 
 
@@ -97,7 +111,7 @@ self.destroy_timer(self.timer)
 threading.Thread(target=run, daemon=True).start()
 """
 AGAIN = "self.timer.cancel()\n{}\nself.timer.reset()"
-COMPUTING = "import hashlib\nhashlib.pbkdf2_hmac('sha256', b'x', b'y', 20_000)"
+COMPUTING = library_call(0.012)
 
 
 @pytest.mark.parametrize(("once", "later"), [(LOOP, COMPUTING), ("", AGAIN.format(COMPUTING))], ids=["loop", "again"])
