@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import io
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from grader.core.submission import Submission
@@ -57,7 +57,7 @@ _ATTRIBUTES = _words(
 #: Built-in functions that run code or look up names at run time.
 _BUILTINS = _words("exec eval compile __import__ globals locals vars dir memoryview breakpoint id hash")
 #: Functions that classify an object; applied to a module's function, they reveal that it was replaced.
-_ASKING = _words("type repr str isinstance issubclass hasattr getattr setattr delattr callable hash format")
+_ASKING = _words("type repr str isinstance issubclass hasattr getattr setattr delattr callable format")
 #: Parts of string literals that name paths or settings of the process.
 _TEXTS = (
     *("/proc", "/sys/", "/dev/shm", "/dev/fd", "/submission", "_grader", "grader_host"),  # noqa: S108 - looked for
@@ -244,20 +244,17 @@ class Times:
 
     def __init__(self, source: Source) -> None:
         self._source = source
+        self._names: set[str] = set()
+        self._in_ns: set[str] = set()
         given = [
-            (node.value, target)
+            (node.value, chain(target))
             for node in source.nodes
             if isinstance(node, (ast.Assign, ast.AnnAssign, ast.NamedExpr)) and node.value is not None
             for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
         ]
-        self._names: set[str] = set()
-        self._in_ns: set[str] = set()
-        while True:
-            known = len(self._names) + len(self._in_ns)
-            self._names |= {chain(target) for value, target in given if self.holds(value)} - {""}
-            self._in_ns |= {chain(target) for value, target in given if self.holds_ns(value)} - {""}
-            if len(self._names) + len(self._in_ns) == known:
-                return
+        self._names = _reached([(value, name) for value, name in given if self.holds(value)], given)
+        differences = [(value, name) for value, name in given if self.holds(value) and not _is_scaled(value)]
+        self._in_ns = _reached([(value, name) for value, name in differences if self.holds_ns(value)], differences)
 
     def holds(self, node: ast.AST) -> bool:
         """Return whether a time is part of an expression."""
@@ -265,15 +262,34 @@ class Times:
 
     def holds_ns(self, node: ast.AST) -> bool:
         """Return whether an expression is a time in nanoseconds, or a difference of such times."""
-        inside = list(ast.walk(node))
-        if any(isinstance(n, (ast.Div, ast.FloorDiv, ast.Mult)) for n in inside) or not self.holds(node):
+        if _is_scaled(node) or not self.holds(node):
             return False
-        return any(chain(n).rpartition(".")[2] in _IN_NS or chain(n) in self._in_ns for n in inside)
+        return any(chain(n).rpartition(".")[2] in _IN_NS or chain(n) in self._in_ns for n in ast.walk(node))
 
     def _reads(self, node: ast.AST) -> bool:
         return _is_clock(node, self._source) or (
             isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "now"
         )
+
+
+def _is_scaled(node: ast.AST) -> bool:
+    return any(isinstance(n, (ast.Div, ast.FloorDiv, ast.Mult)) for n in ast.walk(node))
+
+
+def _reached(first: Sequence[tuple[ast.expr, str]], given: Sequence[tuple[ast.expr, str]]) -> set[str]:
+    """Return the names of some assignments, and of those whose values use such a name, looking at each once."""
+    using: dict[str, list[str]] = {}
+    for value, name in given:
+        for used in {chain(n) for n in ast.walk(value)} - {""}:
+            using.setdefault(used, []).append(name)
+    left = [name for _, name in first]
+    found: set[str] = set()
+    while left:
+        name = left.pop()
+        if name and name not in found:
+            found.add(name)
+            left += using.get(name, ())
+    return found
 
 
 def _collects(node: ast.AST, times: Times) -> bool:

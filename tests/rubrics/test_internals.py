@@ -39,6 +39,9 @@ SUSPICIOUS = {
     "a clock that stands, by name": "import time\na = time.time_ns()\nb = time.time_ns()\nx = a == b",
     "a ROS clock that stands": "def f(node):\n    a = node.get_clock().now()\n    return a == node.get_clock().now()",
     "a difference by name": "import time\na = time.time()\nsum(range(9))\nd = time.time() - a\nx = d == 0",
+    "a long chain of names, last to first": "import time\n"
+    + "".join(f"a{n + 1} = a{n}\n" for n in reversed(range(3_000)))
+    + "a0 = time.time()\nx = a3000 == a1",
     "few nanoseconds": "import time\na = time.time_ns()\nd = time.time_ns() - a\nx = d < 100",
     "how many times": "import time\nt = []\nt.append(time.time())\nx = len(set([time.time(), time.time()]))",
     "many readings": "import time\nt = [time.time_ns() for _ in range(50)]",
