@@ -265,6 +265,8 @@ class Trace:
     most_starved_ns: int = 0
     # What a launch file asks for and the grader cannot do, as sentences: what is not met may be due to it
     left_out: tuple[str, ...] = ()
+    # Whether a wait for the middleware timed out, so that something may be missing: a reason to record again
+    incomplete: bool = False
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

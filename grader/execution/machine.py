@@ -57,6 +57,11 @@ class Patience:
         """Whether it is worth waiting again for something that did not come."""
         return self._losses < MOST_LOSSES
 
+    @property
+    def has_lost(self) -> bool:
+        """Whether any wait timed out."""
+        return self._losses > 0
+
     def wait(self, condition: Callable[[], bool], *, pause_s: float = 0.0003) -> bool:
         """Wait until a condition holds; return whether it did before the time-out."""
         came = wait_until(condition, self.wait_s, pause_s=pause_s)

@@ -83,6 +83,7 @@ class Runner(ABC):
             notes=self._recorder.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
             starts=tuple(s.start_told for s in self._students if s.start_told is not None),
             harness_problem=self._harness_problem(),
+            incomplete=self._is_incomplete(),
         )
 
     @abstractmethod
@@ -120,6 +121,10 @@ class Runner(ABC):
     def _harness_problem(self) -> str:
         """Return why the recording cannot be judged; empty if it can."""
         return ""
+
+    def _is_incomplete(self) -> bool:
+        """Return whether something that the middleware should have delivered did not come in time."""
+        return False
 
     def _observations(self) -> tuple[Observation, ...]:
         """Return the observations, in order."""

@@ -263,10 +263,11 @@ class Recorder:
             yield future.result()
 
     def _record(self, job: Job, progress: Callable[[str], None]) -> Trace:
-        """Record a job, and repeat it if an unexplained signal ended a process: a real fault happens again."""
+        """Record a job, and repeat it if a signal ended a process or messages were lost: a real fault happens again."""
         progress(job.title)
         trace = self._recorded(job)
-        return self._recorded(job) if job.budget.left_ns and any(f.signal for f in trace.faults()) else trace
+        doubtful = trace.incomplete or any(f.signal for f in trace.faults())
+        return self._recorded(job) if doubtful and job.budget.left_ns else trace
 
     def _recorded(self, job: Job) -> Trace:
         problem = ""

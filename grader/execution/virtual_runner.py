@@ -52,6 +52,7 @@ class VirtualRunner(Runner):
         self._free_until_ns = 0
         self._steps = 0
         self._hops = 0
+        self._has_lost = False
         self._discovery = Discovery(students, observer, self._recorder, self._services, self._mark_dead)
         self._topics = VirtualTopicPeers(students, observer, self._recorder, self._discovery)
 
@@ -75,6 +76,9 @@ class VirtualRunner(Runner):
 
     def _unfit(self) -> str:
         return unfit(self._students, self._recorder.observations, full=bool(self._recorder.full))
+
+    def _is_incomplete(self) -> bool:
+        return self._discovery.patience.has_lost or self._has_lost
 
     def _run_on(self) -> None:
         """Step through time until the end, or until nothing more can happen."""
@@ -213,6 +217,7 @@ class VirtualRunner(Runner):
             where = channel[:NAME_CHARACTERS]
             some = "a message" if count == 1 else f"{count:,} messages"
             self._recorder.note(f"{student.name}: {some} on {where} did not arrive in time")
+            self._has_lost = True
         sent = counts(report.get("sent"))
         self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
         self._collect_exchanges(sent)

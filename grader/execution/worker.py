@@ -140,8 +140,9 @@ class Worker:
             if not trace.harness_problem or time.monotonic_ns() - started_ns > min(plan.limits.wall_ns, left_ns):
                 break
         # not in trace_to_json, because the format of evidence does not include it
+        beside = {"reached": list(trace.reached), "incomplete": trace.incomplete}
         cost = {"real_ns": self._real_ns, "starved_ns": self._starved_ns}
-        return {"trace": {**trace_to_json(trace), "reached": list(trace.reached)}, **cost, "worn": is_worn(trace)}
+        return {"trace": {**trace_to_json(trace), **beside}, **cost, "worn": is_worn(trace)}
 
     def _record(self, plan: Plan, domain: int, budget: Budget) -> Trace:
         launched = {
@@ -309,7 +310,7 @@ def _lower(value: int, most: int) -> int:
 
 def is_worn(trace: Trace) -> bool:
     """Return whether a worker should be replaced after a scenario: something unusual happened, or it has grown."""
-    odd = any(f.kind in (FaultKind.KILLED, FaultKind.HUNG) for f in trace.faults()) or trace.notes
+    odd = any(f.kind in (FaultKind.KILLED, FaultKind.HUNG) for f in trace.faults()) or trace.notes or trace.incomplete
     full = any(isinstance(o, Mark) and o.name == "limit" for o in trace.observations)
     return bool(odd or full or trace.harness_problem) or usage([os.getpid()]).memory_bytes > WORN_BYTES
 

@@ -5,6 +5,7 @@ The counts only tell the grader when an instant is settled; no verdict depends o
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import weakref
@@ -74,6 +75,8 @@ class Ledger:
         self._sending: dict[int, Any] = {}
         #: Counterparts, by kind and topic, that the grader does not know and that stayed when their end was awaited.
         self._strangers: dict[tuple[str, str], int] = {}
+        #: The ids of the handles in other ROS domains, which nobody can reach, at the last report of endpoints.
+        self._elsewhere: set[int] = set()
         self.lost: Counter[str] = Counter()
         #: How many wait sets wait for a receiver now, by the address of its handle: its messages are read at once.
         self.awaited: Counter[int] = Counter()
@@ -164,13 +167,15 @@ class Ledger:
         self._endpoints[kind] = [reference for reference, _ in found]
         return [endpoint for _, endpoint in found]
 
-    def claims(self) -> list[dict[str, Any]]:
-        """Return the claims: a description of every endpoint, as plain JSON values."""
+    def claims(self, domain: int) -> list[dict[str, Any]]:
+        """Return the claims: a description of every endpoint in a ROS domain, as plain JSON values."""
         self.changed = self.removed = False
         claims: list[dict[str, Any]] = []
+        elsewhere = [node for node in self.nodes() if not _is_in(domain, node)]
+        self._elsewhere = {id(end.handle) for node in elsewhere for end in _ends(node)}
         for kind in ("publisher", "subscription"):
             for endpoint in self.alive(kind):
-                if endpoint.topic_name in BACKGROUND:
+                if endpoint.topic_name in BACKGROUND or self.is_elsewhere(endpoint.handle):
                     continue
                 qos = endpoint.qos_profile
                 claims.append(
@@ -188,17 +193,22 @@ class Ledger:
             {"kind": kind, "name": service_name(endpoint), "type": type_name(endpoint.srv_type)}
             for kind in ("client", "service")
             for endpoint in self.alive(kind)
-            if kind == "client" or not _is_background(endpoint)
+            if (kind == "client" or not _is_background(endpoint)) and not self.is_elsewhere(endpoint.handle)
         ]
         claims += [claim for end in self._actions for claim in end.claims()]
-        nodes = [node.get_fully_qualified_name() for node in self.nodes()]
+        seen = [node for node in self.nodes() if node not in elsewhere]
+        nodes = [node.get_fully_qualified_name() for node in seen]
         claims += [{"kind": "node", "name": name, "type": ""} for name in nodes]
         claims += [
             {**_ORDINARY, "kind": "publisher", "name": topic, "type": TRANSITION_EVENT}
             for topic in self.transitions.values()
             if topic.rpartition("/")[0] in nodes
         ]
-        return claims + [claim for node in self.nodes() for claim in _parameters(node)]
+        return claims + [claim for node in seen for claim in _parameters(node)]
+
+    def is_elsewhere(self, handle: Any) -> bool:
+        """Return whether an endpoint's handle is in another ROS domain than the grader."""
+        return id(handle) in self._elsewhere
 
     def nodes(self) -> list[Any]:
         """Return the nodes that still exist, oldest first."""
@@ -383,6 +393,17 @@ class Ledger:
 def _is_background(endpoint: Any) -> bool:
     """Return whether a service, or a client's, is of a type that every node serves."""
     return type_name(endpoint.srv_type).startswith(BACKGROUND_SERVICES)
+
+
+def _is_in(domain: int, node: Any) -> bool:
+    """Return whether a node is in a ROS domain, or its context is no longer valid and cannot say so."""
+    with contextlib.suppress(Exception):
+        return bool(node.context.get_domain_id() == domain)
+    return True
+
+
+def _ends(node: Any) -> list[Any]:
+    return [*node.publishers, *node.subscriptions, *node.clients, *node.services]
 
 
 def _valid(endpoint: Any) -> bool:

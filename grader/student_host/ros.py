@@ -330,6 +330,8 @@ def install_traffic(
         if ledger.changed or in_a_row >= MESSAGES_PER_FLUSH:
             in_a_row = 0
             settle()
+        if ledger.is_elsewhere(handle):
+            return send()
         clock.busy_sending()
         ledger.note_sent(name, handle)
         try:

@@ -44,7 +44,7 @@ class VirtualTime:
         self._stopping = False
         self._finishing = False
         self._end_ns = 0
-        self._free_until_ns = self._moved = 0
+        self._free_until_ns = self._moved = self._domain = 0
         self.unreported = False
         self.resumed_ns = originals.processor_ns()
         self.running = True
@@ -92,6 +92,7 @@ class VirtualTime:
     def start(self, now_ns: int) -> None:
         """Start virtual time in this thread, which may be of a fork of the process that made this object."""
         self.scheduler.current.native = originals.get_native_id()
+        self._domain = int(os.environ.get("ROS_DOMAIN_ID", "0"))
         self._move_to(now_ns)
         self.resumed_ns = originals.processor_ns()
 
@@ -107,7 +108,7 @@ class VirtualTime:
                 report["lost"] = dict(self._ledger.lost)
                 self._ledger.lost.clear()
             if self._ledger.changed and not (self._ledger.sending_and_removed or self._finishing):
-                report["endpoints"] = self._ledger.claims()
+                report["endpoints"] = self._ledger.claims(self._domain)
                 report["sees_graph"] = self._ledger.sees_graph
         return report
 

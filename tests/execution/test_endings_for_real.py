@@ -76,7 +76,7 @@ def test_what_was_published_before_the_end_is_in_the_trace(run: Callable[..., Tr
     """Ten messages at one instant, and then the end, one way or another."""
     main = TALKER + "burst(publisher, 10)\n" + ending
     trace = run("def main():\n" + textwrap.indent(main, "    ") + "\nmain()\n")
-    assert numbers(trace) == list(range(10))
+    assert numbers(trace) == list(range(10)), (trace.notes, trace.faults())
 
 
 @pytest.mark.parametrize("at_the_end", ["", "raise ValueError('over')", "atexit.register(node.burst)"])

@@ -62,6 +62,11 @@ for command in line.makefile("r"):
         details = [None, unexplained, None]
         found["observations"] = [["fault", 0, "a.py", "killed", text, "", 0, [], details]] if text else []
         said = json.dumps({"trace": found}).encode()
+    elif behaviour.startswith("loses something"):
+        found = trace(asked["plan"], f"plan {plans}")
+        found["incomplete"] = plans < int(behaviour.split()[2])
+        plans += 1
+        said = json.dumps({"trace": found}).encode()
     elif behaviour == "is worn":
         said = json.dumps({"trace": trace(asked["plan"], f"worker {number}"), "worn": True}).encode()
     elif behaviour == "costs":
@@ -416,6 +421,16 @@ def test_a_signal_that_no_limit_explains_has_to_come_twice(
     assert "".join(fault.text for fault in found.faults()).startswith(kept)
     assert bool(found.faults()) is bool(kept)
     assert found.notes == (f"plan {times - 1}",)
+
+
+@pytest.mark.parametrize(("incomplete", "kept"), [(0, "plan 0"), (1, "plan 1"), (9, "plan 1")])
+def test_what_was_lost_has_to_be_lost_twice(
+    make: Callable[..., tuple[Recorder, Stage]], incomplete: int, kept: str
+) -> None:
+    """A machine that stood still for a moment costs nobody a point; a node that nothing reaches is the same again."""
+    recorder, _ = make(f"loses something {incomplete}")
+    (found,) = recorder.record(jobs("alone"), nothing)
+    assert found.notes == (kept,)
 
 
 def test_a_worn_worker_does_no_more(make: Callable[..., tuple[Recorder, Stage]]) -> None:

@@ -485,7 +485,9 @@ def test_a_hopeless_run_ends_early_where_another_follows() -> None:
 def test_notes_are_few_and_short() -> None:
     """A report is not filled by a process that makes up names."""
     lost = {f"topic /{'x' * 290}{n}": 1 for n in range(500)}
-    notes = Run(saying(idle(100), idle(lost=lost))).trace.notes
+    trace = Run(saying(idle(100), idle(lost=lost))).trace
+    notes = trace.notes
+    assert trace.incomplete
     assert 1 <= len(notes) <= trace_recorder.NOTES
     assert all(len(note) < 500 for note in notes)
 
@@ -560,6 +562,7 @@ def test_nothing_is_announced_to_an_end_without_a_counterpart(missing: list[str]
     run = Run(deaf, numbers=(numbers((1.0, 0)),))
     reached = missing != ["subscription /temperature"]
     assert any("got {'topic /temperature': 1}" in line for line in run.seen()) is reached
+    assert run.trace.incomplete is bool(missing)
     assert all(f"{end} was not matched in time" in note for end, note in zip(missing, run.trace.notes, strict=True))
 
 
@@ -592,6 +595,7 @@ def test_messages_that_never_come_are_noted_and_no_longer_waited_for(monkeypatch
     run = Run(liar)
     assert run.trace.messages() == ()
     assert run.trace.notes == ("some messages on /x did not arrive",)
+    assert run.trace.incomplete
 
 
 JSON = st.recursive(

@@ -136,6 +136,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("observations", list[Union[tuple(rows)]]),  # type: ignore[misc]  # noqa: UP007
         ("starts", tuple[_START, ...], ()),  # type: ignore[valid-type]
         ("reached", tuple[str, ...], ()),
+        ("incomplete", bool, False),
         ("most_starved_ns", int, 0),
         ("left_out", tuple[str, ...], ()),
     ]
@@ -154,6 +155,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         harness_problem=row.harness_problem,
         starts=tuple(map(_start, row.starts)),
         reached=row.reached,
+        incomplete=row.incomplete,
         most_starved_ns=row.most_starved_ns,
         left_out=row.left_out,
     )
