@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from grader.core.shipped import shipped
 from grader.execution.recording_session import RecordingSession, open_session
-from grader.execution.unrunnable import compile_error
+from grader.execution.unrunnable import is_runnable
 
 if TYPE_CHECKING:
     from grader.app.grade import Progress
@@ -62,9 +62,9 @@ def may_run(request: GradeRequest) -> bool:
     texts = (path.read_text(encoding="utf-8") for path in shipped("rubrics").glob("*.yaml"))
     wanted = {name.strip() for text in texts for found in _FILES.findall(text) for name in found.split(",")}
     if not place.is_dir():
-        return place.name in wanted and compile_error(place) is None
+        return place.name in wanted and is_runnable(place)
     for number, (folder, _, names) in enumerate(os.walk(place)):
         found = (Path(folder, name) for name in wanted.intersection(names))
-        if number >= _MOST_FOLDERS or any(compile_error(file) is None for file in found):
+        if number >= _MOST_FOLDERS or any(map(is_runnable, found)):
             return True
     return False

@@ -1,48 +1,91 @@
-"""Finds scenarios that need no run, because Python can compile none of their files."""
+"""Finds scenarios that need no run, because Python can compile none of their files or there is nothing in them."""
 
 from __future__ import annotations
 
+import ast
 import warnings
 from pathlib import Path
 
-from grader.core.trace import ClockKind, GraphSnapshot, Trace
-from grader.execution.ending import reported_fault
+from grader.core.scenario import is_launch_file
+from grader.core.trace import ClockKind, Fault, GraphSnapshot, Mark, Start, StartWay, Trace
+from grader.execution.ending import ending, reported_fault
 from grader.execution.notes import Places
 from grader.execution.plan import Plan
-from grader.student_host.packages import parse
+from grader.student_host.packages import PackageLayout, layout_of, parse
 
 #: A larger file is left to the student's process and its limits.
 MOST_BYTES = 1 << 20
 
 
 def trace_without_run(plan: Plan) -> Trace | None:
-    """Return what a run of the plan would record of its processes; None if any file can be compiled."""
+    """Return what a run of the plan would record of its processes; None if any of them has to be run."""
     places = Places(Path(plan.root))
-    starts_ns = dict(plan.starts_ns)
-    faults = []
+    ends: list[Fault | Mark] = []
+    starts: list[Start] = []
     for name, file in plan.processes:
-        error = compile_error(Path(plan.root, file))
-        if error is None:
+        path, start_ns = Path(plan.root, file), dict(plan.starts_ns).get(name, 0)
+        error = compile_error(path)
+        if error is not None:
+            said = {
+                "code": "syntax_error",
+                "type": type(error).__name__,
+                "message": str(error.msg),
+                "line": error.lineno,
+            }
+            ends.append(reported_fault(name, start_ns, {**said, "file": file}, plan.limits, places))
+        elif not start_ns and _is_script(plan, name, file) and is_inert(path):
+            starts.append(Start(name, file, StartWay.SCRIPT, arguments=plan.start_of(name).words))
+            ends.append(ending(name, 0, {"code": 0}, plan, places, stopped=False))
+        else:
             return None
-        report = {"code": "syntax_error", "type": type(error).__name__, "message": str(error.msg), "line": error.lineno}
-        faults.append(reported_fault(name, starts_ns.get(name, 0), {**report, "file": file}, plan.limits, places))
-    if not faults:
+    if not ends:
         return None
     end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
-    faults.sort(key=lambda fault: fault.t_ns)
-    graph = GraphSnapshot(faults[-1].t_ns, nodes=(), endpoints=(), services=())
-    return Trace(plan.scenario, ClockKind(plan.clock), end_ns, (*faults, graph))
+    ends.sort(key=lambda end: end.t_ns)
+    graph = GraphSnapshot(ends[-1].t_ns, nodes=(), endpoints=(), services=())
+    return Trace(plan.scenario, ClockKind(plan.clock), end_ns, (*ends, graph), starts=tuple(starts))
+
+
+def _is_script(plan: Plan, name: str, file: str) -> bool:
+    """Return whether a file is run as `python3 FILE`, not as part of a package or as a launch file."""
+    return (
+        not (is_launch_file(name) or plan.start_of(name).executable) and layout_of(plan.root, file) == PackageLayout()
+    )
+
+
+def is_runnable(path: Path) -> bool:
+    """Return whether running a file may do anything, judged by its text; True in doubt."""
+    return compile_error(path) is None and not is_inert(path)
 
 
 def compile_error(path: Path) -> SyntaxError | None:
     """Return why Python cannot compile a file; None if it can, or if only a process should find out."""
+    try:
+        _parsed(path)
+    except SyntaxError as error:
+        return error
+    return None
+
+
+def is_inert(path: Path) -> bool:
+    """Return whether a file holds only comments, texts and `pass`, so that running it does nothing."""
+    try:
+        tree = _parsed(path)
+    except SyntaxError:
+        return False
+    return tree is not None and all(
+        isinstance(line, ast.Pass) or (isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant))
+        for line in tree.body
+    )
+
+
+def _parsed(path: Path) -> ast.Module | None:
+    """Parse a file; None if only a process should find out what is in it; raises SyntaxError."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # as error, a warning about a string would be a syntax error
         try:
-            if path.stat().st_size <= MOST_BYTES:
-                parse(str(path))
-        except SyntaxError as error:
-            return error
+            return parse(str(path)) if path.stat().st_size <= MOST_BYTES else None
+        except SyntaxError:
+            raise
         except (OSError, ValueError, RecursionError, MemoryError):
-            pass
-    return None
+            return None

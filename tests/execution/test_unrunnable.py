@@ -1,5 +1,6 @@
-"""Files that Python cannot compile need no run, and are recorded exactly as a run records them."""
+"""Files that Python cannot compile, or that hold nothing, need no run; their trace is the one that a run records."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -21,11 +22,13 @@ BROKEN = {
     "too_deep": f"x = {'(' * 5_000}{')' * 5_000}\n",
     "odd_escape": "x = '\\d'\ny = = 1\n",
 }
+#: What Python runs without doing anything.
+INERT = {"empty": "", "comment": "# later\n", "text": '"""Publishes velocities."""\n\n\npass\n'}
 #: What only the compiler or the program itself would find, after the file has been read.
 ACCEPTED = {
-    "empty": "",
     "return_outside": "import rclpy\nreturn 1\n",
     "odd_escape": "x = '\\d'\n",
+    "text_of_parts": "f'{1 / 0}'\n",
     "raised": "raise SyntaxError('expected a colon')\n",
 }
 
@@ -35,10 +38,10 @@ def _plan(folder: Path, *names: str) -> Plan:
     return Plan("alone", processes, str(folder), "ab" * 32, 10_000_000_000, "", 60_000_000_000, (), (), "virtual")
 
 
-@pytest.mark.parametrize("name", BROKEN)
+@pytest.mark.parametrize("name", BROKEN | INERT)
 def test_the_trace_is_the_one_that_a_run_records(name: str, studio: RecordingSession, tmp_path: Path) -> None:
     """All but the text that Python prints, which the report takes from the fault."""
-    run = record(studio, tmp_path / "in", BROKEN[name])
+    run = record(studio, tmp_path / "in", (BROKEN | INERT)[name])
     known = trace_without_run(_plan(tmp_path / "in", "a.py"))
     assert known is not None
     assert known.observations == tuple(o for o in run.observations if not isinstance(o, OutputLine))
@@ -51,6 +54,20 @@ def test_what_can_be_compiled_or_not_be_read_is_run(name: str, tmp_path: Path) -
     """Only a process can tell what happens then."""
     (tmp_path / "a.py").write_text(ACCEPTED[name])
     assert trace_without_run(_plan(tmp_path, "a.py")) is None
+
+
+@pytest.mark.parametrize("beside", ["__init__.py", "setup.py"])
+def test_an_empty_file_of_a_package_is_run(beside: str, tmp_path: Path) -> None:
+    """How it is started, and with what, only a process finds out."""
+    for name in ("a.py", beside):
+        (tmp_path / name).write_text("")
+    assert trace_without_run(_plan(tmp_path, "a.py")) is None
+
+
+def test_an_empty_file_that_starts_late_is_run(tmp_path: Path) -> None:
+    """Its start is an event of the scenario."""
+    (tmp_path / "a.py").write_text("")
+    assert trace_without_run(replace(_plan(tmp_path, "a.py"), starts_ns=(("a.py", 5),))) is None
 
 
 def test_a_scenario_is_run_if_any_of_its_files_can_be(tmp_path: Path) -> None:
