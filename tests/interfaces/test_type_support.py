@@ -153,6 +153,9 @@ def use(n):
     for k in range(40):
         publisher.publish(Strings(string_value=f"{n} {k}"))
         answers.append(client.call(BasicTypes.Request(int32_value=k)).int32_value)
+deadline = time.monotonic() + 60
+while not (publisher.get_subscription_count() and client.service_is_ready()) and time.monotonic() < deadline:
+    time.sleep(0.01)
 threads = [threading.Thread(target=use, args=(n,)) for n in range(4)]
 for each in threads: each.start()
 for each in threads: each.join()
