@@ -69,6 +69,9 @@ def test_what_holds_no_file_to_run_is_graded_without_a_process(tmp_path: Path, m
     first = report.exercises[0].verdicts[0]
     assert "SyntaxError" in first.reason
     assert first.location == Location("velocity_publisher.py", 3)
+    (tmp_path / "velocity_publisher.py").write_text("# still to be written\n")
+    report = grade(GradeRequest(str(tmp_path), isolation="none"), lambda _: None)
+    assert report.exercises[0].verdicts[0].reason == "velocity_publisher.py exited after 0.0 s with code 0"
 
 
 @pytest.mark.parametrize("id_", builtin_rubrics())
@@ -76,7 +79,7 @@ def test_a_worker_is_started_for_every_file_of_an_exercise(id_: str, tmp_path: P
     """As a file, in a folder, and whatever an archive or a rubric of one's own asks for."""
     for name in read_exercises(GradeRequest("x", exercises=(id_,)))[0].files:
         (tmp_path / "in").mkdir(exist_ok=True)
-        (tmp_path / "in" / name).touch()
+        (tmp_path / "in" / name).write_text("import rclpy")
         assert may_run(GradeRequest(str(tmp_path / "in" / name)))
         assert may_run(GradeRequest(str(tmp_path)))
         (tmp_path / "in" / name).unlink()

@@ -52,7 +52,7 @@ def opened(request: GradeRequest, progress: Progress) -> AbstractContextManager[
 
 
 def may_run(request: GradeRequest) -> bool:
-    """Return whether a submission may hold a file to run, judged by names and syntax alone; True in doubt.
+    """Return whether a submission may hold a file to run, judged by names and texts alone; True in doubt.
 
     If not, no worker is started in advance. Reading the rubrics instead would take as long as the start of a worker.
     """
