@@ -20,20 +20,20 @@ MOST_BYTES = 1 << 20
 def trace_without_run(plan: Plan) -> Trace | None:
     """Return what a run of the plan would record of its processes; None if any of them has to be run."""
     places = Places(Path(plan.root))
+    starts_ns = dict(plan.starts_ns)
     ends: list[Fault | Mark] = []
     starts: list[Start] = []
     for name, file in plan.processes:
-        path, start_ns = Path(plan.root, file), dict(plan.starts_ns).get(name, 0)
-        error = compile_error(path)
-        if error is not None:
+        found, start_ns = _read(Path(plan.root, file)), starts_ns.get(name, 0)
+        if isinstance(found, SyntaxError):
             said = {
                 "code": "syntax_error",
-                "type": type(error).__name__,
-                "message": str(error.msg),
-                "line": error.lineno,
+                "type": type(found).__name__,
+                "message": str(found.msg),
+                "line": found.lineno,
             }
             ends.append(reported_fault(name, start_ns, {**said, "file": file}, plan.limits, places))
-        elif not start_ns and _is_script(plan, name, file) and is_inert(path):
+        elif _is_inert(found) and not start_ns and _is_script(plan, name, file):
             starts.append(Start(name, file, StartWay.SCRIPT, arguments=plan.start_of(name).words))
             ends.append(ending(name, 0, {"code": 0}, plan, places, stopped=False))
         else:
@@ -46,46 +46,33 @@ def trace_without_run(plan: Plan) -> Trace | None:
     return Trace(plan.scenario, ClockKind(plan.clock), end_ns, (*ends, graph), starts=tuple(starts))
 
 
-def _is_script(plan: Plan, name: str, file: str) -> bool:
-    """Return whether a file is run as `python3 FILE`, not as part of a package or as a launch file."""
-    return (
-        not (is_launch_file(name) or plan.start_of(name).executable) and layout_of(plan.root, file) == PackageLayout()
-    )
-
-
 def is_runnable(path: Path) -> bool:
     """Return whether running a file may do anything, judged by its text; True in doubt."""
-    return compile_error(path) is None and not is_inert(path)
+    found = _read(path)
+    return not (isinstance(found, SyntaxError) or _is_inert(found))
 
 
-def compile_error(path: Path) -> SyntaxError | None:
-    """Return why Python cannot compile a file; None if it can, or if only a process should find out."""
-    try:
-        _parsed(path)
-    except SyntaxError as error:
-        return error
-    return None
+def _read(path: Path) -> ast.Module | SyntaxError | None:
+    """Return what a file holds, or why Python cannot compile it; None if only a process should find out."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # as error, a warning about a string would be a syntax error
+        try:
+            return parse(str(path)) if path.stat().st_size <= MOST_BYTES else None
+        except SyntaxError as error:
+            return error
+        except (OSError, ValueError, RecursionError, MemoryError):
+            return None
 
 
-def is_inert(path: Path) -> bool:
+def _is_inert(tree: ast.Module | None) -> bool:
     """Return whether a file holds only comments, texts and `pass`, so that running it does nothing."""
-    try:
-        tree = _parsed(path)
-    except SyntaxError:
-        return False
     return tree is not None and all(
         isinstance(line, ast.Pass) or (isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant))
         for line in tree.body
     )
 
 
-def _parsed(path: Path) -> ast.Module | None:
-    """Parse a file; None if only a process should find out what is in it; raises SyntaxError."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # as error, a warning about a string would be a syntax error
-        try:
-            return parse(str(path)) if path.stat().st_size <= MOST_BYTES else None
-        except SyntaxError:
-            raise
-        except (OSError, ValueError, RecursionError, MemoryError):
-            return None
+def _is_script(plan: Plan, name: str, file: str) -> bool:
+    """Return whether a file is run as `python3 FILE`, not as part of a package or as a launch file."""
+    special = is_launch_file(name) or plan.start_of(name).executable
+    return not special and layout_of(plan.root, file) == PackageLayout()
