@@ -171,8 +171,9 @@ class Ledger:
         """Return the claims: a description of every endpoint in a ROS domain, as plain JSON values."""
         self.changed = self.removed = False
         claims: list[dict[str, Any]] = []
-        elsewhere = [node for node in self.nodes() if not _is_in(domain, node)]
-        self._elsewhere = {id(end.handle) for node in elsewhere for end in _ends(node)}
+        existing = self.nodes()
+        seen = [node for node in existing if is_in(domain, node)]
+        self._elsewhere = {id(end.handle) for node in existing if node not in seen for end in _ends(node)}
         for kind in ("publisher", "subscription"):
             for endpoint in self.alive(kind):
                 if endpoint.topic_name in BACKGROUND or self.is_elsewhere(endpoint.handle):
@@ -196,7 +197,6 @@ class Ledger:
             if (kind == "client" or not _is_background(endpoint)) and not self.is_elsewhere(endpoint.handle)
         ]
         claims += [claim for end in self._actions for claim in end.claims()]
-        seen = [node for node in self.nodes() if node not in elsewhere]
         nodes = [node.get_fully_qualified_name() for node in seen]
         claims += [{"kind": "node", "name": name, "type": ""} for name in nodes]
         claims += [
@@ -395,8 +395,8 @@ def _is_background(endpoint: Any) -> bool:
     return type_name(endpoint.srv_type).startswith(BACKGROUND_SERVICES)
 
 
-def _is_in(domain: int, node: Any) -> bool:
-    """Return whether a node is in a ROS domain, or its context is no longer valid and cannot say so."""
+def is_in(domain: int, node: Any) -> bool:
+    """Return whether a node is in a ROS domain; True if it is being destroyed, or its context was shut down."""
     with contextlib.suppress(Exception):
         return bool(node.context.get_domain_id() == domain)
     return True

@@ -43,7 +43,7 @@ class WallTime:
         from rclpy.duration import Duration
 
         from . import ros
-        from .ledger import BACKGROUND
+        from .ledger import BACKGROUND, is_in
 
         publish = rclpy.publisher.Publisher.publish
         matched, time = self._publishing, self
@@ -53,7 +53,8 @@ class WallTime:
         def publish_when_matched(self: Any, msg: Any) -> Any:
             if self not in matched and self.topic_name not in BACKGROUND:
                 # In another domain there are no subscriptions: waiting would only delay the program.
-                if _domain_of(self, ros.MADE_NODES, time.domain) == time.domain:
+                owner = _owner_of(self, ros.MADE_NODES)
+                if owner is None or is_in(time.domain, owner):
                     originals.wait_until(self.get_subscription_count, MATCH_S, pause_s=0.001)
                 matched.add(self)
             return publish(self, msg)
@@ -116,10 +117,9 @@ class WallTime:
         return {}
 
 
-def _domain_of(publisher: Any, made: list[weakref.ref[Any]], usual: int) -> int:
-    """Return the ROS domain of a publisher's node; the usual domain if that cannot be determined."""
-    with contextlib.suppress(Exception):  # the node may be being destroyed, or its context shut down
+def _owner_of(publisher: Any, made: list[weakref.ref[Any]]) -> Any:
+    """Return the node of a publisher; None if that cannot be determined."""
+    with contextlib.suppress(Exception):  # a node may be being destroyed
         nodes = [node for reference in made if (node := reference()) is not None]
-        owner = next(node for node in nodes if any(publisher is own for own in node.publishers))
-        return int(owner.context.get_domain_id())
-    return usual
+        return next(node for node in nodes if any(publisher is own for own in node.publishers))
+    return None
