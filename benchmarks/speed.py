@@ -51,7 +51,8 @@ TEXTS = {"syntax error": "def main(:\n", "empty file": ""}
 COPIES = 200
 #: A measure that grew by more than this factor is warned of.
 GROWTH = 1.2
-Row = tuple[str, str, Callable[[str], float]]
+#: Names and units of figures, and a function that measures them of a `grade` command, all in one go.
+Rows = tuple[Sequence[tuple[str, str]], Callable[[str], Sequence[float]]]
 
 
 @dataclass(frozen=True)
@@ -98,36 +99,49 @@ def rejudged_a_second(grade: str) -> float:
         return COPIES / graded(grade, "rejudge", str(Path(folder) / "class"), "--jobs", "1").processor_s
 
 
-def rows(place: Path, *, classes: bool) -> list[Row]:
-    """Return what is measured: a name, a unit, and a function of the `grade` command."""
-    found: list[Row] = [
-        ("grade reference_solutions, processor", "s", lambda grade: graded(grade, "reference_solutions").processor_s),
-        ("the same, real time", "s", lambda grade: graded(grade, "reference_solutions").wall_s),
-        ("virtual in a real second", "s", lambda grade: OBSERVED_S / graded(grade, "reference_solutions").wall_s),
-        ("exercise 1, real time", "s", lambda grade: graded(grade, *EXERCISE_1).wall_s),
-        (
-            "wall clock of 5 s / virtual time",
-            "",
-            lambda grade: graded(grade, *EXERCISE_1, *FIVE_SECONDS).wall_s / graded(grade, *EXERCISE_1).wall_s,
-        ),
+def of_references(grade: str) -> Sequence[float]:
+    """Return processor time and real time of the reference solutions, and virtual seconds in a real one."""
+    cost = graded(grade, "reference_solutions")
+    return cost.processor_s, cost.wall_s, OBSERVED_S / cost.wall_s
+
+
+def of_exercise_1(grade: str) -> Sequence[float]:
+    """Return the real time of exercise 1, and how much longer its judgement on the wall clock takes."""
+    wall_s = graded(grade, *EXERCISE_1).wall_s
+    return wall_s, graded(grade, *EXERCISE_1, *FIVE_SECONDS).wall_s / wall_s
+
+
+def wall_of(*arguments: str) -> Callable[[str], Sequence[float]]:
+    """Return a function that measures the real time of a command with some arguments."""
+    return lambda grade: (graded(grade, *arguments).wall_s,)
+
+
+def rows(place: Path, *, classes: bool) -> list[Rows]:
+    """Return what is measured."""
+    references = [("grade reference_solutions, processor", "s"), ("the same, real time", "s")]
+    found: list[Rows] = [
+        ([*references, ("virtual in a real second", "s")], of_references),
+        ([("exercise 1, real time", "s"), ("wall clock of 5 s / virtual time", "")], of_exercise_1),
     ]
     for what, text in TEXTS.items():
         folder = place / what
         folder.mkdir()
         (folder / "velocity_publisher.py").write_text(text)
-        arguments = (str(folder), *EXERCISE_1[1:])
-        found.append((f"{what}, real time", "s", lambda grade, a=arguments: graded(grade, *a).wall_s))  # type: ignore[misc]
+        found.append(([(f"{what}, real time", "s")], wall_of(str(folder), *EXERCISE_1[1:])))
     found += [
-        ("--help, real time", "s", lambda grade: graded(grade, "--help").wall_s),
-        ("--version, real time", "s", lambda grade: graded(grade, "--version").wall_s),
-        ("judged again in a second of processor", "", rejudged_a_second),
+        ([("--help, real time", "s")], wall_of("--help")),
+        ([("--version, real time", "s")], wall_of("--version")),
+        ([("judged again in a second of processor", "")], lambda grade: (rejudged_a_second(grade),)),
     ]
     if classes:
         for size in (100, 300):
             make_class(place / str(size), list(kinds(size)))
         found += [
-            ("class of 100, processor of each", "s", lambda grade: class_of(grade, place, 100, 1).processor_s / 100),
-            ("class of 300, 2 jobs, real time", "s", lambda grade: class_of(grade, place, 300, 2).wall_s),
+            (
+                [("class of 100, processor of each", "s")],
+                lambda grade: (class_of(grade, place, 100, 1).processor_s / 100,),
+            ),
+            ([("class of 300, 2 jobs, real time", "s")], lambda grade: (class_of(grade, place, 300, 2).wall_s,)),
         ]
     return found
 
@@ -158,17 +172,18 @@ def compare(runs: int, against: str, *, classes: bool) -> None:
         start = Cost(statistics.median(s.wall_s for s in starts), statistics.median(s.processor_s for s in starts))
         print(f"plain start: {start.processor_s:.2f} s of processor time, {start.wall_s:.2f} s of real time")
         print(f"{'':38} {'here':>9} {'starts':>7}" + (f" {'other':>9} {'starts':>7} {'ratio':>6}" if against else ""))
-        for what, unit, measure in rows(Path(folder), classes=classes):
-            values: dict[str, list[float]] = {command: [] for command in commands}
-            for _ in range(1 if what.startswith("class") else runs):
+        for figures, measure in rows(Path(folder), classes=classes):
+            values: dict[str, list[Sequence[float]]] = {command: [] for command in commands}
+            for _ in range(1 if figures[0][0].startswith("class") else runs):
                 for command in commands:
                     values[command].append(measure(command))
-            medians = [statistics.median(values[command]) for command in commands]
-            one = start.processor_s if "processor" in what else start.wall_s
-            starts_of = [f"{m / one:7.1f}" if unit and "virtual" not in what else f"{'':7}" for m in medians]
-            cells = [f"{m:9.2f} {s}" for m, s in zip(medians, starts_of, strict=True)]
-            ratio = f" {medians[0] / medians[1]:6.2f}" if against else ""
-            print(f"{f'{what}, {unit}' if unit else what:38} {' '.join(cells)}{ratio}", flush=True)
+            for number, (what, unit) in enumerate(figures):
+                medians = [statistics.median(run[number] for run in values[command]) for command in commands]
+                one = start.processor_s if "processor" in what else start.wall_s
+                starts_of = [f"{m / one:7.1f}" if unit and "virtual" not in what else f"{'':7}" for m in medians]
+                cells = [f"{m:9.2f} {s}" for m, s in zip(medians, starts_of, strict=True)]
+                ratio = f" {medians[0] / medians[1]:6.2f}" if against else ""
+                print(f"{f'{what}, {unit}' if unit else what:38} {' '.join(cells)}{ratio}", flush=True)
 
 
 def small_run(runs: int) -> dict[str, float | None]:
