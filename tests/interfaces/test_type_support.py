@@ -147,7 +147,8 @@ node.create_service(BasicTypes, "/s", serve, callback_group=group)
 client = node.create_client(BasicTypes, "/s", callback_group=group)
 executor = MultiThreadedExecutor(4)
 executor.add_node(node)
-threading.Thread(target=executor.spin, daemon=True).start()
+spinner = threading.Thread(target=executor.spin)
+spinner.start()
 answers = []
 def use(n):
     for k in range(40):
@@ -163,6 +164,7 @@ deadline = time.monotonic() + 20
 while len(heard) < 160 and time.monotonic() < deadline: time.sleep(0.01)
 print(len(heard), sorted(answers) == sorted(list(range(40)) * 4))
 executor.shutdown()
+spinner.join()
 """
 
 
