@@ -44,6 +44,7 @@ class Session:
         *,
         pictures: bool = True,
         session: object = None,
+        under_way: object = None,
     ) -> Report:
         self.requests.append(request)
         self.pictures = pictures
@@ -57,6 +58,7 @@ class Session:
 def run_session(monkeypatch: pytest.MonkeyPatch) -> Session:
     stand_in = Session()
     monkeypatch.setattr(session, "grade", stand_in.grade)
+    monkeypatch.setattr(session, "opened_early", lambda *_: nullcontext())
     return stand_in
 
 
@@ -471,7 +473,7 @@ sys.path.insert(0, {folder!r})
 from cli_samples import a_report
 from grader.app import start as session
 from grader.cli import main
-def grade(request, progress, on_recorded=None, on_partial_report=None, *, pictures=True, session=None):
+def grade(request, progress, *_, **__):
     progress("exercise 1: \\x1b[31malone")
     sys.stdin.readline()
     return a_report()

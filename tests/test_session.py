@@ -80,12 +80,12 @@ def test_a_worker_is_started_for_every_file_of_an_exercise(id_: str, tmp_path: P
     for name in read_exercises(GradeRequest("x", exercises=(id_,)))[0].files:
         (tmp_path / "in").mkdir(exist_ok=True)
         (tmp_path / "in" / name).write_text("import rclpy")
-        assert may_run(GradeRequest(str(tmp_path / "in" / name)))
-        assert may_run(GradeRequest(str(tmp_path)))
+        assert may_run(str(tmp_path / "in" / name))
+        assert may_run(str(tmp_path))
         (tmp_path / "in" / name).unlink()
-    assert not may_run(GradeRequest(str(tmp_path)))
-    assert may_run(GradeRequest(str(tmp_path / "in.zip")))
-    assert may_run(GradeRequest(str(tmp_path), rubrics=(Path("own.yaml"),)))
+    assert not may_run(str(tmp_path))
+    assert may_run(str(tmp_path / "in.zip"))
+    assert may_run(str(tmp_path), [Path("own.yaml")])
 
 
 def test_the_recording_is_read_only_where_it_is_played(tmp_path: Path) -> None:

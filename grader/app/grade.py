@@ -24,11 +24,10 @@ from grader.core.submission import Run, Submission
 from grader.core.trace import Trace
 from grader.execution.bag import Odometry, read_odometry
 from grader.execution.plan import plan_scenario
+from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
 from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
-from grader.execution.worker import RealTimeBudget
-from grader.judging.judge_run import judge_run
 from grader.rubrics.builtin import builtin_exercises, builtin_odometry, compiled, exercise_ids
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import read_reaches, read_sources
@@ -68,7 +67,7 @@ class EarlyReports:
         if pending and key[0] not in pending:
             duration_s = self._run.duration_s + time.perf_counter() - self._started
             run = replace(self._run, traces=dict(self._traces), duration_s=duration_s)
-            self._on_report(judge_run(self._exercises, run, pictures=False, pending=pending))
+            self._on_report(_judge()(self._exercises, run, pictures=False, pending=pending))
 
 
 def grade_in(  # noqa: PLR0913  what to grade, and who is told
@@ -80,13 +79,14 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
     *,
     pictures: bool = True,
     started: float | None = None,
+    under_way: Callable[[], None] = lambda: None,
 ) -> Report:
     """Grade one submission in a session, which others may use before and after it.
 
     Raises a GraderError whose class tells who must act. The complete recording and its exercises are passed to
     `on_recorded`; a partial report to `on_partial_report`, whenever one exercise is done and others are not. Pictures
     are charts, which only some formats show. The duration in the report begins at `started`, a reading of
-    `time.perf_counter`; now if it is None.
+    `time.perf_counter`; now if it is None. While nodes are recorded, `under_way` is called once.
     """
     started = time.perf_counter() if started is None else started
     # What cannot be removed now is removed with the folder of the session.
@@ -128,7 +128,13 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         checks = SpotChecks(request.spot_checks, seed, submission.digest, read_reaches(submission.root))
         later = request.clock == AUTO and checks.certain
         first = None if later else take
-        traces = session.record(jobs, request.clock, progress, first, budget_s=request.time_budget_s)
+
+        def meanwhile() -> None:
+            _judge()
+            under_way()
+
+        budget_s = request.time_budget_s
+        traces = session.record(jobs, request.clock, progress, first, budget_s=budget_s, under_way=meanwhile)
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_one, session, progress, RealTimeBudget(request.time_budget_s))
@@ -137,7 +143,14 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         run = replace(run, definitions=definitions(run.traces.values(), provided))
         if on_recorded is not None:
             on_recorded(run, exercises)
-        return judge_run(exercises, run, pictures=pictures)
+        return _judge()(exercises, run, pictures=pictures)
+
+
+def _judge() -> Callable[..., Report]:
+    """Return `judge_run`; the first call imports it, which takes as long as the start of a node."""
+    from grader.judging.judge_run import judge_run  # noqa: PLC0415
+
+    return judge_run
 
 
 def _kept(  # noqa: PLR0913  all that a recording depends on

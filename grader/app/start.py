@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.core.shipped import shipped
+from grader.execution.inert import is_runnable
 from grader.execution.recording_session import RecordingSession, open_session
-from grader.execution.unrunnable import is_runnable
 
 if TYPE_CHECKING:
     from grader.app.grade import Progress
@@ -36,14 +36,17 @@ def grade(  # noqa: PLR0913  what to grade, and who is told
     *,
     pictures: bool = True,
     session: RecordingSession | None = None,
+    under_way: Callable[[], None] = lambda: None,
 ) -> Report:
     """Grade one submission, in a session of its own unless one is given; see `grade_in`."""
     started = time.perf_counter()
-    own = open_session(request.isolation, request.workers, progress, warm=may_run(request))
+    warm = request.collected is not None or may_run(request.submission, request.rubrics)
+    own = open_session(request.isolation, request.workers, progress, warm=warm)
     with own if session is None else nullcontext(session) as used:
         from grader.app.grade import grade_in  # noqa: PLC0415 - takes as long as the worker takes to start
 
-        return grade_in(used, request, progress, on_recorded, on_partial_report, pictures=pictures, started=started)
+        told = (on_recorded, on_partial_report)
+        return grade_in(used, request, progress, *told, pictures=pictures, started=started, under_way=under_way)
 
 
 def opened(request: GradeRequest, progress: Progress) -> AbstractContextManager[RecordingSession]:
@@ -51,13 +54,21 @@ def opened(request: GradeRequest, progress: Progress) -> AbstractContextManager[
     return open_session(request.isolation, request.workers, progress)
 
 
-def may_run(request: GradeRequest) -> bool:
+def opened_early(
+    submission: str, rubrics: Sequence[Path], isolation: str, progress: Progress
+) -> AbstractContextManager[RecordingSession | None]:
+    """Return a session whose worker starts at once; None if it is not certain that something will be run in it."""
+    there = Path(submission).exists() and may_run(submission, rubrics)
+    return open_session(isolation, None, progress) if there else nullcontext()
+
+
+def may_run(submission: str, rubrics: Sequence[Path] = ()) -> bool:
     """Return whether a submission may hold a file to run, judged by names and texts alone; True in doubt.
 
     If not, no worker is started in advance. Reading the rubrics instead would take as long as the start of a worker.
     """
-    place = Path(request.submission)
-    if request.rubrics or request.collected is not None or not (place.is_dir() or place.suffix == ".py"):
+    place = Path(submission)
+    if rubrics or not (place.is_dir() or place.suffix == ".py"):
         return True
     texts = (path.read_text(encoding="utf-8") for path in shipped("rubrics").glob("*.yaml"))
     wanted = {name.strip() for text in texts for found in _FILES.findall(text) for name in found.split(",")}

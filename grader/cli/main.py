@@ -172,7 +172,27 @@ class _Default(click.Command):
 @click.option("--open", "opens", is_flag=True, help="Write the HTML page and open it in a browser.")
 @click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
 @click.version_option(grader.__version__, prog_name="grade", message="%(prog)s %(version)s")
-def _grade(  # noqa: PLR0913  one parameter an option
+def _grade(*, submission: str | None, watch: bool, no_progress: bool, **as_given: Any) -> int:
+    """Grade a SUBMISSION (a folder, an archive or a .py file) and explain the score.
+
+    Without one, the current folder is graded if it holds exercise files. A folder with the name of a command is graded
+    as ./NAME.
+    """
+    started = click.get_current_context().find_object(float) or time.monotonic()
+    from grader.app import start
+
+    with ExitStack() as stack:
+        session = None
+        if submission is not None and not watch:  # before the rest is imported, which takes as long as a worker's start
+            with shown_progress(wanted=not no_progress) as progress:
+                early = start.opened_early(submission, as_given["rubrics"], as_given["isolation"], progress)
+                session = stack.enter_context(early)
+        return _graded(started, session, submission=submission, watch=watch, no_progress=no_progress, **as_given)
+
+
+def _graded(  # noqa: PLR0913  one parameter an option
+    started: float,
+    session: RecordingSession | None,
     *,
     submission: str | None,
     exercises: tuple[str, ...],
@@ -191,12 +211,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     no_progress: bool,
     **as_given: Any,  # options that are fields of a request
 ) -> int:
-    """Grade a SUBMISSION (a folder, an archive or a .py file) and explain the score.
-
-    Without one, the current folder is graded if it holds exercise files. A folder with the name of a command is graded
-    as ./NAME.
-    """
-    started = click.get_current_context().find_object(float) or time.monotonic()
+    """Check the options, grade, and return the exit code."""
     from grader.cli import interactive
     from grader.reporting.delivery import Output, prepared
 
@@ -231,7 +246,8 @@ def _grade(  # noqa: PLR0913  one parameter an option
     writer = _evidence_writer(folders, request) if folders else None
     grading = _Grading(request, wanted, for_whom, writer, min_score, not no_progress, pages[0] if opens else None)
     # What does not exist is no folder to watch; grading it says so.
-    return grading.each_save(started) if watch and Path(request.submission).exists() else grading.once(started)
+    watched = watch and Path(request.submission).exists()
+    return grading.each_save(started) if watched else grading.once(started, session)
 
 
 @dataclass(slots=True)
@@ -250,13 +266,22 @@ class _Grading:
         """Grade, in a session if one is given, and return the exit code; the user waits since `started`."""
         from grader.app import start
         from grader.reporting.audience import told
-        from grader.reporting.delivery import deliver, early_delivery
+        from grader.reporting.delivery import deliver, early_delivery, load_formats
 
         remember = self.writer.remember if self.writer is not None else None
         early = early_delivery(self.outputs, self.readers)
         pictures = any(FORMATS[output.format].illustrated for output in self.outputs)
         with shown_progress(wanted=self.shows_progress) as progress:
-            report = start.grade(self.request, progress, remember, early, pictures=pictures, session=session)
+            progress("starting")
+            report = start.grade(
+                self.request,
+                progress,
+                remember,
+                early,
+                pictures=pictures,
+                session=session,
+                under_way=partial(load_formats, self.outputs),
+            )
         report = replace(report, duration_s=time.monotonic() - started)
         self._warn(report)
         deliver(report, self.outputs, self.readers)

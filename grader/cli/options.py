@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -207,10 +207,27 @@ def write_file(path: Path, content: bytes, *, parents: bool = False) -> None:
 
 @contextmanager
 def shown_progress(*, wanted: bool) -> Iterator[Progress]:
-    """Show the current step and how long it all has taken on a terminal, and erase it at the end."""
+    """Show the current step and how long it all has taken on a terminal, and erase it at the end.
+
+    What draws it takes long to import, so that is done when there is a step to show. The first one must come from the
+    caller's thread.
+    """
     if not (wanted and sys.stderr is not None and sys.stderr.isatty()):
         yield lambda _: None
         return
+    with ExitStack() as stack:
+        shows: list[Progress] = []
+
+        def show(step: str) -> None:
+            if not shows:
+                shows.append(stack.enter_context(_progress_bar()))
+            shows[0](step)
+
+        yield show
+
+
+@contextmanager
+def _progress_bar() -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import Progress as Bar
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn

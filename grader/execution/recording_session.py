@@ -14,13 +14,12 @@ from grader.core.checkup import Property
 from grader.core.trace import Trace
 from grader.execution.byte_code import compile_own
 from grader.execution.domains import private_domains, shared_domains
+from grader.execution.real_time_budget import FOREVER_S, RealTimeBudget
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.choose import choose_isolation
 from grader.execution.sandbox.protocol import Isolation
 from grader.execution.supervisor import Job, Recorder
 from grader.execution.temp_dirs import scratch_folder
-from grader.execution.unrunnable import trace_without_run
-from grader.execution.worker import FOREVER_S, RealTimeBudget
 
 #: The name of a run without a sandbox in reports.
 NO_ISOLATION = "none"
@@ -50,7 +49,7 @@ class RecordingSession:
     recorder: Recorder
     folder: Path
 
-    def record(
+    def record(  # noqa: PLR0913  what to record, and who is told
         self,
         jobs: Mapping[Key, Job],
         clock: str,
@@ -58,6 +57,7 @@ class RecordingSession:
         finished: Callable[[Key, Trace], None] | None = None,
         *,
         budget_s: float = FOREVER_S,
+        under_way: Callable[[], None] = lambda: None,
     ) -> dict[Key, Trace]:
         """Record jobs and return their traces, in the same order.
 
@@ -70,13 +70,17 @@ class RecordingSession:
             progress: Called with the title of each job that starts.
             finished: Called with each trace once it is final, while others are still being recorded.
             budget_s: Real time that all jobs may take together.
+            under_way: Called once while jobs are being recorded, for work that need not wait for them.
         """
+        from grader.execution.unrunnable import trace_without_run  # noqa: PLC0415 - after a worker has been started
+
         budget = RealTimeBudget(budget_s)
         known = {key: trace for key, job in jobs.items() if (trace := trace_without_run(job.plan)) is not None}
         to_run = {key: job for key, job in jobs.items() if key not in known}
         first = [Job(job.title, replace(job.plan, stop_when_unfit=clock == AUTO), budget) for job in to_run.values()]
         traces: dict[Key, Trace] = {}
         recorded = zip(to_run, self.recorder.each(first, progress), strict=True)
+        under_way()
         for key, trace in chain(known.items(), recorded):
             traces[key] = trace
             if finished is not None and not _unfit(trace, clock):

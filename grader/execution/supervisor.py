@@ -21,20 +21,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.core.quantities import MIB, NS_PER_S, size
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
 from grader.execution.codec import to_json
-from grader.execution.evidence.packed import trace_from_json
-from grader.execution.plan import Plan
+from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.environment import worker_environment
 from grader.execution.sandbox.exposure import worker_view
 from grader.execution.sandbox.protocol import Isolation
 from grader.execution.usage import families, usage
-from grader.execution.worker import RealTimeBudget
+
+if TYPE_CHECKING:
+    from grader.execution.plan import Plan
 
 #: A worker that has not answered this many seconds after the real-time limit of a scenario is lost: its resource
 #: monitor would have ended the run before. On the wall clock it may have started a second try shortly before the limit.
@@ -110,6 +112,8 @@ class WorkerProcess:
 
     def run(self, plan: Plan, budget: RealTimeBudget) -> Trace:
         """Run one plan; raises HarnessError if the worker fails, WorkerLostError if it has ended or times out."""
+        from grader.execution.evidence.packed import trace_from_json  # noqa: PLC0415 - takes as long as a start
+
         self._interfaces = plan.interfaces
         own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
         request = json.dumps({"plan": to_json(plan), **own}) + "\n"
@@ -257,10 +261,9 @@ class Recorder:
         return list(self.each(jobs, progress))
 
     def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
-        """Record every job and yield the traces in the same order, each as soon as it is available."""
+        """Begin to record every job, and yield the traces in the same order, each as soon as it is available."""
         futures = [self._pool.submit(self._record, job, progress) for job in jobs]
-        for future in futures:
-            yield future.result()
+        return (future.result() for future in futures)
 
     def _record(self, job: Job, progress: Callable[[str], None]) -> Trace:
         """Record a job, and repeat it if a signal ended a process or messages were lost: a real fault happens again."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path, PurePosixPath
@@ -41,11 +41,14 @@ class Format:
 
     def __call__(self, report: Report, layout: PageLayout, **arguments: object) -> str:
         """Return the text of a report."""
-        module, _, function = self.renderer.partition(":")
-        text: str = getattr(import_module(f"grader.reporting.{module}"), function)(
-            report, **_arguments(self.needs, report, layout), **arguments
-        )
+        text: str = self.load()(report, **_arguments(self.needs, report, layout), **arguments)
         return text
+
+    def load(self) -> Callable[..., str]:
+        """Import the rendering function and return it."""
+        module, _, function = self.renderer.partition(":")
+        render: Callable[..., str] = getattr(import_module(f"grader.reporting.{module}"), function)
+        return render
 
 
 def _arguments(needs: str, report: Report, layout: PageLayout) -> Mapping[str, object]:

@@ -19,11 +19,11 @@ from grader.core.limits import Limits
 from grader.core.trace import ClockKind, Trace
 from grader.execution import supervisor as module
 from grader.execution.plan import Plan
+from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.exposure import View
 from grader.execution.sandbox.protocol import Command, Isolation
 from grader.execution.supervisor import Job, Recorder
-from grader.execution.worker import RealTimeBudget
 
 RUNTIME = PythonRuntime(Path(sys.executable), (), (), (), {})
 

@@ -1,0 +1,38 @@
+"""Says whether a file holds anything to run, judged by its text."""
+
+from __future__ import annotations
+
+import ast
+import warnings
+from pathlib import Path
+
+from grader.student_host.packages import parse
+
+#: A larger file is left to the student's process and its limits.
+MOST_BYTES = 1 << 20
+
+
+def is_runnable(path: Path) -> bool:
+    """Return whether running a file may do anything, judged by its text; True in doubt."""
+    found = read(path)
+    return not (isinstance(found, SyntaxError) or is_inert(found))
+
+
+def read(path: Path) -> ast.Module | SyntaxError | None:
+    """Return what a file holds, or why Python cannot compile it; None if only a process should find out."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # as error, a warning about a string would be a syntax error
+        try:
+            return parse(str(path)) if path.stat().st_size <= MOST_BYTES else None
+        except SyntaxError as error:
+            return error
+        except (OSError, ValueError, RecursionError, MemoryError):
+            return None
+
+
+def is_inert(tree: ast.Module | None) -> bool:
+    """Return whether a file holds only comments, texts and `pass`, so that running it does nothing."""
+    return tree is not None and all(
+        isinstance(line, ast.Pass) or (isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant))
+        for line in tree.body
+    )
