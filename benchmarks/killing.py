@@ -47,7 +47,7 @@ def kind_of(pid: int, grader: int) -> str:
             return "starter" if inside == (parent.st_ino, parent.st_dev) else "student"
         if any(word.endswith("/launcher.py") for word in words):
             return "student"
-        if "grader.execution.worker" in words:
+        if "grader.execution.worker_main" in words:
             return "worker"
     return ""
 

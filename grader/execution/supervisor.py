@@ -33,6 +33,7 @@ from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.environment import worker_environment
 from grader.execution.sandbox.exposure import worker_view
 from grader.execution.sandbox.protocol import Isolation
+from grader.execution.sandbox.starter import starter_command
 from grader.execution.usage import families, usage
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ FULL_BYTES, LOOK_S = 768 * MIB, 0.1
 #: The largest valid answer: this size, or this multiple of the size of the messages that may be in it.
 ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
 TRIES = 2
-MODULE = b"grader.execution.worker"
+MODULE = b"grader.execution.worker_main"
 
 
 class WorkerLostError(HarnessError):
@@ -87,7 +88,13 @@ class WorkerProcess:
         self._executable = os.fsencode(runtime.executable)
         self._pid = 0
         self._line, theirs = socket.socketpair()
-        request = {"isolation": isolation.name, "line": theirs.fileno(), "runtime": to_json(runtime)}
+        enters = isolation.can_enter
+        request = {
+            "isolation": isolation.name,
+            "line": theirs.fileno(),
+            "runtime": to_json(runtime),
+            "starter": starter_command(ClockKind.VIRTUAL.value, runtime, isolation.host_seen_at) if enters else None,
+        }
         argv = [str(runtime.executable), "-s", "-u", "-m", MODULE.decode(), json.dumps(request)]
         command = isolation.worker_command(
             argv, _environment(runtime, scratch), (theirs.fileno(),), worker_view(runtime, scratch)

@@ -33,6 +33,7 @@ from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.environment import quick_discovery
 from grader.execution.sandbox.protocol import Isolation, StudentProcess
 from grader.execution.sandbox.starter import HASH_SEED, Starter
+from grader.execution.sandbox.starter_process import StarterProcess
 from grader.execution.sandbox.tiers import isolation_from_name
 from grader.execution.student_process import LOG_FORMAT, NodeProcess
 from grader.execution.usage import usage
@@ -56,15 +57,18 @@ class Worker:
     Args:
         isolation: The tier to start student processes in.
         runtime: Interpreter and ROS.
+        executed: The starter for virtual time, which imports rclpy while the first plan is made; None if the tier needs
+            none.
     """
 
-    def __init__(self, isolation: Isolation, runtime: PythonRuntime) -> None:
+    def __init__(self, isolation: Isolation, runtime: PythonRuntime, executed: StarterProcess | None) -> None:
         self._isolation = isolation
         self._runtime = runtime
         self._real_ns = self._starved_ns = 0
         self._starters: dict[str, Starter] = {}
-        if isolation.can_enter:
-            self._starter(ClockKind.VIRTUAL.value)  # it imports rclpy while the first plan is made
+        if executed is not None:
+            clock = ClockKind.VIRTUAL.value
+            self._starters[clock] = Starter(clock, runtime, isolation.host_seen_at, executed)
 
     def run(self, plan: Plan, domain: int, left_ns: int, budget_words: str) -> dict[str, Any]:
         """Run one plan and return the answer.
@@ -282,13 +286,18 @@ def stop(students: list[NodeProcess]) -> None:
         student.close()
 
 
-def main() -> None:
-    """Run plans until the supervisor closes the socket."""
-    request = json.loads(sys.argv[1])
+def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
+    """Run plans until the supervisor closes the socket.
+
+    Args:
+        request: `isolation`, `runtime` and `line`, the number of the socket.
+        executed: See `Worker`.
+    """
     line = socket.socket(fileno=request["line"])
     commands, answers = line.makefile("r"), line.makefile("w")
     limit_memory()
-    worker = Worker(isolation_from_name(request["isolation"]), from_json(PythonRuntime, request["runtime"]))
+    runtime = from_json(PythonRuntime, request["runtime"])
+    worker = Worker(isolation_from_name(request["isolation"]), runtime, executed)
     with suppress(Exception):  # the first plan raises it again, and answers with it
         _import_runners()  # here, because the starter and the supervisor are still busy with imports as well
     for command in commands:
@@ -302,8 +311,3 @@ def main() -> None:
             answer = {"problem": traceback.format_exc()[-4000:]}
         answers.write(json.dumps(answer) + "\n")
         answers.flush()
-
-
-if __name__ == "__main__":
-    os.chdir("/")
-    main()

@@ -392,7 +392,7 @@ def workers_of(pid: int) -> list[int]:
             words = (path / "cmdline").read_bytes().split(b"\0")
         except (OSError, IndexError):  # it has ended, before or after its files were opened
             continue
-        if b"grader.execution.worker" in words and parent != 1:
+        if b"grader.execution.worker_main" in words and parent != 1:
             found.append(int(path.name))
     return [p for p in found if pid in ancestors(p)]
 

@@ -17,6 +17,7 @@ from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox import start
 from grader.execution.sandbox.environment import quick_discovery, student_environment
 from grader.execution.sandbox.protocol import PreparedSandbox, StudentProcess
+from grader.execution.sandbox.starter_process import StarterProcess, execute
 
 #: Seconds until the starter has imported rclpy, and until a sandbox is ready or a process has been forked.
 READY_S, FORKED_S = 60.0, 20.0
@@ -86,6 +87,23 @@ class StartedProcess:
         _end(self._placeholder)
 
 
+def starter_command(clock: str, runtime: PythonRuntime, host_folder: str) -> dict[str, Any]:
+    """Return the arguments of `execute` for a starter; see `Starter`."""
+    nothing = StudentProcess(runtime, Path(host_folder), Path("/"), (), {"PYTHONHASHSEED": HASH_SEED}, ())
+    return {
+        "argv": [str(runtime.executable), "-s", "-u", "-B", "-X", "utf8", f"{host_folder}/{MODULE}"],
+        "told": {
+            "clock": clock,
+            "python_paths": [str(path) for path in runtime.python_paths],
+            "sandbox": start.__file__,
+        },
+        "environment": {
+            **student_environment(nothing, Path("/nonexistent")),
+            **quick_discovery(host_folder, runtime),
+        },
+    }
+
+
 class Starter:
     """One starter process, for one clock.
 
@@ -93,26 +111,13 @@ class Starter:
         clock: `virtual` or `wall`.
         runtime: Interpreter and ROS.
         host_folder: Where students' processes see the host package; the same folder is there for the worker.
+        executed: The process, if it has been executed before.
     """
 
-    def __init__(self, clock: str, runtime: PythonRuntime, host_folder: str) -> None:
-        self._line, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        told = {
-            "line": theirs.fileno(),
-            "clock": clock,
-            "python_paths": [str(path) for path in runtime.python_paths],
-            "sandbox": start.__file__,
-        }
-        nothing = StudentProcess(runtime, Path(host_folder), Path("/"), (), {"PYTHONHASHSEED": HASH_SEED}, ())
-        self._process = subprocess.Popen(
-            (str(runtime.executable), "-s", "-u", "-B", "-X", "utf8", f"{host_folder}/{MODULE}", json.dumps(told)),
-            env={**student_environment(nothing, Path("/nonexistent")), **quick_discovery(host_folder, runtime)},
-            pass_fds=(theirs.fileno(),),
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-        theirs.close()
+    def __init__(
+        self, clock: str, runtime: PythonRuntime, host_folder: str, executed: StarterProcess | None = None
+    ) -> None:
+        self._line, self._process = executed or execute(**starter_command(clock, runtime, host_folder))
         self._ready = False
 
     def start(
