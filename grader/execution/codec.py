@@ -83,19 +83,26 @@ def observation_to_json(observation: Observation) -> list[Any]:
 
 def plain(value: Any) -> Any:  # noqa: PLR0911 - one for each kind of value
     """Convert message fields, and any other value in a trace, to strict JSON values."""
-    if type(value) in _SCALARS:
+    kind: Any = type(value)
+    if kind in _SCALARS:
         return value
-    if isinstance(value, float):
+    if kind is float or isinstance(value, float):
         return value if math.isfinite(value) else {"float": str(value)}
-    if isinstance(value, Mapping):
+    if (names := _field_names(kind)) is not None:
+        return [plain(getattr(value, name)) for name in names]
+    if kind is dict or isinstance(value, Mapping):
         return {name: plain(field) for name, field in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(field) for field in value]
-    if is_dataclass(value):
-        return [plain(getattr(value, field.name)) for field in fields(value)]
     if isinstance(value, bytes):
         return base64.b64encode(value).decode()
     return value.value if isinstance(value, Enum) else value
+
+
+@lru_cache(maxsize=256)
+def _field_names(kind: Any) -> tuple[str, ...] | None:
+    """Return the names of a dataclass's fields; None for any other type."""
+    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else None
 
 
 def to_json(value: Any) -> Any:

@@ -285,6 +285,8 @@ class NodeProcess:
         """Return the complete records and lines since the last call; `final` adds an unfinished line."""
         found: list[LogRecord | OutputLine] = []
         for stream, buffer in self._streams.items():
+            if not buffer:
+                continue
             end = len(buffer) if final else _complete(buffer, self._record_start() if stream == "stderr" else b"")
             text = bytes(buffer[:end]).decode("utf-8", "backslashreplace")
             del buffer[:end]

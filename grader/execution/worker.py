@@ -21,6 +21,7 @@ from grader.core.limits import Limits
 from grader.core.quantities import GIB, MIB, NS_PER_S
 from grader.core.scenario import is_launch_file
 from grader.core.trace import ClockKind, FaultKind, Mark, Trace
+from grader.execution import late_numpy
 from grader.execution.bare_start import BareProcess, bare_arguments
 from grader.execution.beside import files_beside
 from grader.execution.codec import from_json, trace_to_json
@@ -121,6 +122,9 @@ class Worker:
                 start = self._start_bare if plan.bare else self._start
                 students.append(start(plan, name, file, domain))
             from grader.execution.observer import Observer  # noqa: PLC0415 - imports rclpy, which takes long
+
+            if plan.clock == ClockKind.WALL.value:
+                late_numpy.load()
 
             observer = Observer(domain, plan.limits)
             stack.callback(observer.close)

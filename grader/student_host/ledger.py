@@ -275,11 +275,11 @@ class Ledger:
 
     def keeps_anything(self) -> bool:
         """Return whether any message was taken ahead of time and is still kept."""
-        return any(self._kept.values())
+        return len(self._kept) > 0 and any(self._kept.values())
 
     def expects_anything(self) -> bool:
         """Return whether any message is expected."""
-        return any(count > 0 for count in self._expected.values())
+        return len(self._expected) > 0 and any(count > 0 for count in self._expected.values())
 
     def _context(self) -> Any:
         contexts = (reference() for reference in reversed(self.contexts))

@@ -216,29 +216,29 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
 
         def _add(self, add: Callable[..., Any], entity: Any) -> Any:
             self._added.append((add, entity))
-            return add(entity)
+            return add(self, entity)
 
         def add_subscription(self, entity: Any) -> Any:
             self._receivers.append(entity.pointer)
-            return self._add(super().add_subscription, entity)
+            return self._add(REAL_WAIT_SET.add_subscription, entity)
 
         def add_client(self, entity: Any) -> Any:
             self._receivers.append(entity.pointer)
-            return self._add(super().add_client, entity)
+            return self._add(REAL_WAIT_SET.add_client, entity)
 
         def add_service(self, entity: Any) -> Any:
             self._receivers.append(entity.pointer)
-            return self._add(super().add_service, entity)
+            return self._add(REAL_WAIT_SET.add_service, entity)
 
         def add_timer(self, entity: Any) -> Any:
             self._timers.append(entity)
-            return self._add(super().add_timer, entity)
+            return self._add(REAL_WAIT_SET.add_timer, entity)
 
         def add_guard_condition(self, entity: Any) -> Any:
-            return self._add(super().add_guard_condition, entity)
+            return self._add(REAL_WAIT_SET.add_guard_condition, entity)
 
         def add_event(self, entity: Any) -> Any:
-            return self._add(super().add_event, entity)
+            return self._add(REAL_WAIT_SET.add_event, entity)
 
         def get_ready_entities(self, kind: str) -> Any:
             ready = super().get_ready_entities(kind)
@@ -252,8 +252,11 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
             return [p for p in self._receivers if p in known and ledger.kept(known[p])]
 
         def _ready(self) -> bool:
-            return any(self.get_ready_entities(kind) for kind in KINDS) or any(
-                self.is_ready("event", number) for number in range(self._events)
+            ready = REAL_WAIT_SET.get_ready_entities
+            return (
+                any(ready(self, kind) for kind in KINDS)
+                or bool(self._kept())
+                or any(self.is_ready("event", number) for number in range(self._events))
             )
 
         def _expects(self) -> bool:
@@ -288,7 +291,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
                 # Polling has removed everything that was not ready from the set.
                 super().clear_entities()
                 for add, entity in self._added:
-                    add(entity)
+                    add(self, entity)
 
     return VirtualWaitSet
 

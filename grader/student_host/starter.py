@@ -42,6 +42,7 @@ def load(path: str, name: str) -> Any:
 
 def main() -> None:
     """Prepare what all processes have in common, and start one for each message."""
+    gc.disable()  # imports make many objects, and no garbage
     told = json.loads(sys.argv[1])
     sys.path[:1] = told["python_paths"]
     line = socket.socket(fileno=told["line"])
@@ -54,6 +55,7 @@ def main() -> None:
         inspect.getmodule(sys._getframe())  # fills a cache that the first log record of each node needs
     gc.collect()
     gc.freeze()
+    gc.enable()
     signal.signal(signal.SIGCHLD, reap)
     line.send(b"ready")
     while True:
