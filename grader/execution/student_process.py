@@ -27,9 +27,11 @@ from grader.execution.workload import Workload
 #: The format of log records on standard error. Each process has its own token, known only to the logging library and
 #: the worker, so a program cannot write log records itself.
 LOG_FORMAT = "\x1e{token}\x1f{severity}\x1f{name}\x1f{file_name}\x1f{line_number}\x1f{message}\x1d"
-#: The fields after the token. No field can extend over the start of the next record, so that a stream of unfinished
+#: A record with its token. No field can extend over the start of the next record, so that a stream of unfinished
 #: records is parsed in linear time.
-_LOG_FIELDS = "\x1f([A-Z]+)\x1f([^\x1e\x1f]*)\x1f([^\x1e\x1f]*)\x1f([0-9]+)\x1f([^\x1d\x1e]*)\x1d\n?"
+_RECORD = re.compile(
+    "\x1e([0-9a-f]{32})\x1f([A-Z]+)\x1f([^\x1e\x1f]*)\x1f([^\x1e\x1f]*)\x1f([0-9]+)\x1f([^\x1d\x1e]*)\x1d\n?"
+)
 _TOKEN = re.compile("[0-9a-f]{32}")
 #: The host never sends a longer report.
 REPORT_BYTES = 4 << 20
@@ -304,10 +306,11 @@ class NodeProcess:
     def _parsed(self, t_ns: int, stream: str, text: str) -> list[LogRecord | OutputLine]:
         found: list[LogRecord | OutputLine] = []
         position = 0
-        start = self._record_start().decode() if stream == "stderr" else ""
-        for match in re.finditer(start + _LOG_FIELDS, text) if start else ():
+        for match in _RECORD.finditer(text) if stream == "stderr" else ():
+            token, severity, logger, file, line, message = match.groups()
+            if token != self.log_token:
+                continue  # the program has written it
             found += self._lines(t_ns, stream, text[position : match.start()])
-            severity, logger, file, line, message = match.groups()
             relative, place = file.removeprefix(f"{self.root}/"), int(line[:9])
             if relative == file or not self.places.has(relative, place):
                 relative, place = "", 0
