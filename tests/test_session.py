@@ -8,8 +8,8 @@ import pytest
 
 from grader.app.grade import read_exercises, read_recording
 from grader.app.request import GradeRequest
-from grader.app.start import grade, may_run
-from grader.core.errors import RecordingError, RubricError
+from grader.app.start import grade, may_run, opened_early
+from grader.core.errors import RecordingError, RubricError, SubmissionError
 from grader.core.exercise import Location, Outcome
 from grader.execution.ros_installation import find_ros
 from grader.rubrics.builtin import builtin_rubrics, exercise_ids
@@ -99,3 +99,12 @@ def test_the_recording_is_read_only_where_it_is_played(tmp_path: Path) -> None:
     named = GradeRequest("x", exercises=("velocity_publisher",), odom_bag=tmp_path / "none.mcap")
     with pytest.raises(RecordingError):
         read_recording(named, read_exercises(named))
+
+
+@pytest.mark.parametrize("name", ["a" * 5000, "a" * 5000 + ".py", "a\0b", "a\0b.py", ""])
+def test_a_name_that_no_file_can_have_starts_nothing_and_is_named(name: str) -> None:
+    """The system's own error for such a name is not the answer."""
+    with opened_early(name, (), "none", lambda _: None) as session:
+        assert session is None
+    with pytest.raises(SubmissionError):
+        grade(GradeRequest(name, isolation="none"), lambda _: None)

@@ -57,8 +57,8 @@ def opened(request: GradeRequest, progress: Progress) -> AbstractContextManager[
 def opened_early(
     submission: str, rubrics: Sequence[Path], isolation: str, progress: Progress
 ) -> AbstractContextManager[RecordingSession | None]:
-    """Return a session whose worker starts at once; None if it is not certain that something will be run in it."""
-    there = Path(submission).exists() and may_run(submission, rubrics)
+    """Return a session whose worker starts at once; None if there is nothing to run."""
+    there = os.path.exists(submission) and may_run(submission, rubrics)  # noqa: PTH110 - False for any unusable name
     return open_session(isolation, None, progress) if there else nullcontext()
 
 
@@ -67,12 +67,12 @@ def may_run(submission: str, rubrics: Sequence[Path] = ()) -> bool:
 
     If not, no worker is started in advance. Reading the rubrics instead would take as long as the start of a worker.
     """
-    place = Path(submission)
-    if rubrics or not (place.is_dir() or place.suffix == ".py"):
+    place, is_folder = Path(submission), os.path.isdir(submission)  # noqa: PTH112 - False for any unusable name
+    if rubrics or not (is_folder or place.suffix == ".py"):
         return True
     texts = (path.read_text(encoding="utf-8") for path in shipped("rubrics").glob("*.yaml"))
     wanted = {name.strip() for text in texts for found in _FILES.findall(text) for name in found.split(",")}
-    if not place.is_dir():
+    if not is_folder:
         return place.name in wanted and is_runnable(place)
     for number, (folder, _, names) in enumerate(os.walk(place)):
         found = (Path(folder, name) for name in wanted.intersection(names))
