@@ -40,13 +40,16 @@ def grade(  # noqa: PLR0913  what to grade, and who is told
 ) -> Report:
     """Grade one submission, in a session of its own unless one is given; see `grade_in`."""
     started = time.perf_counter()
-    warm = request.collected is not None or may_run(request.submission, request.rubrics)
-    own = open_session(request.isolation, request.workers, progress, warm=warm)
-    with own if session is None else nullcontext(session) as used:
+    with _own_session(request, progress) if session is None else nullcontext(session) as used:
         from grader.app.grade import grade_in  # noqa: PLC0415 - takes as long as the worker takes to start
 
         told = (on_recorded, on_partial_report)
         return grade_in(used, request, progress, *told, pictures=pictures, started=started, under_way=under_way)
+
+
+def _own_session(request: GradeRequest, progress: Progress) -> AbstractContextManager[RecordingSession]:
+    warm = request.collected is not None or may_run(request.submission, request.rubrics)
+    return open_session(request.isolation, request.workers, progress, warm=warm)
 
 
 def opened(request: GradeRequest, progress: Progress) -> AbstractContextManager[RecordingSession]:

@@ -107,8 +107,9 @@ def _field_names(kind: Any) -> tuple[str, ...] | None:
 
 def to_json(value: Any) -> Any:
     """Convert a dataclass to plain JSON values by field name; `from_json` reads them back."""
-    if is_dataclass(value):
-        return {field.name: to_json(getattr(value, field.name)) for field in fields(value)}
+    kind: Any = type(value)
+    if (names := _field_names(kind)) is not None:
+        return {name: to_json(getattr(value, name)) for name in names}
     if isinstance(value, tuple):
         return [to_json(item) for item in value]
     if isinstance(value, bytes):

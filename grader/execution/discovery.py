@@ -233,7 +233,8 @@ class Discovery:
         """Return whether the graph shows everything that the processes claim."""
         wanted = _wanted(claims)
         self._known |= wanted.keys()
-        if not self._nodes() <= set(self._observer.students_nodes(self._nodes())):
+        names = self._nodes()
+        if not names <= {*self._observer.students_nodes(names)}:
             return False  # before anything that takes longer to query: this is asked most often
         graph = self._graph_at(now_ns)
         found = self._found(graph)
