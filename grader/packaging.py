@@ -20,8 +20,8 @@ from grader.app.seeds import read_key
 from grader.core.errors import EnvironmentFault, GraderError, RubricError
 from grader.core.shipped import shipped
 from grader.rubrics.builtin import builtin_rubrics, exercise_ids
+from grader.rubrics.draws import First
 from grader.rubrics.loader import read_rubric, side_files
-from grader.rubrics.variants import First
 
 PACKAGE = "rclpy-grader"
 #: The earliest time that a zip can store; a fixed time makes archives reproducible.

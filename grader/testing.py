@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from grader.core.exercise import Check, Finding, SourceCheck
+from grader.core.exercise import Check, Finding, reads_sources
 from grader.core.quantities import NS_PER_S, nanoseconds
 from grader.core.trace import (
     ClockKind,
@@ -71,7 +71,7 @@ def judge(check: Check, trace: Trace, sources: Mapping[str, str] | None = None) 
 
 
 def _asked(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
-    if sources is not None and isinstance(check, SourceCheck):
+    if sources is not None and reads_sources(check):
         return check.judge_sources(trace, sources)
     return check.judge(trace)
 

@@ -34,9 +34,9 @@ from grader.core.scenario import (
 from grader.judging.checks import CHECKS
 from grader.judging.run_check import check_name
 from grader.rubrics.check_parameters import Manual, manual_of
+from grader.rubrics.draws import First
 from grader.rubrics.loader import own_checks
 from grader.rubrics.units import format_quantity
-from grader.rubrics.variants import First
 
 #: Most names suggested for an unknown one.
 OFFERED = 3

@@ -34,7 +34,7 @@ from grader.reporting.delivery import Output, write_report
 from grader.reporting.formats import FORMATS
 from grader.reporting.json_report import ReportData, dumps, report_to_json
 from grader.reporting.rejudged import RejudgedResult, ReportChange, change
-from grader.rubrics.variants import First
+from grader.rubrics.draws import First
 
 #: With fewer submissions than this for each process, another process does not pay off.
 WORTH_A_POOL = 16

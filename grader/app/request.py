@@ -13,10 +13,10 @@ from grader.app.seeds import PRACTICE, SeedKey
 from grader.core.exercise import Drawn, Exercise
 from grader.core.limits import TIME_BUDGET_S
 from grader.core.report import JsonObject, Reproduction
+from grader.rubrics.draws import Draw, Recorded
 
 if TYPE_CHECKING:
     from grader.execution.bag import Odometry
-    from grader.rubrics.variants import Draw
     from grader.submissions.collected import Collected
 
 
@@ -119,8 +119,6 @@ def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -
 
 def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> GradeRequest:
     """Return the request that would record a kept run again and judge it by these rubrics."""
-    from grader.rubrics.variants import Recorded  # noqa: PLC0415 - only where a recording is judged again
-
     bag, key, student = data.get("odom_bag"), data.get("variant_key"), str(data.get("student", ""))
     return GradeRequest(
         submission=submission,

@@ -18,7 +18,7 @@ from grader.core.exercise import Drawn, Exercise, Value
 from grader.submissions.collected import shown
 
 if TYPE_CHECKING:
-    from grader.rubrics.variants import VariantOptions
+    from grader.rubrics.draws import Options
 
 #: Fewest and most bytes of a key; with a key that can be guessed, students could predict the drawn values.
 LEAST_BYTES, MOST_BYTES = 16, 4096
@@ -123,7 +123,7 @@ class ByKey:
     key: bytes
     student: str  # id of the student; case, surrounding whitespace and Unicode normalisation make no difference
 
-    def value(self, exercise: str, options: VariantOptions) -> Value | None:
+    def value(self, exercise: str, options: Options) -> Value | None:
         """Pick a value by the HMAC-SHA256 of exercise, variant and student."""
         text = "\n".join((_VARIANT_SCHEME, exercise, options.name, folded(self.student)))
         digest = hmac.new(self.key, text.encode(), hashlib.sha256).digest()

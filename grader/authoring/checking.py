@@ -15,8 +15,8 @@ from grader.core.quantities import duration
 from grader.core.scenario import Scenario, shortest
 from grader.judging.checks import CHECKS
 from grader.rubrics.check_parameters import manual_of
+from grader.rubrics.draws import First
 from grader.rubrics.loader import RubricMistakes, read_rubric
-from grader.rubrics.variants import First
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlTree, read_yaml
 from grader.submissions.collected import shown
 

@@ -47,7 +47,7 @@ from grader.reporting.html.class_links import with_class_links
 from grader.reporting.html.final_mark import render_refusal, with_final_mark
 from grader.reporting.json_report import ReportData
 from grader.reporting.rejudged import ReportChange, change, render_changes_table
-from grader.rubrics.variants import First
+from grader.rubrics.draws import First
 from grader.similarity.finding import find_similar, read_programs
 from grader.similarity.library import ComparedProgram, Handed, Similar
 from grader.similarity.pages import MOST_PAGES, OVERVIEW, page_name, render_overview, render_pair, render_table

@@ -27,7 +27,7 @@ from grader.execution.recording_session import workers_for
 from grader.execution.supervisor import MARGIN_S, TRIES
 from grader.execution.temp_dirs import scratch_folder
 from grader.reporting.html.assets import bundle
-from grader.rubrics.variants import Recorded
+from grader.rubrics.draws import Recorded
 from grader.similarity.library import ComparedProgram
 from grader.submissions.submission import stage_submission
 

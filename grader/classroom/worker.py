@@ -35,7 +35,7 @@ from grader.reporting.delivery import write_whole
 from grader.reporting.html.render import render_html
 from grader.reporting.json_report import dumps
 from grader.reporting.platforms.gradescope import render_gradescope
-from grader.rubrics.variants import Recorded
+from grader.rubrics.draws import Recorded
 
 PAGE, EVIDENCE = "report.html", "evidence"
 #: Files for students, with what the rubric lets them see on the day of grading.

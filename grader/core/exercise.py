@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeGuard
 
 from grader.core.scenario import OdometryStream, Scenario
 from grader.core.trace import Trace
@@ -195,12 +195,16 @@ class Check(Protocol):
         """Judge the trace. This is a pure function, and nothing that a student does makes it raise."""
 
 
-@runtime_checkable
 class SourceCheck(Protocol):
     """A check that also reads the text of the students' files."""
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
         """Judge the trace and the files, by their required names; a pure function like `judge`."""
+
+
+def reads_sources(check: object) -> TypeGuard[SourceCheck]:
+    """Return whether a check also reads the students' files."""
+    return callable(getattr(check, "judge_sources", None))
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from grader.core.chart import (
     Stage,
     Tone,
 )
-from grader.core.exercise import Check, Criterion, Exercise, Location, SourceCheck
+from grader.core.exercise import Check, Criterion, Exercise, Location, reads_sources
 from grader.core.quantities import seconds
 from grader.core.report import ExerciseReport
 from grader.core.scenario import Scenario
@@ -144,7 +144,7 @@ def _playbacks(exercise: Exercise, traces: Mapping[str, Trace], told: Set[str]) 
 
 
 def _is_recorded(criterion: Criterion, told: Set[str]) -> bool:
-    return criterion.id not in told and not isinstance(criterion.check, SourceCheck)
+    return criterion.id not in told and not reads_sources(criterion.check)
 
 
 #: Maximum number of changes of the graph that can be played.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from grader.core.errors import HarnessError
-from grader.core.exercise import Check, Criterion, Exercise, Finding, Location, Problem, SourceCheck
+from grader.core.exercise import Check, Criterion, Exercise, Finding, Location, Problem, reads_sources
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import Submission
 from grader.core.trace import Fault, FaultKind, Request, Response, Trace
@@ -83,7 +83,7 @@ def run_check(
             return Answer(
                 problem=f"the machine was too busy: the nodes waited {waited} for a processor, which can be why"
             )
-    if not isinstance(criterion.check, SourceCheck):
+    if not reads_sources(criterion.check):
         return _for_what_is_lacking(answer, scenario, trace, sources or {})
     return answer if answer.finding is None else replace(answer, finding=_placed(answer.finding, submission))
 
@@ -125,7 +125,7 @@ def _placed(finding: Finding, submission: Submission) -> Finding:
 
 def _put(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
     """Return the finding of a check, which may need the students' files too."""
-    if sources is not None and isinstance(check, SourceCheck):
+    if sources is not None and reads_sources(check):
         return check.judge_sources(trace, sources)
     return check.judge(trace)
 

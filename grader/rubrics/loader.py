@@ -31,6 +31,7 @@ from grader.core.scenario import (
     shortest,
 )
 from grader.judging.checks import CHECKS
+from grader.rubrics.draws import Draw, First
 from grader.rubrics.interfaces import Interfaces, interface_mistakes
 from grader.rubrics.mistakes import mistakes_of, nearest
 from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, feedback_of, rubric_model
@@ -48,8 +49,6 @@ from grader.rubrics.run_options import RunShape
 from grader.rubrics.simulations import simulation_mistakes
 from grader.rubrics.types import CHECK_FILE, INTERFACE_FOLDER, PROVIDED_FILE, PROVIDED_WORDS, build
 from grader.rubrics.variants import (
-    Draw,
-    First,
     VariantOptions,
     Variants,
     has_variants,

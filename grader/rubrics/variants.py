@@ -9,12 +9,12 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from typing import Annotated, Protocol
+from typing import Annotated
 
 from pydantic import ConfigDict, PlainValidator, WithJsonSchema, model_validator
 from typing_extensions import Self
 
-from grader.core.exercise import Drawn, Value, Variant
+from grader.core.exercise import Value, Variant
 from grader.rubrics.mistakes import nearest
 from grader.rubrics.types import Id, Shape, must, wrong
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlTree
@@ -129,47 +129,6 @@ class VariantOptions:
         every = range(self.count)
         few = every if self.count <= TRIED else (*every[: TRIED // 2], *every[-TRIED // 2 :])
         yield from map(self.value, few)
-
-
-class Draw(Protocol):
-    """Chooses the value of each variant for a student."""
-
-    @property
-    def student(self) -> str:
-        """The student whose values these are."""
-        ...
-
-    def value(self, exercise: str, options: VariantOptions) -> Value | None:
-        """Return the value of a variant; None if it is not known."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class First:
-    """The first value of each variant, for reading a rubric without a student."""
-
-    student: str = ""
-
-    def value(self, exercise: str, options: VariantOptions) -> Value | None:
-        """Return the first value."""
-        del exercise
-        return options.value(0)
-
-
-@dataclass(frozen=True, slots=True)
-class Recorded:
-    """The values used in an earlier run, for judging its recording."""
-
-    drawn: Drawn
-
-    @property
-    def student(self) -> str:
-        """The student whose values these are."""
-        return self.drawn.student
-
-    def value(self, exercise: str, options: VariantOptions) -> Value | None:
-        """Return the recorded value."""
-        return self.drawn.values.get(exercise, {}).get(options.name)
 
 
 def tried(options: Sequence[VariantOptions], usual: Mapping[str, Value]) -> Iterator[Mapping[str, Value]]:

@@ -20,8 +20,8 @@ from grader.core.errors import ClassError, HarnessError, VariantError
 from grader.core.exercise import Drawn
 from grader.core.report import Report
 from grader.rubrics.builtin import builtin_rubrics
+from grader.rubrics.draws import Recorded
 from grader.rubrics.loader import read_rubric
-from grader.rubrics.variants import Recorded
 
 ROSTER = (
     "name,username,email,id number\nAda,ada,ada@x.edu,17\nBob,bob,bob@x.edu,\nEve,eve,eve@x.edu,18\nEve 2,eve,,19\n"

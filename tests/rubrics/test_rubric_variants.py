@@ -15,9 +15,9 @@ from stand_in_checks import CHECKS
 from grader.core.errors import RubricError
 from grader.core.exercise import Drawn, Exercise, Variant
 from grader.core.scenario import NumberStream
+from grader.rubrics.draws import First, Options, Recorded
 from grader.rubrics.loader import read_rubric
 from grader.rubrics.schema import rubric_schema
-from grader.rubrics.variants import First, Recorded, VariantOptions
 
 RUBRIC = """\
 schema: grader/rubric/v1
@@ -57,7 +57,7 @@ class Nth:
     def __init__(self, index: int) -> None:
         self.index = index
 
-    def value(self, exercise: str, options: VariantOptions) -> float | str:
+    def value(self, exercise: str, options: Options) -> float | str:
         return options.value(self.index % options.count)
 
 
@@ -129,7 +129,7 @@ def test_values_between_two_are_exact(
     seen = {}
 
     class Spy(First):
-        def value(self, exercise: str, options: VariantOptions) -> float | str:
+        def value(self, exercise: str, options: Options) -> float | str:
             seen[options.name] = [options.value(index) for index in range(options.count)]
             return options.value(0)
 

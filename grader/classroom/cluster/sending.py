@@ -27,8 +27,8 @@ from grader.classroom.store import State, refused
 from grader.classroom.worker import PARTS
 from grader.core.errors import HarnessError, RecordingError, RubricError, SubmissionError
 from grader.interfaces.definitions import files_in
+from grader.rubrics.draws import First
 from grader.rubrics.loader import side_files
-from grader.rubrics.variants import First
 from grader.submissions.submission import collect_submission
 
 _PARTS = frozenset(PARTS)
