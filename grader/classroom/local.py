@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
+from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
@@ -21,6 +22,7 @@ import msgspec
 from grader.classroom import store as kept
 from grader.classroom.store import Conditions, ResultStatus, State
 from grader.core.checkup import NO_SANDBOX, missing
+from grader.execution.recording_session import WALL
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import choose_isolation
 
@@ -85,10 +87,15 @@ WORKER = (sys.executable, "-s", "-m", "grader.classroom.worker")
 
 
 class LocalScheduler:
-    """Grades on this machine; relative paths start at the folder, or at the current one if it is None."""
+    """Grades on this machine; relative paths start at the folder, or at the current one if it is None.
+
+    A submission that is recorded on the wall clock because virtual time does not suffice spends its time waiting.
+    Another one is begun beside it, so that up to twice as many as `jobs` are being graded.
+    """
 
     def __init__(self, jobs: int, command: Sequence[str] = WORKER, *, folder: Path | None = None) -> None:
         self._jobs = jobs
+        self._at_once = 2 * jobs
         self._command = command
         self._folder = folder
         self._lock = threading.Lock()
@@ -101,38 +108,42 @@ class LocalScheduler:
         choice = choose_isolation(isolation, find_ros())
         name = choice.isolation.name
         warnings = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
-        if choice.isolation.shares_network and name != NO_SANDBOX and self._jobs > 1:
-            self._jobs = 1
-            warnings.append(f"sandbox {name}: submissions share the network, so they are graded one at a time")
+        if choice.isolation.shares_network and name != NO_SANDBOX:
+            if self._jobs > 1:
+                warnings.append(f"sandbox {name}: submissions share the network, so they are graded one at a time")
+            self._jobs = self._at_once = 1
         return warnings
 
     def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
         """Yield an attempt for each task; see `ClassScheduler`."""
         # The kernel kills a worker when the thread that started it ends, so the threads live until all tasks are done.
-        pool = ThreadPoolExecutor(self._jobs, thread_name_prefix="batch")
+        pool = ThreadPoolExecutor(self._at_once, thread_name_prefix="batch")
+        places, waiting = threading.Semaphore(self._jobs), deque(tasks)
         try:
-            for future in as_completed([pool.submit(self._one, task, on_step) for task in tasks]):
+            for future in as_completed([pool.submit(self._next, waiting, on_step, places) for _ in tasks]):
                 yield future.result()
         finally:
             self._close()
             pool.shutdown(wait=True, cancel_futures=True)
 
-    def _one(self, task: Task, on_step: OnStep) -> Attempt:
-        on_step(task.name, "starting")
-        process = self._idle_one()
-        if process is not None:
-            attempt = self._attempt(process, task, on_step)
-            if attempt.status.state is not State.FAILED:
-                return attempt
-            # What a process keeps for the next submission costs no submission its result.
-            shutil.rmtree(task.into, ignore_errors=True)
-        try:
-            process = self._start()
-        except OSError as error:
-            return failed(task, f"the grader cannot be started: {error.strerror}")
-        return self._attempt(process, task, on_step)
+    def _next(self, waiting: deque[Task], on_step: OnStep, places: threading.Semaphore) -> Attempt:
+        with _Place(places) as place:
+            task = waiting.popleft()
+            on_step(task.name, "starting")
+            process = self._idle_one()
+            if process is not None:
+                attempt = self._attempt(process, task, on_step, place)
+                if attempt.status.state is not State.FAILED:
+                    return attempt
+                # What a process keeps for the next submission costs no submission its result.
+                shutil.rmtree(task.into, ignore_errors=True)
+            try:
+                process = self._start()
+            except OSError as error:
+                return failed(task, f"the grader cannot be started: {error.strerror}")
+            return self._attempt(process, task, on_step, place)
 
-    def _attempt(self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep) -> Attempt:
+    def _attempt(self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place) -> Attempt:
         """Grade in a process, and keep it for the next submission unless it failed."""
         overdue, status = threading.Event(), None
 
@@ -144,7 +155,7 @@ class LocalScheduler:
         timer.daemon = True
         timer.start()
         try:
-            status = self._listen(process, task, on_step)
+            status = self._listen(process, task, on_step, place)
         finally:
             timer.cancel()
             if status is None or status.state is State.FAILED:
@@ -180,7 +191,9 @@ class LocalScheduler:
             self._running.add(process)
         return process
 
-    def _listen(self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep) -> ResultStatus | None:
+    def _listen(
+        self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place
+    ) -> ResultStatus | None:
         """Read messages from a process until it reports its result; None if it ends without one."""
         assert process.stdin is not None
         assert process.stdout is not None
@@ -195,6 +208,8 @@ class LocalScheduler:
                 return kept.load(json.dumps(message["done"]).encode())
             if "step" in message:
                 on_step(task.name, str(message["step"]))
+            if "wall_clock" in message and task.conditions.clock != WALL:  # with `--clock wall`, all would be recorded
+                place.leave()
         return None
 
     def _end(self, process: subprocess.Popen[bytes]) -> None:
@@ -219,6 +234,28 @@ class LocalScheduler:
             _kill(process)
         for process in idle:
             self._end(process)
+
+
+class _Place:
+    """One of the places for submissions that need a processor; it is left once, at the latest at the end."""
+
+    def __init__(self, places: threading.Semaphore) -> None:
+        self._places = places
+        self._taken = False
+
+    def __enter__(self) -> _Place:
+        self._places.acquire()
+        self._taken = True
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.leave()
+
+    def leave(self) -> None:
+        """Leave the place to the next submission."""
+        if self._taken:
+            self._taken = False
+            self._places.release()
 
 
 def _message(line: bytes) -> dict[str, object]:

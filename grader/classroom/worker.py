@@ -50,12 +50,13 @@ _SET_PARENT_DEATH_SIGNAL = 1  # linux/prctl.h
 def main() -> None:
     """Grade the tasks from standard input; write steps and each status as JSON lines to standard output.
 
+    Before a recording on the wall clock, which leaves the processors to others, it writes that too.
     A recording session serves all tasks that ask for the same one. It never runs anything of a submission in this
     process.
     """
     ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
     with ExitStack() as stack:
-        sessions = Sessions(stack)
+        sessions = Sessions(stack, lambda: _send({"wall_clock": True}))
         for line in sys.stdin.buffer:
             request = json.loads(line)
             if os.getppid() != request["parent"]:  # the parent died before the signal was set
@@ -69,8 +70,9 @@ def main() -> None:
 class Sessions:
     """The recording sessions of a process, which are closed with the stack."""
 
-    def __init__(self, stack: ExitStack) -> None:
+    def __init__(self, stack: ExitStack, on_wall_clock: Callable[[], None]) -> None:
         self._stack = stack
+        self._on_wall_clock = on_wall_clock
         self._opened: dict[tuple[str, int | None], RecordingSession] = {}
 
     def grade(
@@ -80,7 +82,8 @@ class Sessions:
         started = time.perf_counter()
         wanted = (request.isolation, request.workers)
         if wanted not in self._opened:
-            self._opened[wanted] = self._stack.enter_context(open_session(*wanted, progress))
+            session = open_session(*wanted, progress, on_wall_clock=self._on_wall_clock)
+            self._opened[wanted] = self._stack.enter_context(session)
         return grade_in(self._opened[wanted], request, progress, on_recorded, started=started)
 
 

@@ -106,7 +106,12 @@ def _unfit(trace: Trace, clock: str) -> bool:
 
 @contextmanager
 def open_session(
-    isolation: str, workers: int | None = None, progress: Callable[[str], None] = lambda _: None, *, warm: bool = True
+    isolation: str,
+    workers: int | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+    *,
+    warm: bool = True,
+    on_wall_clock: Callable[[], None] = lambda: None,
 ) -> Iterator[RecordingSession]:
     """Open a recording session, and close it at the end of the block.
 
@@ -115,6 +120,7 @@ def open_session(
         workers: How many scenarios to record in parallel; None to choose by the number of processors.
         progress: Called with a message when a sandbox has to be tested.
         warm: Whether to start a worker at once, not when something is recorded.
+        on_wall_clock: See `Recorder`.
 
     Raises:
         EnvironmentFault: This machine lacks ROS or the requested tier.
@@ -128,7 +134,8 @@ def open_session(
     compile_own()
     with scratch_folder() as folder:
         folder.chmod(0o755)  # students' processes may run as another user and have to read the staged copy
-        with Recorder(tier, ros.runtime, domains, scratch=folder, workers=workers) as recorder:
+        kept = Recorder(tier, ros.runtime, domains, scratch=folder, workers=workers, on_wall_clock=on_wall_clock)
+        with kept as recorder:
             if warm:
                 recorder.warm_up(1)
             yield RecordingSession(ros, tier, choice.containment, recorder, folder)

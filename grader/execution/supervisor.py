@@ -230,10 +230,18 @@ class Recorder:
         scratch: A folder for files that ROS writes, and for everything that is recorded: a worker may see no other
             folder. The caller removes it.
         workers: How many scenarios to record at the same time.
+        on_wall_clock: Called before each recording on the wall clock, which takes much time and little of a processor.
     """
 
-    def __init__(
-        self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], *, scratch: Path, workers: int
+    def __init__(  # noqa: PLR0913  what it records with, and who is told
+        self,
+        isolation: Isolation,
+        runtime: PythonRuntime,
+        domains: Iterator[int],
+        *,
+        scratch: Path,
+        workers: int,
+        on_wall_clock: Callable[[], None] = lambda: None,
     ) -> None:
         self._isolation = isolation
         self._runtime = runtime
@@ -244,6 +252,7 @@ class Recorder:
         self._closed = False
         self._count = workers
         self._scratch = scratch
+        self._on_wall_clock = on_wall_clock
         # The kernel kills a worker when the thread that started it ends; these threads live as long as the recorder.
         self._pool = ThreadPoolExecutor(workers, thread_name_prefix="recorder")
         for _ in range(workers):
@@ -275,6 +284,8 @@ class Recorder:
     def _record(self, job: Job, progress: Callable[[str], None]) -> Trace:
         """Record a job, and repeat it if a signal ended a process or messages were lost: a real fault happens again."""
         progress(job.title)
+        if job.plan.clock == ClockKind.WALL.value:
+            self._on_wall_clock()
         trace = self._recorded(job)
         doubtful = trace.incomplete or any(f.signal for f in trace.faults())
         return self._recorded(job) if doubtful and job.budget.left_ns else trace

@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -101,6 +102,45 @@ def test_a_process_is_kept_for_the_next_submission(tmp_path: Path) -> None:
     order = {pid: number for number, pid in enumerate(dict.fromkeys(pids))}
     assert [order[pid] for pid in pids] == [0, 0, 0, 1, 2, 2, 2, 3, 4]
     assert [pid for pid in pids if Path(f"/proc/{pid}").exists()] == []
+
+
+#: Says that it records on the wall clock, if its label says so, and ends once every submission has been begun.
+WAITING = f"""
+import json, os, sys, time
+from pathlib import Path
+for line in sys.stdin:
+    task = json.loads(line)["task"]
+    begun = Path(task["submission"], "begun")
+    begun.mkdir(exist_ok=True)
+    (begun / task["label"]).touch()
+    if task["label"].startswith("waits"):
+        print(json.dumps({{"wall_clock": True}}), flush=True)
+        while len(os.listdir(begun)) < 4:
+            time.sleep(0.01)
+    print(json.dumps({{"step": str(len(os.listdir(begun)))}}), flush=True)
+    print(json.dumps({{"done": {DONE!r}}}), flush=True)
+"""
+
+
+def test_another_submission_is_begun_beside_one_that_waits_for_the_wall_clock(tmp_path: Path) -> None:
+    """It would never end otherwise. Twice as many as jobs are graded at most."""
+    here = LocalScheduler(2, (sys.executable, "-c", WAITING))
+    tasks = [task(tmp_path, label) for label in ("waits", "waits too", "a", "b", "c")]
+    heard: dict[str, str] = {}
+    found = [a.status.state for a in here.run(tasks, lambda name, step: heard.update({name: step}))]
+    assert found == [State.GRADED] * 5
+    assert heard["waits"] >= "4"
+
+
+@pytest.mark.parametrize("clock", ["wall", "auto"])
+def test_a_class_that_is_graded_on_the_wall_clock_keeps_to_its_jobs(tmp_path: Path, clock: str) -> None:
+    """Recordings in real time disturb each other, so only single ones have others beside them."""
+    program = WAITING.replace("< 4", "< 2") if clock == "auto" else WAITING.replace("< 4", "< 1")
+    here = LocalScheduler(1, (sys.executable, "-c", program))
+    tasks = [replace(task(tmp_path, label), conditions=replace(CONDITIONS, clock=clock)) for label in ("waits", "b")]
+    heard: dict[str, str] = {}
+    assert all(a.status.state is State.GRADED for a in here.run(tasks, lambda name, step: heard.update({name: step})))
+    assert heard["waits"] == {"wall": "1", "auto": "2"}[clock]
 
 
 def test_what_does_not_end_is_given_up(tmp_path: Path) -> None:
