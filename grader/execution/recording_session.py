@@ -23,8 +23,9 @@ from grader.execution.temp_dirs import scratch_folder
 
 #: The name of a run without a sandbox in reports.
 NO_ISOLATION = "none"
-#: A worker and the nodes that it records keep two processors busy, and its start costs as much as several scenarios.
-PROCESSORS_PER_WORKER, MOST_WORKERS = 2, 4
+#: Most scenarios of a submission that are recorded at once: one more than there are processors, because nodes wait for
+#: discovery in between, and each takes memory.
+MOST_WORKERS = 4
 #: The values of `--clock`: `auto` is virtual time, with the wall clock where virtual time is unsuitable.
 VIRTUAL, WALL, AUTO = "virtual", "wall", "auto"
 
@@ -96,7 +97,7 @@ class RecordingSession:
 
 def workers_for(processors: int) -> int:
     """Return how many scenarios of one submission to record in parallel on so many processors."""
-    return min(max(1, processors // PROCESSORS_PER_WORKER), MOST_WORKERS)
+    return min(max(1, processors) + 1, MOST_WORKERS)
 
 
 def _unfit(trace: Trace, clock: str) -> bool:
@@ -137,7 +138,7 @@ def open_session(
         kept = Recorder(tier, ros.runtime, domains, scratch=folder, workers=workers, on_wall_clock=on_wall_clock)
         with kept as recorder:
             if warm:
-                recorder.warm_up(1)
+                recorder.warm_up(workers)
             yield RecordingSession(ros, tier, choice.containment, recorder, folder)
 
 

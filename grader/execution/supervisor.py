@@ -3,7 +3,7 @@
 A worker's answer is untrusted input: its size is limited and its structure is checked. A worker that fails is replaced,
 and its plan is tried once more, unless the worker had used up its time. A second failure becomes a trace with a harness
 problem, which is never judged. If both workers ended at their own limits, the nodes caused it, and the trace has
-faults.
+faults. A failure of a worker that shares its sandbox with a fork of it does not count, as the other may have caused it.
 """
 
 from __future__ import annotations
@@ -12,11 +12,14 @@ import contextlib
 import json
 import os
 import queue
+import select
 import signal
 import socket
+import struct
 import subprocess
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -51,6 +54,8 @@ FULL_BYTES, LOOK_S = 768 * MIB, 0.1
 ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
 TRIES = 2
 MODULE = b"grader.execution.worker_main"
+#: pid, user and group of the sender of a message (`struct ucred`, unix(7)).
+_CREDENTIALS = struct.Struct("3i")
 
 
 class WorkerLostError(HarnessError):
@@ -68,54 +73,29 @@ class WorkerLostError(HarnessError):
         self.late = late
 
 
-class WorkerProcess:
-    """One running worker and the socket to it.
+class Worker(ABC):
+    """A running worker and the socket to it.
 
     Args:
-        isolation: The tier that it runs in and starts student processes in.
-        runtime: Interpreter and ROS.
+        line: The socket.
         domains: Yields ROS domains that no other program uses.
-        scratch: A folder for files that ROS writes, such as logs.
 
     Attributes:
         worn: Whether it reports that it should be replaced.
+        shares: Whether it shares its sandbox with another worker.
+        gone: Whether it has ended with another worker.
     """
 
-    def __init__(self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], scratch: Path) -> None:
+    def __init__(self, line: socket.socket, domains: Iterator[int]) -> None:
+        self._line = line
         self._domains = domains
-        self.worn = False
         self._interfaces: tuple[str, ...] = ()
-        self._executable = os.fsencode(runtime.executable)
         self._pid = 0
-        self._line, theirs = socket.socketpair()
-        enters = isolation.can_enter
-        request = {
-            "isolation": isolation.name,
-            "line": theirs.fileno(),
-            "runtime": to_json(runtime),
-            "starter": starter_command(ClockKind.VIRTUAL.value, runtime, isolation.host_seen_at) if enters else None,
-        }
-        argv = [str(runtime.executable), "-s", "-u", "-m", MODULE.decode(), json.dumps(request)]
-        command = isolation.worker_command(
-            argv, _environment(runtime, scratch), (theirs.fileno(),), worker_view(runtime, scratch)
-        )
-        self._process = subprocess.Popen(
-            command.argv,
-            env=dict(command.environment),
-            pass_fds=command.pass_fds,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=None if os.environ.get("GRADER_DEBUG") == "1" else subprocess.DEVNULL,
-            cwd="/",
-            start_new_session=True,
-        )
-        for descriptor in command.opened_fds:
-            os.close(descriptor)
-        theirs.close()
+        self.worn = self.shares = self.gone = False
 
     def suits(self, plan: Plan) -> bool:
-        """Return whether this worker has used no other interface packages than those of a plan."""
-        return self._interfaces in ((), plan.interfaces)
+        """Return whether this worker is there and has used no other interface packages than those of a plan."""
+        return not self.gone and self._interfaces in ((), plan.interfaces)
 
     def run(self, plan: Plan, budget: RealTimeBudget) -> Trace:
         """Run one plan; raises HarnessError if the worker fails, WorkerLostError if it has ended or times out."""
@@ -127,6 +107,7 @@ class WorkerProcess:
         expected = f"worker: expected a trace of {plan.scenario}, found none"
         try:
             self._line.settimeout(MARGIN_S)  # a plan with a recording is larger than the socket buffer
+            self._await_start()
             self._line.sendall(request.encode())
             tries = 1 + (plan.clock == ClockKind.WALL.value)
             seconds = min(tries * plan.limits.wall_ns, budget.left_ns) / NS_PER_S + MARGIN_S
@@ -152,14 +133,13 @@ class WorkerProcess:
             budget.charge(real_ns, starved_ns)
         return trace_from_json(answer["trace"])
 
+    def _await_start(self) -> None:
+        """Wait until the worker can be used; raises EOFError if it has ended."""
+        return
+
     def _end(self) -> str:
         """Return how the worker ended: the name of a signal, or its exit code."""
-        try:
-            code = self._process.wait(END_S)
-        except subprocess.TimeoutExpired:
-            return "nothing that can be seen"
-        number = -code if code < 0 else code - 128  # bubblewrap passes a signal on as a shell does
-        return signal.Signals(number).name if number in {*signal.Signals} else f"code {code}"
+        return "nothing that can be seen"
 
     def _answer(self, limits: Limits, deadline: float) -> bytes:
         """Wait for the worker's answer.
@@ -195,7 +175,72 @@ class WorkerProcess:
             raise MemoryError
 
     def _find(self) -> int:
-        """Return the pid of the worker inside of its sandbox's processes; 0 before it has started."""
+        """Return the pid of the worker; 0 before it has started."""
+        return 0
+
+    @abstractmethod
+    def close(self) -> None:
+        """Kill the worker and everything that it started."""
+
+
+class ExecutedWorker(Worker):
+    """A worker in a sandbox of its own; it may make forks of itself there before it runs anything.
+
+    Args:
+        isolation: The tier that it runs in and starts student processes in.
+        runtime: Interpreter and ROS.
+        domains: Yields ROS domains that no other program uses.
+        scratch: A folder for files that ROS writes, such as logs.
+        forks: How many forks it makes; each costs less than another start.
+
+    Attributes:
+        forked: The forks.
+    """
+
+    def __init__(
+        self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], scratch: Path, *, forks: int
+    ) -> None:
+        lines = [socket.socketpair() for _ in range(1 + forks)]
+        super().__init__(lines[0][0], domains)
+        self.shares = forks > 0
+        self.forked = [ForkedWorker(line, domains) for line, _ in lines[1:]]
+        self._executable = os.fsencode(runtime.executable)
+        numbers = tuple(theirs.fileno() for _, theirs in lines)
+        clock, host = ClockKind.VIRTUAL.value, isolation.host_seen_at
+        request = {
+            "isolation": isolation.name,
+            "line": numbers[0],
+            "lines_of_forks": numbers[1:],
+            "runtime": to_json(runtime),
+            "starter": starter_command(clock, runtime, host, users=len(lines)) if isolation.can_enter else None,
+        }
+        argv = [str(runtime.executable), "-s", "-u", "-m", MODULE.decode(), json.dumps(request)]
+        environment, view = _environment(runtime, scratch), worker_view(runtime, scratch)
+        command = isolation.worker_command(argv, environment, numbers, view)
+        self._process = subprocess.Popen(
+            command.argv,
+            env=dict(command.environment),
+            pass_fds=command.pass_fds,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=None if os.environ.get("GRADER_DEBUG") == "1" else subprocess.DEVNULL,
+            cwd="/",
+            start_new_session=True,
+        )
+        for descriptor in command.opened_fds:
+            os.close(descriptor)
+        for _, theirs in lines:
+            theirs.close()
+
+    def _end(self) -> str:
+        try:
+            code = self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            return super()._end()
+        number = -code if code < 0 else code - 128  # bubblewrap passes a signal on as a shell does
+        return signal.Signals(number).name if number in {*signal.Signals} else f"code {code}"
+
+    def _find(self) -> int:
         for pid in sorted(families([self._process.pid])[self._process.pid]):
             with contextlib.suppress(OSError):
                 words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
@@ -204,11 +249,53 @@ class WorkerProcess:
         return 0
 
     def close(self) -> None:
-        """Kill the worker and everything that it started."""
+        """Kill the worker, its forks, and everything that they started."""
+        for fork in self.forked:
+            fork.gone = True
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, 9)
         self._process.wait()
         self._line.close()  # last, so that a thread waiting for an answer is woken by the end of the worker
+
+
+class ForkedWorker(Worker):
+    """A fork of a worker in the same sandbox, made before that one has run anything."""
+
+    def __init__(self, line: socket.socket, domains: Iterator[int]) -> None:
+        super().__init__(line, domains)
+        self.shares = True
+        self._process: int | None = None  # a descriptor of the process, because its pid may be given to another one
+        line.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
+
+    def _await_start(self) -> None:
+        """Receive the first message, with which the kernel tells the sender's pid."""
+        if self._process is not None:
+            return
+        received, told, _, _ = self._line.recvmsg(1, socket.CMSG_SPACE(_CREDENTIALS.size))
+        if not received:
+            raise EOFError
+        for level, kind, data in told:
+            if (level, kind) == (socket.SOL_SOCKET, socket.SCM_CREDENTIALS):
+                self._pid = _CREDENTIALS.unpack(data[: _CREDENTIALS.size])[0]
+                self._process = os.pidfd_open(self._pid)
+
+    def close(self) -> None:
+        """Kill the worker, and wait for its end; what it started ends with it."""
+        self.gone = True
+        with contextlib.suppress(OSError, EOFError):
+            self._line.settimeout(0)
+            self._await_start()
+        if self._process is not None:
+            with contextlib.suppress(OSError):
+                signal.pidfd_send_signal(self._process, signal.SIGKILL)
+            ended = select.poll()
+            ended.register(self._process, select.POLLIN)
+            ended.poll(END_S * 1000)
+            os.close(self._process)
+            self._process = None
+        with contextlib.suppress(OSError):
+            self._line.shutdown(socket.SHUT_RDWR)  # wakes a thread that waits for an answer
+        self._line.close()
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,13 +333,14 @@ class Recorder:
         self._isolation = isolation
         self._runtime = runtime
         self._domains = _Shared(domains)
-        self._idle: queue.LifoQueue[WorkerProcess | None] = queue.LifoQueue()  # a warm worker first
-        self._alive: list[WorkerProcess] = []
+        self._idle: queue.LifoQueue[Worker | None] = queue.LifoQueue()  # a warm worker first
+        self._alive: list[Worker] = []
         self._lock = threading.Lock()
         self._closed = False
         self._count = workers
         self._scratch = scratch
         self._on_wall_clock = on_wall_clock
+        self._on_the_wall = threading.Lock()  # in real time, recordings would disturb each other
         # The kernel kills a worker when the thread that started it ends; these threads live as long as the recorder.
         self._pool = ThreadPoolExecutor(workers, thread_name_prefix="recorder")
         for _ in range(workers):
@@ -265,27 +353,36 @@ class Recorder:
         self.close()
 
     def warm_up(self, count: int) -> None:
-        """Start some workers now, so that they are ready for the first plan."""
-        # This runs in the caller's thread, which outlives the recorder. All slots are taken before any is put back:
-        # otherwise the queue would return the first worker again.
+        """Start so many workers before anything is recorded: one, and forks that it makes of itself."""
+        # This runs in the caller's thread, which outlives the recorder.
         places = [self._idle.get() for _ in range(min(count, self._count))]
-        for place in places:
-            self._idle.put(place or self._start())
+        executed = self._start(forks=len(places) - 1)
+        for worker in (*executed.forked, executed):  # the last one is the next to be taken, and is ready first
+            self._idle.put(worker)
 
     def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
         """Record every job and return the traces in the same order."""
         return list(self.each(jobs, progress))
 
     def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
-        """Begin to record every job, and yield the traces in the same order, each as soon as it is available."""
-        futures = [self._pool.submit(self._record, job, progress) for job in jobs]
-        return (future.result() for future in futures)
+        """Begin to record every job, and yield the traces in the same order, each as soon as it is available.
+
+        With several workers, the longest scenarios begin first, so that no worker is left alone with one at the end.
+        """
+        order = sorted(range(len(jobs)), key=lambda at: 0 if self._count == 1 else -_length(jobs[at]))
+        futures = {at: self._pool.submit(self._record, jobs[at], progress) for at in order}
+        return (futures[at].result() for at in range(len(jobs)))
 
     def _record(self, job: Job, progress: Callable[[str], None]) -> Trace:
         """Record a job, and repeat it if a signal ended a process or messages were lost: a real fault happens again."""
         progress(job.title)
-        if job.plan.clock == ClockKind.WALL.value:
-            self._on_wall_clock()
+        if job.plan.clock != ClockKind.WALL.value:
+            return self._recorded_surely(job)
+        self._on_wall_clock()
+        with self._on_the_wall:
+            return self._recorded_surely(job)
+
+    def _recorded_surely(self, job: Job) -> Trace:
         trace = self._recorded(job)
         doubtful = trace.incomplete or any(f.signal for f in trace.faults())
         return self._recorded(job) if doubtful and job.budget.left_ns else trace
@@ -293,7 +390,8 @@ class Recorder:
     def _recorded(self, job: Job) -> Trace:
         problem = ""
         limits: list[str] = []
-        for _ in range(TRIES):
+        tries = 0
+        while tries < TRIES:
             if not job.budget.left_ns:
                 return job.budget.unrecorded(job.plan)
             worker = self._idle.get()
@@ -312,11 +410,10 @@ class Recorder:
             except HarnessError as error:
                 problem = error.message
                 self._discard(worker)
-                if isinstance(error, WorkerLostError):
-                    limits += [error.limit] if error.limit else []
-                    if error.late:
-                        break
-                if self._closed:
+                limit, late = (error.limit, error.late) if isinstance(error, WorkerLostError) else ("", False)
+                limits += [limit] if limit else []
+                tries += worker is None or not worker.shares or bool(limit)  # a replacement does not share its sandbox
+                if late or self._closed:
                     break
             finally:
                 self._idle.put(usable)
@@ -334,15 +431,15 @@ class Recorder:
             return Trace(job.plan.scenario, clock, stop_ns=job.plan.duration_ns, observations=faults)
         return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
 
-    def _start(self) -> WorkerProcess:
+    def _start(self, *, forks: int = 0) -> ExecutedWorker:
         with self._lock:
             if self._closed:
                 raise HarnessError("worker: the recorder is closed")
-            worker = WorkerProcess(self._isolation, self._runtime, self._domains, self._scratch)
-            self._alive.append(worker)
+            worker = ExecutedWorker(self._isolation, self._runtime, self._domains, self._scratch, forks=forks)
+            self._alive += [worker, *worker.forked]
             return worker
 
-    def _discard(self, worker: WorkerProcess | None) -> None:
+    def _discard(self, worker: Worker | None) -> None:
         with self._lock:
             if worker in self._alive and worker is not None:
                 self._alive.remove(worker)
@@ -356,6 +453,11 @@ class Recorder:
         for worker in alive:
             worker.close()
         self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _length(job: Job) -> int:
+    """Return an estimate of how long a recording takes, for comparison."""
+    return job.plan.duration_ns * len(job.plan.processes)
 
 
 class _Shared:

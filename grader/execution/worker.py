@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import math
 import os
@@ -10,7 +11,7 @@ import socket
 import sys
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -33,6 +34,7 @@ from grader.execution.resource_monitor import Budget, ResourceMonitor
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.environment import quick_discovery
 from grader.execution.sandbox.protocol import Isolation, StudentProcess
+from grader.execution.sandbox.start import die_with
 from grader.execution.sandbox.starter import HASH_SEED, Starter
 from grader.execution.sandbox.starter_process import StarterProcess
 from grader.execution.sandbox.tiers import isolation_from_name
@@ -294,16 +296,17 @@ def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
     """Run plans until the supervisor closes the socket.
 
     Args:
-        request: `isolation`, `runtime` and `line`, the number of the socket.
+        request: `isolation`, `runtime` and `line`, the number of the socket; and `lines_of_forks`, those of forks that
+            serve too.
         executed: See `Worker`.
     """
-    line = socket.socket(fileno=request["line"])
-    commands, answers = line.makefile("r"), line.makefile("w")
     limit_memory()
     runtime = from_json(PythonRuntime, request["runtime"])
     worker = Worker(isolation_from_name(request["isolation"]), runtime, executed)
     with suppress(Exception):  # the first plan raises it again, and answers with it
         _import_runners()  # here, because the starter and the supervisor are still busy with imports as well
+    line = _own_line([request["line"], *request["lines_of_forks"]])
+    commands, answers = line.makefile("r"), line.makefile("w")
     for command in commands:
         data = json.loads(command)
         try:
@@ -315,3 +318,22 @@ def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
             answer = {"problem": traceback.format_exc()[-4000:]}
         answers.write(json.dumps(answer) + "\n")
         answers.flush()
+
+
+def _own_line(lines: Sequence[int]) -> socket.socket:
+    """Make a fork for each line but the first, and return the socket to the supervisor of this process."""
+    own, *others = lines
+    parent = os.getpid()
+    if others:
+        gc.freeze()
+    for line in others:
+        if not os.fork():
+            die_with(parent)
+            for number in {*lines} - {line}:  # or the supervisor would not see the end of another worker
+                with suppress(OSError):
+                    os.close(number)
+            connection = socket.socket(fileno=line)
+            connection.send(b"\n")
+            return connection
+        os.close(line)
+    return socket.socket(fileno=own)

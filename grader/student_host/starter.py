@@ -1,9 +1,9 @@
 """Starts students' processes: imports rclpy once, and for each process forks itself into a sandbox.
 
 Usage: starter.py JSON, with an object of `line`, the descriptor of a socket; `clock`, empty to import nothing and to
-execute each process's command; `python_paths`; and `sandbox`, the path of the module that sandboxes a process. Each
-message on the socket has these descriptors: the request, the standard streams of the process, its connection to the
-grader, and a socket for its pid and its exit code.
+execute each process's command; `users`, how many processes wait until it is ready; `python_paths`; and `sandbox`, the
+path of the module that sandboxes a process. Each message on the socket has these descriptors: the request, the standard
+streams of the process, its connection to the grader, and a socket for its pid and its exit code.
 
 This process has seen no plan, seed, path or file of any submission: a request is read by the fork that it is for.
 """
@@ -57,7 +57,8 @@ def main() -> None:
     gc.freeze()
     gc.enable()
     signal.signal(signal.SIGCHLD, reap)
-    line.send(b"ready")
+    for _ in range(told["users"]):
+        line.send(b"ready")
     while True:
         data, descriptors, _, _ = socket.recv_fds(line, 1, CONTROL + 1)
         if not data:

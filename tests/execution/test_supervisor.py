@@ -32,6 +32,18 @@ WORKER = """
 import ctypes, json, os, signal, socket, sys, time
 ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # as the tiers of isolation do: it ends with the thread that started it
 folder, request = sys.argv[1], json.loads(sys.argv[2])
+lines = [request["line"], *request["lines_of_forks"]]
+own = lines[0]
+for fork in lines[1:]:
+    if not os.fork():
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)
+        own = fork
+        break
+for other in {*lines} - {own}:
+    try:
+        os.close(other)
+    except OSError:
+        pass  # closed before the fork
 for number in range(1000):
     try:
         os.mkdir(os.path.join(folder, f"start-{number}"))
@@ -44,7 +56,9 @@ behaviour = behaviours[min(number, len(behaviours) - 1)]
 started = os.path.join(folder, f"start-{number}")
 open(os.path.join(started, "unfinished"), "w").write(str(os.getpid()))
 os.rename(os.path.join(started, "unfinished"), os.path.join(started, "pid"))
-line = socket.socket(fileno=request["line"])
+line = socket.socket(fileno=own)
+if own != lines[0]:
+    line.send(b"\\n")
 plans = 0
 def trace(plan, note):
     return {"format": "grader/trace/v1", "scenario": plan["scenario"], "clock": plan["clock"], "clock_reason": "",
@@ -77,6 +91,14 @@ for command in line.makefile("r"):
     elif behaviour == "grows":
         grown = b"x" * (200 << 20)
         signal.pause()
+    elif behaviour == "wants to be alone":
+        try:
+            os.mkdir(os.path.join(folder, "busy"))
+            time.sleep(0.05)
+            os.rmdir(os.path.join(folder, "busy"))
+            said = json.dumps({"trace": trace(asked["plan"], "alone")}).encode()
+        except FileExistsError:
+            said = json.dumps({"trace": trace(asked["plan"], "not alone")}).encode()
     elif behaviour == "dies":
         os._exit(1)
     elif behaviour == "dies in its sentence":
@@ -186,12 +208,42 @@ def test_a_warm_worker_is_used_first_and_again(make: Callable[..., tuple[Recorde
 
 
 def test_every_warm_worker_is_used(make: Callable[..., tuple[Recorder, Stage]]) -> None:
-    """None is started and forgotten."""
-    recorder, stage = make("answers", workers=3)
-    recorder.warm_up(2)
+    """None is started and forgotten: one is started, and the others are forks of it."""
+    recorder, stage = make("rests", workers=3)
     recorder.warm_up(5)
-    recorder.record(jobs(*"abcdefgh"), nothing)
-    wait_for(lambda: len(stage.pids()) == 3)
+    traces = recorder.record(jobs(*"abcdefgh"), nothing)
+    assert {note(trace).partition(",")[0] for trace in traces} == {"worker 0", "worker 1", "worker 2"}
+    assert len(stage.pids()) == 3
+
+
+def test_the_end_of_a_worker_with_forks_is_not_held_against_their_plans(
+    make: Callable[..., tuple[Recorder, Stage]],
+) -> None:
+    """They may have ended with it. Each plan is tried twice after that, in a sandbox of its own."""
+    recorder, stage = make("dies", "dies", "dies", "answers", workers=2)
+    recorder.warm_up(2)
+    wait_for(lambda: len(stage.pids()) == 2)
+    assert [trace.harness_problem for trace in recorder.record(jobs("a", "b"), nothing)] == ["", ""]
+
+
+def test_what_begins_first_takes_longest(make: Callable[..., tuple[Recorder, Stage]]) -> None:
+    """So that no worker is alone with it at the end; with a single worker, the order is that of the exercises."""
+    lengths = {"a": 1, "b": 5, "c": 2, "d": 9, "e": 3}
+    long = [Job(name, replace(plan(name), duration_ns=length)) for name, length in lengths.items()]
+    steps: list[str] = []
+    assert [trace.scenario for trace in make("rests", workers=2)[0].record(long, steps.append)] == [*lengths]
+    assert {*steps[:2]} == {"b", "d"}
+    steps.clear()
+    make("answers")[0].record(long, steps.append)
+    assert steps == [*lengths]
+
+
+def test_recordings_on_the_wall_clock_are_made_one_at_a_time(make: Callable[..., tuple[Recorder, Stage]]) -> None:
+    """In real time they would disturb each other; in virtual time they do not."""
+    recorder, _ = make("wants to be alone", workers=3)
+    on_the_wall = [Job(name, plan(name, "wall")) for name in "abcdef"]
+    assert {note(trace) for trace in recorder.record(on_the_wall, nothing)} == {"alone"}
+    assert {note(trace) for trace in recorder.record(jobs(*"abcdef"), nothing)} == {"alone", "not alone"}
 
 
 def test_workers_outlive_the_call_that_started_them(make: Callable[..., tuple[Recorder, Stage]]) -> None:
@@ -327,7 +379,7 @@ def test_closing_ends_every_worker(make: Callable[..., tuple[Recorder, Stage]]) 
     wait_for(lambda: len(stage.pids()) == 3)
     recorder.close()
     recorder.close()
-    assert not any(map(alive, stage.pids()))
+    wait_for(lambda: not any(map(alive, stage.pids())))
     with pytest.raises(RuntimeError):
         recorder.record(jobs("alone"), nothing)
 

@@ -87,13 +87,14 @@ class StartedProcess:
         _end(self._placeholder)
 
 
-def starter_command(clock: str, runtime: PythonRuntime, host_folder: str) -> dict[str, Any]:
-    """Return the arguments of `execute` for a starter; see `Starter`."""
+def starter_command(clock: str, runtime: PythonRuntime, host_folder: str, users: int = 1) -> dict[str, Any]:
+    """Return the arguments of `execute` for a starter that so many processes use; see `Starter`."""
     nothing = StudentProcess(runtime, Path(host_folder), Path("/"), (), {"PYTHONHASHSEED": HASH_SEED}, ())
     return {
         "argv": [str(runtime.executable), "-s", "-u", "-B", "-X", "utf8", f"{host_folder}/{MODULE}"],
         "told": {
             "clock": clock,
+            "users": users,
             "python_paths": [str(path) for path in runtime.python_paths],
             "sandbox": start.__file__,
         },
