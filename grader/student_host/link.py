@@ -8,10 +8,12 @@ from __future__ import annotations
 import json
 import os
 import socket
-from typing import Any, BinaryIO
+from typing import Any
 
 from . import originals
 
+#: The most that is read at once.
+ANSWER_BYTES = 1 << 16
 _LOG_FORMAT_VARIABLE = "RCUTILS_CONSOLE_OUTPUT_FORMAT"
 
 
@@ -19,17 +21,16 @@ class Link:
     """The host's end of the connection."""
 
     _socket: socket.socket
-    _lines: BinaryIO
 
     def __init__(self) -> None:
         self._sending = originals.allocate_lock()
+        self._received = b""
         self._cut = False
 
     def open(self, descriptor: int) -> None:
         """Use the inherited socket with this number."""
         self._socket = socket.socket(fileno=descriptor)
         self._socket.settimeout(None)
-        self._lines = self._socket.makefile("rb")
 
     def send(self, report: dict[str, Any]) -> None:
         """Send one report; raises OSError if the grader is gone, which ends the process."""
@@ -45,7 +46,6 @@ class Link:
     def cut(self) -> None:
         """Close the connection in a forked process, which the grader does not know."""
         self._cut = True
-        self._lines.close()
         self._socket.close()
 
     def ask(self, report: dict[str, Any]) -> dict[str, Any]:
@@ -55,9 +55,12 @@ class Link:
 
     def next_answer(self) -> dict[str, Any]:
         """Wait for the grader's next answer; raises ConnectionError if the grader is gone."""
-        line = self._lines.readline()
-        if not line:
-            raise ConnectionError("the grader is gone")
+        while b"\n" not in self._received:
+            received = self._socket.recv(ANSWER_BYTES)
+            if not received:
+                raise ConnectionError("the grader is gone")
+            self._received += received
+        line, _, self._received = self._received.partition(b"\n")
         answer: dict[str, Any] = json.loads(line)
         return answer
 

@@ -10,8 +10,10 @@ import contextlib
 import functools
 import os
 import signal
+import sys
 import weakref
 from collections.abc import Callable
+from types import CodeType
 from typing import Any
 
 import rclpy.client
@@ -28,6 +30,7 @@ import rclpy.time_source
 import rclpy.utilities
 from rclpy.clock import Clock, ClockType, ROSClock
 from rclpy.event_handler import QoSPublisherEventType, QoSSubscriptionEventType
+from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.time import Time
 
@@ -38,7 +41,11 @@ from .scheduler import Scheduler
 
 #: After this many messages in a row, the next one waits until they have arrived, so that no queue overflows.
 MESSAGES_PER_FLUSH = 8
-KINDS = ("subscription", "guard_condition", "timer", "client", "service")
+#: The kinds of entities in a wait set, in the order of the counts that it is made with.
+GUARD = "guard_condition"
+KINDS = ("subscription", GUARD, "timer", "client", "service")
+#: The most places in the code that are remembered for their log records.
+CALLERS = 2000
 #: The signals at which rclpy shuts down its contexts, with the options that enable this.
 SHUTTING_DOWN = {
     signal.SIGINT: (_rclpy.SignalHandlerOptions.ALL, _rclpy.SignalHandlerOptions.SIGINT),
@@ -121,6 +128,8 @@ class RosClocks:
         return Time(nanoseconds=self._clock.now_ns, clock_type=ClockType.ROS_TIME)
 
 
+#: Checks whether a task has ended, without counting as a look, which would let time pass.
+_DONE = rclpy.task.Future.done
 _SYSTEM_CLOCK = _rclpy.Clock(_rclpy.ClockType.SYSTEM_TIME)
 
 
@@ -193,7 +202,44 @@ def _count_periods(clock: VirtualClock, timer: Any) -> None:
         setattr(owner, name, counting(getattr(owner, name)))
 
 
-def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> type:
+class WakeUps:
+    """Tells which executors were woken since they last looked for work.
+
+    An executor wakes itself after each callback. The wait after that returns at once, and the executor builds the same
+    wait set again, although it has already seen everything that it was woken for.
+    """
+
+    def __init__(self) -> None:
+        self._executors: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._woken: weakref.WeakSet[Any] = weakref.WeakSet()
+
+    def install(self) -> None:
+        """Notice when guard conditions are triggered, and when an executor begins to look for work."""
+        trigger, look = GuardCondition.trigger, rclpy.executors.Executor._wait_for_ready_callbacks
+
+        @functools.wraps(trigger)
+        def triggered(guard: Any) -> None:
+            self._woken.add(guard.handle)
+            trigger(guard)
+
+        @functools.wraps(look)
+        def looking(executor: Any, *args: Any, **kwargs: Any) -> Any:
+            self._executors.add(executor._guard.handle)
+            # A coroutine may wait for one that is resumed after it, and then needs the wait that returns at once.
+            if all(_DONE(task) for task, *_ in executor._tasks):
+                self._woken.discard(executor._guard.handle)
+            return look(executor, *args, **kwargs)
+
+        GuardCondition.trigger = triggered
+        rclpy.executors.Executor._wait_for_ready_callbacks = looking
+
+    def news(self, ready: list[int], guards: list[Any]) -> list[int]:
+        """Return which guard conditions are ready, by the addresses of their handles, for something not seen yet."""
+        seen = {g.pointer for g in guards if g in self._executors and g not in self._woken}
+        return [pointer for pointer in ready if pointer not in seen]
+
+
+def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wake_ups: WakeUps) -> type:
     """Create the class that replaces rclpy's wait set."""
 
     class VirtualWaitSet(REAL_WAIT_SET):  # type: ignore[misc]
@@ -201,10 +247,12 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
 
         def __init__(self, *counts: Any) -> None:
             super().__init__(*counts)
+            self._kinds = [kind for kind, count in zip(KINDS, counts, strict=False) if count and kind != GUARD]
             self._events = counts[5]
             self._capacity = sum(counts[:6])
             self._added: list[tuple[Callable[..., Any], Any]] = []
             self._timers: list[Any] = []
+            self._guards: list[Any] = []
             self._receivers: list[int] = []
             self._included = ledger.included
 
@@ -212,6 +260,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
             super().clear_entities()
             self._added.clear()
             self._timers.clear()
+            self._guards.clear()
             self._receivers.clear()
 
         def _add(self, add: Callable[..., Any], entity: Any) -> Any:
@@ -235,6 +284,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
             return self._add(REAL_WAIT_SET.add_timer, entity)
 
         def add_guard_condition(self, entity: Any) -> Any:
+            self._guards.append(entity)
             return self._add(REAL_WAIT_SET.add_guard_condition, entity)
 
         def add_event(self, entity: Any) -> Any:
@@ -251,10 +301,12 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
             known = ledger.handles()
             return [p for p in self._receivers if p in known and ledger.kept(known[p])]
 
-        def _ready(self) -> bool:
+        def _ready(self, *, guards: list[int]) -> bool:
+            """Return whether anything is ready; of guard conditions, whether any of these is."""
             ready = REAL_WAIT_SET.get_ready_entities
             return (
-                any(ready(self, kind) for kind in KINDS)
+                bool(guards)
+                or any(ready(self, kind) for kind in self._kinds)
                 or bool(self._kept())
                 or any(self.is_ready("event", number) for number in range(self._events))
             )
@@ -273,9 +325,13 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
             deadline_ns = None if timeout_ns < 0 else clock.end_of(timeout_ns)
             while True:
                 super().wait(0)
-                if self._ready():
+                guards = REAL_WAIT_SET.get_ready_entities(self, GUARD)
+                news = wake_ups.news(guards, self._guards) if guards and timeout_ns else guards
+                if self._ready(guards=news):
                     scheduler.progress()
                     return
+                if guards:
+                    scheduler.progress()
                 if not self._expects():
                     if deadline_ns is not None and clock.now_ns >= deadline_ns:
                         clock.idle_look(50)
@@ -298,7 +354,38 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
 
 def install_wait_sets(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> None:
     """Replace rclpy's wait set."""
-    _rclpy.WaitSet = wait_set_type(scheduler, clock, ledger)
+    wake_ups = WakeUps()
+    wake_ups.install()
+    _rclpy.WaitSet = wait_set_type(scheduler, clock, ledger, wake_ups)
+
+
+def install_callers() -> None:
+    """Remember, for each place in the code, what rclpy finds out about the caller of a log record."""
+    loggers = rclpy.impl.rcutils_logger
+    look = loggers.CallerId.__new__
+    loggers_own: dict[int, CodeType] = {}
+    known: dict[tuple[int, int, int], tuple[CodeType, Any]] = {}  # a code's id is its own as long as it is kept
+
+    def caller(cls: type[Any], given: Any = None) -> Any:
+        if given is not None:
+            return look(cls, given)
+        log: Any = sys._getframe(1)
+        frame = log
+        while id(frame.f_code) in loggers_own:
+            frame = frame.f_back
+        place = id(frame.f_code), frame.f_lasti, len(loggers._internal_callers)
+        if place in known:
+            return known[place][1]
+        outside = loggers._find_caller(log)
+        while log is not outside:
+            loggers_own[id(log.f_code)] = log.f_code
+            log = log.f_back
+        found = look(cls, outside)
+        if len(known) < CALLERS:
+            known[id(outside.f_code), outside.f_lasti, len(loggers._internal_callers)] = outside.f_code, found
+        return found
+
+    loggers.CallerId.__new__ = caller
 
 
 def replace_log(wrap: Callable[[Callable[..., Any]], Callable[..., Any]]) -> None:

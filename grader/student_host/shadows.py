@@ -49,6 +49,7 @@ ROS_PARTS = (
     "rclpy.duration",
     "rclpy.event_handler",
     "rclpy.executors",
+    "rclpy.guard_condition",
     "rclpy.impl.implementation_singleton",
     "rclpy.impl.rcutils_logger",
     "rclpy.logging",

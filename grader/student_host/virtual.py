@@ -72,6 +72,7 @@ class VirtualTime:
         )
         ros.install_looks(self.clock, self._ledger, self._settle)
         ros.install_own_signals(self._await_shutdown)
+        ros.install_callers()
         times.install_wall_time(self.clock)
         self._notice_output(ros)
 

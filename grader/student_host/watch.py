@@ -30,6 +30,11 @@ MAKING = ("compile", "exec", "sys._", "object.__", "function.__new__", "code.__n
 CALLERS = 12
 #: The most different events that are reported.
 MOST = 20
+#: The most names of events, and of files, of which is remembered what they are.
+NAMES = 2000
+#: Where code belongs to: to the student, to a module of the standard library that generates code or to another one, or
+#: to nobody whose events count.
+STUDENT, MAKER, LIBRARY, ELSEWHERE = "student", "maker", "library", "elsewhere"
 
 
 class Watch:
@@ -46,6 +51,8 @@ class Watch:
         self._library = os.path.dirname(os.__file__)
         self._packages = os.path.join(self._library, "site-packages")
         self._makers = frozenset(os.path.join(self._library, maker) for maker in MAKERS)
+        self._matters: dict[str, bool] = {}
+        self._places: dict[str, str] = {}
         self._told: set[str] = set()
         self._inside = False
 
@@ -54,11 +61,22 @@ class Watch:
         sys.addaudithook(self._hear)
 
     def _hear(self, event: str, arguments: tuple[Any, ...]) -> None:
-        if self._inside or event in self._told or not self._matters(event, arguments):
+        # Looking at a frame raises audit events as well, so most calls end here.
+        if self._inside:
+            return
+        matters = self._matters.get(event)
+        if matters is None:
+            matters = _remembered(self._matters, event, event in LOOKS or event.startswith(EVENTS))
+        if not matters or (event in LOOKS and not _looks_around(arguments)):
             return
         self._inside = True
         try:
-            if len(self._told) < MOST and self._by_student(sys._getframe(1), event) and self._link.is_free():
+            if (
+                event not in self._told
+                and len(self._told) < MOST
+                and self._by_student(sys._getframe(1), event)
+                and self._link.is_free()
+            ):
                 self._told.add(event)
                 self._link.send({"kind": "reached", "what": event})
         except Exception:  # noqa: S110 - an error here must not change what the program does
@@ -66,24 +84,38 @@ class Watch:
         finally:
             self._inside = False
 
-    def _matters(self, event: str, arguments: tuple[Any, ...]) -> bool:
-        if event in LOOKS:
-            place = arguments[0] if arguments else None
-            return type(place) is str and (place == "/" or place.startswith(FOLDERS))
-        return event.startswith(EVENTS)
-
     def _by_student(self, frame: FrameType | None, event: str) -> bool:
         for _ in range(CALLERS):
             if frame is None:
                 return False
             file = frame.f_code.co_filename
-            if file.startswith(self._root) or (file.startswith("<") and not file.startswith("<frozen")):
+            place = self._places.get(file) or _remembered(self._places, file, self._place(file))
+            if place == STUDENT:
                 return True
-            if not file.startswith(("<frozen", self._library)) or file.startswith(self._packages):
-                return False
-            if file.startswith("<frozen importlib"):
-                return False  # the event comes from importing a module
-            if file in self._makers and event.startswith(MAKING):
+            if place == ELSEWHERE or (place == MAKER and event.startswith(MAKING)):
                 return False
             frame = frame.f_back
         return False
+
+    def _place(self, file: str) -> str:
+        """Return where the code of a file belongs to."""
+        if file.startswith(self._root) or (file.startswith("<") and not file.startswith("<frozen")):
+            return STUDENT
+        if not file.startswith(("<frozen", self._library)) or file.startswith(self._packages):
+            return ELSEWHERE
+        if file.startswith("<frozen importlib"):
+            return ELSEWHERE  # the event comes from importing a module
+        return MAKER if file in self._makers else LIBRARY
+
+
+def _looks_around(arguments: tuple[Any, ...]) -> bool:
+    """Return whether a file or folder that is opened tells about processes and the machine."""
+    place = arguments[0] if arguments else None
+    return type(place) is str and (place == "/" or place.startswith(FOLDERS))
+
+
+def _remembered(known: dict[str, Any], name: str, found: Any) -> Any:
+    """Return what was found of a name, and keep it unless the program invents names without end."""
+    if len(known) < NAMES:
+        known[name] = found
+    return found

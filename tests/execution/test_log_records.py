@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 
@@ -75,3 +76,40 @@ def test_no_variable_and_no_option_tells_the_token(run: Callable[..., Trace], cl
     assert "RCUTILS_COLORIZED_OUTPUT" in text
     assert "RCUTILS_CONSOLE_OUTPUT_FORMAT" not in text
     assert "/grader_host/host/" in text
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_each_record_names_its_own_place(studio: RecordingSession, tmp_path: Path, clock: str) -> None:
+    """Also of functions that are the same in two files, in a loop, and of one that rclpy is told to leave out."""
+    tmp_path.chmod(0o755)
+    says = "def say(logger, text):\n    logger.info(text)\n"
+    program = """
+        import rclpy
+        import rclpy.impl.rcutils_logger as loggers
+        from rclpy.node import Node
+        import b, c
+        def own(text):
+            logger.info(text)
+        rclpy.init()
+        logger = Node("node").get_logger()
+        for number in range(2):
+            b.say(logger, f"b {number}")
+            c.say(logger, f"c {number}")
+            logger.info(f"a {number}"); logger.warning(f"a {number}")
+            own(f"own {number}")
+        loggers._internal_callers.append(b.__file__)
+        b.say(logger, "left out")
+    """
+    trace = record(studio, tmp_path / "s", textwrap.dedent(program), says, says, clock=clock, duration_ns=SECOND_NS)
+    found = [(r.severity, r.text, r.file, r.line) for r in trace.records() if r.process == "a.py"]
+    each = [
+        [
+            ("INFO", f"b {number}", "b.py", 2),
+            ("INFO", f"c {number}", "c.py", 2),
+            ("INFO", f"a {number}", "a.py", 13),
+            ("WARN", f"a {number}", "a.py", 13),
+            ("INFO", f"own {number}", "a.py", 7),
+        ]
+        for number in range(2)
+    ]
+    assert found == [*each[0], *each[1], ("INFO", "left out", "a.py", 16)]

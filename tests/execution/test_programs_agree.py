@@ -165,6 +165,62 @@ PROGRAMS = {
         node.create_timer(0.5, lambda: (say("calling"), say(client.call(Trigger.Request()).message)))
         rclpy.spin(node)
     """,
+    "coroutines_that_wait_for_each_other": """
+        first, second = Future(), Future()
+        async def wait_for(future, then):
+            say(await future)
+            if then is not None:
+                then.set_result("second")
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.create_task(wait_for, first, second)
+        executor.create_task(wait_for, second, None)  # asked before the other one, which it waits for
+        node.create_timer(0.5, lambda: first.set_result("first") if not first.done() else say("later"))
+        executor.spin()
+    """,
+    "coroutine_that_ends_a_spin": """
+        first, ended = Future(), Future()
+        async def wait():
+            ended.set_result(await first)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.create_task(wait)
+        node.create_timer(0.7, lambda: first.done() or first.set_result("first"))
+        executor.spin_until_future_complete(ended)
+        say(ended.result())
+        executor.spin_once(timeout_sec=0)
+        say("end")
+    """,
+    "work_from_another_thread": """
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        other = Node("second")
+        other.create_timer(0.4, lambda: say("timer of a node that was added"))
+        def work():
+            time.sleep(0.3)
+            executor.create_task(say, "task")
+            time.sleep(0.3)
+            executor.add_node(other)
+            time.sleep(1.4)
+            executor.remove_node(other)
+            say("removed")
+        threading.Thread(target=work, daemon=True).start()
+        executor.spin()
+    """,
+    "work_from_a_callback": """
+        executor, made = SingleThreadedExecutor(), []
+        executor.add_node(node)
+        condition = node.create_guard_condition(lambda: say("condition"))
+        def tick():
+            say("tick", len(made))
+            condition.trigger()
+            executor.create_task(say, "task")
+            made.append(node.create_timer(0.1, lambda: (say("once"), made[-1].cancel())))
+        node.create_timer(0.6, tick)
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=0.21)
+            say("spun")
+    """,
     "second_context": """
         context, ticks = Context(), 0
         rclpy.init(context=context)
