@@ -62,7 +62,7 @@ class Patience:
         """Whether any wait timed out."""
         return self._losses > 0
 
-    def wait(self, condition: Callable[[], bool], *, pause_s: float = 0.0003) -> bool:
+    def wait(self, condition: Callable[[], bool], *, pause_s: float = 0.00015) -> bool:
         """Wait until a condition holds; return whether it did before the time-out."""
         came = wait_until(condition, self.wait_s, pause_s=pause_s)
         if not came:

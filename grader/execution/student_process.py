@@ -6,7 +6,7 @@ import contextlib
 import json
 import os
 import re
-import selectors
+import select
 import signal
 import socket
 import subprocess
@@ -41,6 +41,8 @@ REPORTS_AT_ONCE, READS_AT_ONCE = 1000, 256
 NOTES, NOTE_CHARACTERS = 100, 500
 #: The most audit events that the host reports of its program, and the maximum length of their names.
 REACHED, NAME_CHARACTERS = 20, 60
+#: How much one read takes at most, and milliseconds after which a wait for a report looks at the time.
+READ_BYTES, LOOK_MS = 1 << 16, 1000
 #: How much of the end of standard error is kept to find out why a process ended.
 LAST_BYTES = 16_000
 #: Longer lines and log messages are cut.
@@ -124,7 +126,8 @@ class NodeProcess:
     _kept: dict[str, int] = field(default_factory=lambda: {"stdout": 0, "stderr": 0})
     _lines_kept: int = 0
     _last: bytes = b""
-    _selector: selectors.BaseSelector = field(default_factory=selectors.DefaultSelector)
+    _poll: select.poll = field(default_factory=select.poll)
+    _sources: dict[int, str] = field(default_factory=dict)  # descriptor -> stream; empty for the socket
 
     @property
     def roots(self) -> tuple[int, ...]:
@@ -160,12 +163,17 @@ class NodeProcess:
     ) -> NodeProcess:
         """Watch a process that has just been started."""
         student = cls(name, root, process, line, limits)
+        # First, because the kernel looks in this order: where there is a report, the output before it is found as well.
+        student._register(line.fileno(), "")
         for stream, source in (("stdout", process.stdout), ("stderr", process.stderr)):
             if source is not None:
                 os.set_blocking(source.fileno(), False)
-                student._selector.register(source, selectors.EVENT_READ, stream)
-        student._selector.register(line, selectors.EVENT_READ, "line")
+                student._register(source.fileno(), stream)
         return student
+
+    def _register(self, descriptor: int, stream: str) -> None:
+        self._poll.register(descriptor, select.POLLIN)
+        self._sources[descriptor] = stream
 
     def tell(self, answer: Mapping[str, Any]) -> None:
         """Send an answer. A dead process is noticed at its next report."""
@@ -211,23 +219,25 @@ class NodeProcess:
 
     def _next_report(self) -> dict[str, Any] | None:
         """Wait for the next report and read output meanwhile; None if the process has ended or timed out."""
+        if b"\n" in self._pending:
+            self.drain()
+            return self._parsed_report()
         deadline = time.monotonic() + SILENCE_S
         while b"\n" not in self._pending:
-            ready = self._selector.select(timeout=1.0)
-            for key, _ in ready:
-                if key.data != "line":
-                    self._read(key.data)
+            for descriptor, _ in self._poll.poll(LOOK_MS):
+                stream = self._sources[descriptor]
+                if stream:
+                    self._read_all(stream)
                 elif not self._receive():
                     return None
             if time.monotonic() > deadline or len(self._pending) > REPORT_BYTES:
                 return None
-        self.drain()
         return self._parsed_report()
 
     def _parsed_report(self) -> dict[str, Any] | None:
         line, _, self._pending = self._pending.partition(b"\n")
         try:
-            data = json.loads(line)
+            data = json.loads(line.decode())
         except (ValueError, RecursionError):
             return None
         return data if isinstance(data, dict) else None
@@ -236,7 +246,7 @@ class NodeProcess:
         """Return the reports that have arrived, without waiting; the last one is None if the process has ended."""
         gone = False
         for _ in range(READS_AT_ONCE):
-            if gone or not any(key.data == "line" for key, _ in self._selector.select(timeout=0)):
+            if gone or not any(not self._sources[descriptor] for descriptor, _ in self._poll.poll(0)):
                 break
             gone = not self._receive() or len(self._pending) > REPORT_BYTES
         if self._pending.count(b"\n") > REPORTS_AT_ONCE:
@@ -255,16 +265,17 @@ class NodeProcess:
         return bool(received)
 
     def _read(self, stream: str) -> bool:
-        """Read from a stream without blocking; return whether there was any output."""
+        """Read from a stream without blocking; return whether there may be more output."""
         source = self.process.stdout if stream == "stdout" else self.process.stderr
         if source is None or source.closed:
             return False
         try:
-            found = os.read(source.fileno(), 1 << 16)
+            found = os.read(source.fileno(), READ_BYTES)
         except BlockingIOError:
             return False
         if not found:
-            self._selector.unregister(source)
+            self._poll.unregister(source.fileno())
+            del self._sources[source.fileno()]
             source.close()
             return False
         most = self.limits.output_bytes
@@ -274,14 +285,17 @@ class NodeProcess:
         self._kept[stream] += len(found)
         if stream == "stderr":
             self._last = (self._last + found)[-LAST_BYTES:]
-        return True
+        return len(found) == READ_BYTES
 
     def drain(self, reads: int = READS_AT_ONCE) -> None:
         """Read the output so far, with at most `reads` reads from each stream."""
         for stream in ("stdout", "stderr"):
-            for _ in range(reads):
-                if not self._read(stream):
-                    break
+            self._read_all(stream, reads)
+
+    def _read_all(self, stream: str, reads: int = READS_AT_ONCE) -> None:
+        for _ in range(reads):
+            if not self._read(stream):
+                break
 
     def output(self, t_ns: int, *, final: bool = False) -> list[LogRecord | OutputLine]:
         """Return the complete records and lines since the last call; `final` adds an unfinished line."""
@@ -382,7 +396,6 @@ class NodeProcess:
 
     def close(self) -> None:
         """Close the file descriptors of a process that has ended."""
-        self._selector.close()
         self.line.close()
         for source in (self.process.stdout, self.process.stderr):
             if source is not None:

@@ -214,7 +214,7 @@ class ExecutedWorker(Worker):
             "runtime": to_json(runtime),
             "starter": starter_command(clock, runtime, host, users=len(lines)) if isolation.can_enter else None,
         }
-        argv = [str(runtime.executable), "-s", "-u", "-m", MODULE.decode(), json.dumps(request)]
+        argv = [str(runtime.executable), "-s", "-S", "-u", "-m", MODULE.decode(), json.dumps(request)]
         environment, view = _environment(runtime, scratch), worker_view(runtime, scratch)
         command = isolation.worker_command(argv, environment, numbers, view)
         self._process = subprocess.Popen(

@@ -22,6 +22,7 @@ from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_processes
 from .packages import packages_of
+from .quick_imports import import_type_support_loader
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
@@ -46,6 +47,7 @@ class Host:
     def install_ros(self) -> None:
         """Import rclpy and install the clock in it, once."""
         if not self.has_ros:
+            import_type_support_loader()
             self.time.install_ros()
         self.has_ros = True
 
@@ -253,6 +255,9 @@ INTERFACES = {
     "std_srvs.srv": (),
 }
 
+#: The interface packages of the services that every node has.
+OF_EVERY_NODE = ("rcl_interfaces.msg", "rcl_interfaces.srv", "type_description_interfaces.srv")
+
 
 def preload(path: str) -> None:
     """Import the common interface packages that a file names, before time starts.
@@ -274,8 +279,9 @@ def _named(path: str) -> list[str]:
 
 
 def warm_up() -> None:
-    """Import the common interface packages and load their type supports, for all forks of this process."""
-    for name in (*INTERFACES, "rcl_interfaces.msg", "rcl_interfaces.srv"):
+    """Import what all forks of this process need: interface packages, type supports, numpy's randomness."""
+    importlib.import_module("numpy.random")  # seeded in each fork
+    for name in (*INTERFACES, *OF_EVERY_NODE):
         for interface in list(vars(importlib.import_module(name)).values()):
             if hasattr(interface, "__import_type_support__"):
                 interface.__import_type_support__()

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import inspect
 import os
 import signal
 import sys
 import weakref
 from collections.abc import Callable
-from types import CodeType
+from types import CodeType, SimpleNamespace
 from typing import Any
 
 import rclpy.client
@@ -99,9 +100,14 @@ class RosClocks:
 
     def move(self) -> None:
         """Set every clock to the virtual time, so that timers that are due become ready."""
-        time = self._time()
+        time = _RclTime(self._clock.now_ns, ClockType.ROS_TIME)
         for made in list(self._made):
-            _set(made, time)
+            handle = made.handle
+            try:
+                with handle:
+                    handle.set_ros_time_override(time)
+            except _rclpy.InvalidHandle:
+                continue
 
     def simulates(self, clock: Clock) -> bool:
         """Return whether messages on /clock set a clock."""
@@ -130,6 +136,7 @@ class RosClocks:
 
 #: Checks whether a task has ended, without counting as a look, which would let time pass.
 _DONE = rclpy.task.Future.done
+_RclTime = type(Time()._time_handle)
 _SYSTEM_CLOCK = _rclpy.Clock(_rclpy.ClockType.SYSTEM_TIME)
 
 
@@ -360,8 +367,14 @@ def install_wait_sets(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger)
 
 
 def install_callers() -> None:
-    """Remember, for each place in the code, what rclpy finds out about the caller of a log record."""
+    """Remember, for each place in the code, what rclpy finds out about the caller of a log record.
+
+    Of a frame, rclpy needs the file alone, but asks for lines of the source as well, for which `inspect` searches
+    through all modules.
+    """
     loggers = rclpy.impl.rcutils_logger
+    files_only = functools.partial(inspect.getframeinfo, context=0)
+    loggers.inspect = SimpleNamespace(**{**vars(inspect), "getframeinfo": files_only})
     look = loggers.CallerId.__new__
     loggers_own: dict[int, CodeType] = {}
     known: dict[tuple[int, int, int], tuple[CodeType, Any]] = {}  # a code's id is its own as long as it is kept

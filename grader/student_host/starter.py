@@ -14,7 +14,6 @@ import contextlib
 import gc
 import importlib
 import importlib.util
-import inspect
 import json
 import os
 import select
@@ -52,7 +51,6 @@ def main() -> None:
     if host is not None:
         host.install_ros()
         program.warm_up()
-        inspect.getmodule(sys._getframe())  # fills a cache that the first log record of each node needs
     gc.collect()
     gc.freeze()
     gc.enable()

@@ -34,7 +34,7 @@ PYTHON = {
         "_wait_for_ready_callbacks",
     ),
     "rclpy.guard_condition:GuardCondition": ("handle", "trigger"),
-    "rclpy.impl.rcutils_logger": ("_find_caller", "_internal_callers"),
+    "rclpy.impl.rcutils_logger": ("inspect", "_find_caller", "_internal_callers"),
     "rclpy.impl.rcutils_logger:Throttle": ("params",),
     "rclpy.impl.rcutils_logger:CallerId": ("__new__",),
     "rclpy.logging": ("initialize",),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import site
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -70,13 +71,18 @@ def runtime_environment(runtime: PythonRuntime) -> dict[str, str]:
 
 
 def worker_environment(runtime: PythonRuntime, home: Path) -> dict[str, str]:
-    """Return the environment of a trusted worker, with ROS and this package; ROS writes its logs to `home`."""
+    """Return the environment of a trusted worker, with ROS and this package; ROS writes its logs to `home`.
+
+    It names the folders of installed packages, because workers start with `-S`: what `site` does takes as long as
+    starting Python.
+    """
     environment = runtime_environment(runtime)
     python_paths = [environment["PYTHONPATH"]] if "PYTHONPATH" in environment else []
+    installed = [path for path in site.getsitepackages() if Path(path).is_dir()]
     return {
         **environment,
         **quick_discovery(PACKAGE / "student_host", runtime),
-        "PYTHONPATH": os.pathsep.join([*python_paths, str(PACKAGE.parent)]),
+        "PYTHONPATH": os.pathsep.join([*python_paths, str(PACKAGE.parent), *installed]),
         "HOME": str(home),
         "ROS_LOG_DIR": str(home),
     }

@@ -1,0 +1,40 @@
+"""Loading type supports imports no generator, and hides nothing of it from a program that wants it."""
+
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs rclpy")
+
+
+def said(program: str) -> str:
+    """Return what a program says in a new process, without the variables of this one that start others."""
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def test_a_message_can_be_used_without_the_generator() -> None:
+    """Neither of the generator's parsers is imported."""
+    program = """
+        import sys
+        from grader.student_host.quick_imports import import_type_support_loader
+        import_type_support_loader()
+        from std_msgs.msg import Float32
+        Float32.__import_type_support__()
+        print(Float32._CREATE_ROS_MESSAGE is not None, {"lark", "em"} & {*sys.modules})
+    """
+    assert said(program) == "True set()"
+
+
+def test_the_generator_can_still_be_imported() -> None:
+    """A program may want to generate classes itself."""
+    program = """
+        from grader.student_host.quick_imports import import_type_support_loader
+        import_type_support_loader()
+        import_type_support_loader()
+        from rosidl_generator_py.generate_py_impl import generate_py
+        print(callable(generate_py))
+    """
+    assert said(program) == "True"
