@@ -1,8 +1,12 @@
 """Judges the whole set of test submissions on each clock, with and without load, and prints where the outcomes differ.
 
 Usage: python benchmarks/agreement.py RESULTS [--jobs N] [--only TEXT] MODE...
-       MODE is virtual, wall, auto or auto-load (two busy loops per core); RESULTS is a JSON file that is added to, so
-       that a run that was stopped goes on. Without a MODE only the table of what RESULTS holds is printed.
+       MODE is virtual, wall, auto, auto-load (two busy loops per core), or auto-executed (every student's process is
+       executed, none is forked from a starter); RESULTS is a JSON file that is added to, so that a run that was stopped
+       goes on. Without a MODE only the table of what RESULTS holds is printed.
+
+The reports, without their duration, are kept in the folder RESULTS.reports, by mode. If there are some of auto and of
+auto-executed, the table also says which differ; `diff -r` shows how. The exit code is 1 if an outcome differs.
 """
 
 from __future__ import annotations
@@ -11,23 +15,33 @@ import argparse
 import collections
 import json
 import multiprocessing
+import os
+import sys
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tests" / "execution"))
+
+from executed import executing
+from killing import kind_of
 from ruamel.yaml import YAML
 
 from grader.app.grade import grade_in
 from grader.app.request import GradeRequest
 from grader.core.errors import GraderError
 from grader.execution.recording_session import RecordingSession, open_session
+from grader.execution.usage import families
 from grader.reporting.delivery import write_whole
+from grader.reporting.json_report import dumps
 
-SUBMISSIONS = Path(__file__).resolve().parent.parent / "tests" / "submissions"
-MODES = ("virtual", "wall", "auto", "auto-load")
+SUBMISSIONS = ROOT / "tests" / "submissions"
+FORKED, EXECUTED = "auto", "auto-executed"
+MODES = ("virtual", "wall", FORKED, "auto-load", EXECUTED)
 Results = dict[str, dict[str, Any]]
 
 
@@ -54,13 +68,18 @@ def print_nothing(step: str) -> None:
     """Hear which step begins, and say nothing."""
 
 
-def judged(session: RecordingSession, folder: str, exercises: tuple[str, ...], how: GradeRequest) -> dict[str, Any]:
-    """Return what one folder was given: outcomes other than `met`, and why it went to the wall clock."""
+def judged(
+    session: RecordingSession, folder: str, exercises: tuple[str, ...], how: GradeRequest, reports: Path
+) -> dict[str, Any]:
+    """Keep the report of one folder, and return outcomes other than `met`, and why it went to the wall clock."""
     request = replace(how, submission=str(SUBMISSIONS / folder), exercises=exercises)
     try:
         report = grade_in(session, request, print_nothing)
     except GraderError as fault:
         return {"outcomes": {"error": fault.message}, "wall": []}
+    kept = reports / f"{folder}.json"
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    kept.write_text(dumps(replace(report, duration_s=0.0)), encoding="utf-8")
     verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
     return {
         "outcomes": {v.id: v.outcome.value for v in verdicts if v.outcome.value != "met"},
@@ -77,22 +96,46 @@ def run(  # noqa: PLR0913  one parameter a choice
     path: Path,
     *,
     jobs: int,
-    load: bool = False,
 ) -> None:
     """Grade every folder that has no result under a mode, and write each result when it is there."""
     left = [folder for folder in expected if folder not in results.setdefault(mode, {})]
-    loops = 2 * multiprocessing.cpu_count() if load else 0
-    with busy(loops), open_session(how.isolation, jobs) as session, ThreadPoolExecutor(jobs) as pool:
-        futures = {pool.submit(judged, session, f, tuple(expected[f]["graded"]), how): f for f in left}
+    loops = 2 * multiprocessing.cpu_count() if mode.endswith("-load") else 0
+    with (
+        busy(loops),
+        open_session(how.isolation, jobs, warm=mode != EXECUTED) as opened,
+        session_of(mode, opened, jobs) as session,
+        ThreadPoolExecutor(jobs) as pool,
+    ):
+        futures = {
+            pool.submit(judged, session, f, tuple(expected[f]["graded"]), how, reports_of(path, mode)): f for f in left
+        }
+        forked = False
         for number, future in enumerate(as_completed(futures), 1):
             results[mode][futures[future]] = future.result()
             write_whole(path, json.dumps(results, indent=1).encode())  # a run that is killed here loses nothing
             print(f"{mode} {number}/{len(left)} {futures[future]}", flush=True)
+            forked = forked or bool(starters())
+        assert forked == session.isolation.can_enter or not left, "processes were started in the other way"
+
+
+def session_of(mode: str, opened: RecordingSession, jobs: int) -> AbstractContextManager[RecordingSession]:
+    """Return the session that a mode records in."""
+    return executing(opened, jobs) if mode == EXECUTED else nullcontext(opened)
+
+
+def starters() -> list[int]:
+    """Return the starters below this process."""
+    return [pid for pid in families([os.getpid()])[os.getpid()] if kind_of(pid, os.getpid()) == "starter"]
+
+
+def reports_of(path: Path, mode: str) -> Path:
+    """Return the folder with the reports of a mode."""
+    return path.with_suffix(".reports") / mode
 
 
 def table(expected: Mapping[str, Any], results: Results) -> None:
     """Print how many folders of each kind have the expected outcomes under each mode, and every one that has not."""
-    print(f"{'mode':10} {'kind':10} {'folders':>8} {'as expected':>12} {'on the wall clock':>18}")
+    print(f"{'mode':14} {'kind':10} {'folders':>8} {'as expected':>12} {'on the wall clock':>18}")
     for mode, found in results.items():
         counts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
         for folder, result in found.items():
@@ -101,7 +144,7 @@ def table(expected: Mapping[str, Any], results: Results) -> None:
             counts[kind]["same"] += result["outcomes"] == expected[folder]["expected"]
             counts[kind]["wall"] += bool(result["wall"])
         for kind, count in sorted(counts.items()):
-            print(f"{mode:10} {kind:10} {count['folders']:8} {count['same']:12} {count['wall']:18}")
+            print(f"{mode:14} {kind:10} {count['folders']:8} {count['same']:12} {count['wall']:18}")
     for mode, found in results.items():
         for folder, result in sorted(found.items()):
             if result["outcomes"] != expected[folder]["expected"]:
@@ -110,13 +153,30 @@ def table(expected: Mapping[str, Any], results: Results) -> None:
                     print(f"    {criterion}: {reason}")
 
 
+def ways_of_starting(results: Results, path: Path) -> int:
+    """Print which folders were given something else after a fork than after an execution; return 1 for an outcome."""
+    forked, executed = results.get(FORKED, {}), results.get(EXECUTED, {})
+    both = sorted({*forked} & {*executed})
+    if not both:
+        return 0
+    kept = {folder: [reports_of(path, mode) / f"{folder}.json" for mode in (FORKED, EXECUTED)] for folder in both}
+    texts = {folder: [file.read_bytes() if file.exists() else b"" for file in files] for folder, files in kept.items()}
+    others = [folder for folder in both if forked[folder]["outcomes"] != executed[folder]["outcomes"]]
+    words = [folder for folder in both if texts[folder][0] != texts[folder][1]]
+    print(f"\n{FORKED} and {EXECUTED}: {len(both)} folders, {len(others)} with other outcomes", end="")
+    print(f", {len(words)} with another report")
+    for folder in words:
+        print(f"  {folder}" + (": another outcome" if folder in others else ""))
+    return 1 if others else 0
+
+
 def what_is_known(path: Path) -> tuple[dict[str, Any], Results]:
     """Return what every folder should be given, and the results so far."""
     expected = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
     return expected, json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
-def main() -> None:
+def main() -> int:
     """Run the modes asked for and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("results", type=Path)
@@ -129,11 +189,11 @@ def main() -> None:
     expected, results = what_is_known(arguments.results)
     chosen = {folder: entry for folder, entry in expected.items() if arguments.only in folder}
     for mode in arguments.modes:
-        clock, _, load = mode.partition("-")
-        how = GradeRequest("", clock=clock)
-        run(mode, how, chosen, results, arguments.results, jobs=arguments.jobs, load=bool(load))
+        how = GradeRequest("", clock=mode.partition("-")[0])
+        run(mode, how, chosen, results, arguments.results, jobs=arguments.jobs)
     table(expected, results)
+    return ways_of_starting(results, arguments.results)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
