@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import platform
 import signal
 import time
 from collections.abc import Callable
@@ -12,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hostile import hostile, record
+from executed import executing
+from hostile import hostile, record, staging
 from sandboxes import DOMAIN, Sandbox, finish, said, sandbox_or_skip
 
 from grader.core.trace import FaultKind, Trace
@@ -28,7 +30,11 @@ S = 1_000_000_000
 
 #: What a student's process can find out about its surroundings.
 INSPECT = """
-import ctypes, json, os, resource, socket, sys
+import ctypes, json, os, resource, signal, socket, sys
+system = ctypes.CDLL(None)
+def option(number):
+    value = ctypes.c_int()
+    return system.prctl(number, ctypes.byref(value)), value.value
 status = {name: text.strip() for name, _, text in (line.partition(":") for line in open("/proc/self/status"))}
 names = [name for name in dir(resource) if name.startswith("RLIMIT_")]
 mounts = [line.split() for line in open("/proc/self/mountinfo")]
@@ -38,10 +44,11 @@ for name in os.listdir("/proc/self/fd"):
         targets[int(name)] = os.readlink(f"/proc/self/fd/{name}").split(":")[0]
     except OSError:
         pass
-print(json.dumps({
+found = json.dumps({
     "status": {key: status[key] for key in status
-        if key.startswith(("Cap", "NoNew", "Seccomp", "Groups", "Gid", "Spec", "Speculation", "Umask", "CoreDumping"))},
-    "user is another": os.getuid() != 0,
+        if key.startswith(("Cap", "NoNew", "Seccomp", "Groups", "Gid", "Spec", "Umask", "CoreDumping", "Cpus"))
+        or key in ("SigBlk", "SigIgn", "SigCgt")},
+    "user is another": [os.getuid() != 0, len({*os.getresuid()})],
     "limits": {name: resource.getrlimit(getattr(resource, name)) for name in names},
     "mounts": sorted([m[4], m[5], *m[m.index("-") + 1:][:1]] for m in mounts),
     "descriptors": targets,
@@ -49,11 +56,17 @@ print(json.dumps({
     "leads": [os.getsid(0) == os.getpid(), os.getpgid(0) == os.getpid()],
     "place": [os.getcwd(), socket.gethostname()],
     "folders": {folder: sorted(os.listdir(folder)) for folder in ("/", "/tmp", "/dev", "/dev/shm", "/submission")},
-    "dumpable": ctypes.CDLL(None).prctl(3, 0, 0, 0, 0),
-    "signals": sorted(s for s in range(1, 65) if int(status["SigIgn"], 16) >> s - 1 & 1),
-    "blocked": status["SigBlk"],
-    "command": sys.argv[0],
-}))
+    "dumpable, kept capabilities, secure bits, slack": [system.prctl(n, 0, 0, 0, 0) for n in (3, 7, 27, 30)],
+    "subreaper": option(37),
+    "dies by": option(2),
+    "scheduling": [os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0), os.nice(0)],
+    "timers": [signal.getitimer(which) for which in (0, 1, 2)],
+    "handlers": {number: repr(signal.getsignal(number)).partition(" at ")[0] for number in range(1, 65)},
+    "kernel": {name: open(f"/proc/self/{name}").read() for name in ("oom_score_adj", "personality", "cgroup")},
+    "program": [sys.argv[0], sys.path, str(sys.flags), sys.executable, sys.prefix],
+})
+for begin in range(0, len(found), 1000):  # the grader cuts long lines
+    print(found[begin : begin + 1000])
 """
 
 #: A worker that starts the same program in both ways and prints what each printed.
@@ -108,7 +121,8 @@ def printed(trace: Trace) -> list[str]:
 def test_a_forked_process_is_in_the_sandbox_of_an_executed_one(sandbox: Sandbox) -> None:
     """Descriptors, privileges, mounts, limits, environment: equal.
 
-    But for the placeholder, the connection to the grader, and that a forked process leads its session.
+    But for the placeholder, the connection to the grader, and that a forked process leads its session and dies with its
+    parent; an executed one may die only with its sandbox.
     """
     told = {
         "tier": sandbox.isolation.name,
@@ -122,11 +136,37 @@ def test_a_forked_process_is_in_the_sandbox_of_an_executed_one(sandbox: Sandbox)
     executed, forked, code, errors = said(finish(sandbox.worker(argv, pass_fds=(), **variables)))
     assert errors == ""
     assert code == 0
-    found, expected = json.loads(forked), json.loads(executed)
+    found, expected = (json.loads("".join(text.splitlines())) for text in (forked, executed))
     placeholder = ["/grader_host/cat"]
     assert [mount for mount in found["mounts"] if mount[0] in placeholder]
     found["mounts"] = [mount for mount in found["mounts"] if mount[0] not in placeholder]
     assert found["descriptors"].pop("3") == "socket"
+    assert (expected.pop("leads"), found.pop("leads")) == ([False, False], [True, True])
+    assert found.pop("dies by") == [0, signal.SIGKILL]
+    del expected["dies by"]
+    assert found == expected
+
+
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+def test_a_node_has_the_same_surroundings_in_both_ways(studio: RecordingSession, tmp_path: Path, clock: str) -> None:
+    """A node that is forked and one that is executed, each with the host in its process.
+
+    They differ in the placeholder; the number of the connection to the grader; whether the empty input could be written
+    to; the session, which a forked process leads; and files and threads of LTTng, which the starter keeps to itself.
+    """
+    tmp_path.chmod(0o755)
+    with executing(studio, 1) as other:
+        found, expected = (
+            json.loads("".join(printed(record(session, tmp_path / way, INSPECT, duration_ns=S, clock=clock))))
+            for way, session in (("forked", studio), ("executed", staging(other)))
+        )
+    for surroundings in (found, expected):
+        surroundings["folders"]["/dev/shm"] = [
+            name for name in surroundings["folders"]["/dev/shm"] if not name.startswith("lttng-ust-")
+        ]
+        surroundings["descriptors"] = sorted(surroundings["descriptors"].values())
+        del surroundings["environment"]["ROS_DOMAIN_ID"]  # each recording has its own
+    found["mounts"] = [mount for mount in found["mounts"] if mount[0] != "/grader_host/cat"]
     assert (expected.pop("leads"), found.pop("leads")) == ([False, False], [True, True])
     assert found == expected
 
@@ -146,48 +186,104 @@ def test_a_program_does_not_see_the_starter(run: Callable[..., Trace]) -> None:
     assert len(trace.messages("/cmd_vel")) > 20
 
 
-#: Leaves a word in every place that the process can reach, and looks for words of others there.
+#: Looks for what earlier starts left in each place that a process may reach, leaves a word in each, and looks again.
 CANARY = """
-import gc, mmap, os, sys
+import builtins, contextlib, ctypes, errno, json, os, socket, sys
+import rclpy, rclpy.node
 word = b"canary-" + b"of-a-start-"
-def seen():
-    found = set()
+mine = lambda: word + b"%04d" % NUMBER
+kept = []
+system = ctypes.CDLL(None, use_errno=True)
+system.mq_open.argtypes = [ctypes.c_char_p, ctypes.c_int, ctypes.c_uint, ctypes.c_void_p]
+CREATE, KEY, PORT, SESSION = 0o1000, 4242, 45454, -3
+def in_memory():
     for line in open("/proc/self/maps"):
         span, rights = line.split()[:2]
-        if "r" in rights and not line.rstrip().endswith(("[vvar]", "[vsyscall]", "[vvar_vclock]")):
-            begin, end = (int(x, 16) for x in span.split("-"))
-            with open("/proc/self/mem", "rb", 0) as memory:
-                try:
-                    memory.seek(begin)
-                    block = memory.read(end - begin)
-                except (OSError, OverflowError):
-                    continue
+        if "r" not in rights or line.rstrip().endswith(("[vvar]", "[vsyscall]", "[vvar_vclock]")):
+            continue
+        begin, end = (int(x, 16) for x in span.split("-"))
+        with open("/proc/self/mem", "rb", 0) as memory, contextlib.suppress(OSError, OverflowError):
+            memory.seek(begin)
+            block = memory.read(end - begin)
             at = block.find(word)
             while at >= 0:
-                found.add(block[at + len(word) : at + len(word) + 4])
+                if block[at + len(word) : at + len(word) + 4].isdigit():
+                    return True
                 at = block.find(word, at + 1)
-    return {text for text in found if text.isdigit()}
-files = [os.path.join(top, name) for root in ("/tmp", "/dev/shm") for top, _, names in os.walk(root) for name in names]
-before = seen()
-kept = [word + b"%04d" % NUMBER]
-sys.modules["canary"] = kept
-import rclpy.node
-rclpy.node.canary = kept
-os.environ["CANARY"] = kept[0].decode()
-for folder in ("/tmp", "/dev/shm"):
-    open(f"{folder}/canary", "wb").write(kept[0])
-print("before:", sorted(before), [f for f in files if "canary" in f], os.path.exists("/tmp/canary.old"),
-    len(seen() - before), [line for line in open("/proc/self/maps") if line.split()[1] in ("rw-s", "-w-s", "rwxs")])
+    return False
+def checked(result):
+    if result < 0:
+        raise OSError(ctypes.get_errno(), "")
+    return result
+def is_there(call, *arguments):
+    return lambda: call(*arguments) >= 0
+def writable():
+    folders = [m.split()[4] for m in open("/proc/self/mountinfo") if m.split()[5].startswith("rw")]
+    return [top for folder in folders if not folder.startswith("/proc") for top, _, _ in os.walk(folder)
+        if os.access(top, os.W_OK)]
+def leave_files():
+    for folder in writable():
+        with open(os.path.join(folder, "canary"), "wb") as file:
+            file.write(mine())
+def bound(kind, address, family=socket.AF_INET):
+    kept.append(socket.socket(family, kind))
+    kept[-1].bind(address)
+def is_bound(kind, address, family=socket.AF_INET):
+    with socket.socket(family, kind) as other:
+        try:
+            other.bind(address)
+        except OSError as error:
+            return error.errno == errno.EADDRINUSE
+    return False
+UDP, UNIX = (socket.SOCK_DGRAM, ("127.0.0.1", PORT)), (socket.SOCK_STREAM, chr(0) + "canary", socket.AF_UNIX)
+places = {
+    "memory": (lambda: kept.append(mine()), in_memory),
+    "a module": (lambda: sys.modules.update(canary=mine()), lambda: "canary" in sys.modules),
+    "builtins": (lambda: setattr(builtins, "canary", mine()), lambda: hasattr(builtins, "canary")),
+    "a global": (lambda: setattr(rclpy.node, "canary", mine()), lambda: hasattr(rclpy.node, "canary")),
+    "a class": (lambda: setattr(rclpy.node.Node, "canary", mine()), lambda: hasattr(rclpy.node.Node, "canary")),
+    "the environment": (lambda: os.environ.update(CANARY="1"), lambda: "CANARY" in os.environ),
+    "files": (leave_files, lambda: any("canary" in os.listdir(folder) for folder in writable())),
+    "a port": (lambda: bound(*UDP), lambda: is_bound(*UDP)),
+    "an abstract socket": (lambda: bound(*UNIX), lambda: is_bound(*UNIX)),
+    "shared memory": (lambda: checked(system.shmget(KEY, 4096, CREATE | 0o666)), is_there(system.shmget, KEY, 0, 0)),
+    "semaphores": (lambda: checked(system.semget(KEY, 1, CREATE | 0o666)), is_there(system.semget, KEY, 0, 0)),
+    "messages": (lambda: checked(system.msgget(KEY, CREATE | 0o666)), is_there(system.msgget, KEY, 0)),
+    "a queue": (lambda: checked(system.mq_open(b"/canary", os.O_CREAT | os.O_RDWR, 0o666, None)),
+        is_there(system.mq_open, b"/canary", os.O_RDONLY, 0, None)),
+    "a key": (lambda: checked(system.syscall(ADD_KEY, b"user", b"canary", mine(), 4, SESSION)),
+        is_there(system.syscall, KEYCTL, 10, SESSION, b"user", b"canary", 0)),
+}
+found = [place for place, (_, look) in places.items() if look()]
+left = []
+for place, (leave, _) in places.items():
+    with contextlib.suppress(OSError):
+        leave()
+        left.append(place)
+again = [place for place, (_, look) in places.items() if look()]
+shared = [line for line in open("/proc/self/maps") if line.split()[1] in ("rw-s", "-w-s", "rwxs")]
+print(json.dumps([found, left, again, shared]))
+sys.exit(0)
 """
+#: Places that a process can write into; the others are closed to it.
+OPEN_PLACES = (
+    *("memory", "a module", "builtins", "a global", "a class", "the environment", "files"),
+    *("a port", "an abstract socket"),
+)
+#: The numbers of `add_key` and `keyctl` by machine.
+KEY_CALLS = {"x86_64": (248, 250), "aarch64": (217, 219)}
 
 
 @pytest.mark.parametrize("starts", [6, pytest.param(1000, marks=pytest.mark.nightly)])
 def test_nothing_of_a_start_is_found_by_a_later_one(run: Callable[..., Trace], starts: int) -> None:
-    """Not in memory, modules, environment or files: each process is a fork of one that has run no student's code."""
+    """Not in memory, modules, files or the kernel: each process is a fork of one that has run no student's code.
+
+    Each start finds again whatever it has left itself, so the places are looked at in a way that would find it.
+    """
+    add_key, keyctl = KEY_CALLS[platform.machine()]
     for number in range(1, starts + 1):
-        source = f"NUMBER = {number}\n{CANARY}\nimport sys\nsys.exit(0)\n"
-        trace = run(source)
-        assert printed(trace) == ["before: [] [] False 1 []"], (number, trace.faults())
+        trace = run(f"NUMBER, ADD_KEY, KEYCTL = {number}, {add_key}, {keyctl}\n{CANARY}")
+        assert [json.loads(line) for line in printed(trace)] == [[[], [*OPEN_PLACES], [*OPEN_PLACES], []]], number
 
 
 def below() -> set[int]:
