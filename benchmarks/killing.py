@@ -1,20 +1,25 @@
 """Grades a submission again and again, kills one of the grader's processes each time, and compares the reports.
 
-Usage: python benchmarks/killing.py [RUNS] [SUBMISSION]      200 runs of reference_solutions unless told otherwise
+Usage: python benchmarks/killing.py [RUNS] [SUBMISSION | --class]
 
-The process is drawn from one kind at a time: the grader, a worker, a starter, a student's process, or bubblewrap, at a
-moment that is drawn from the time that a grading takes. A criterion has to have its usual outcome or be undecided, and
-no process and no temporary folder may stay.
+200 runs of reference_solutions unless told otherwise; --class grades a class of three with `grade batch` and two jobs.
+
+The process is drawn from one kind at a time: the grader, a worker, a starter, a student's process, bubblewrap, or a job
+of a class, at a moment that is drawn from the time that a grading takes. A criterion has to have its usual outcome or
+be undecided, or the student's result is marked as failed. No process and no temporary folder may stay, but that of a
+killed grader or job until the next grading. The same command, which goes on with a class, has to complete it.
 """
 
 from __future__ import annotations
 
+import argparse
 import collections
 import contextlib
 import ctypes
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -22,11 +27,18 @@ import tempfile
 import time
 from pathlib import Path
 
+from grader.execution.temp_dirs import sweep
 from grader.execution.usage import families
 
 ROOT = Path(__file__).resolve().parent.parent
 GRADE = str(Path(sys.executable).with_name("grade"))
 KINDS = ("grader", "worker", "starter", "student", "bubblewrap")
+REFERENCE = ROOT / "reference_solutions"
+MODULES = {"grader.execution.worker_main": "worker", "grader.classroom.worker": "job"}
+#: Kinds that remove their temporary folder themselves; after a kill, the next grading does it.
+SWEPT = ("grader", "job")
+#: Outcomes that cost no student anything, and the beginnings of the words about a grading that ended wrongly.
+HARMLESS, BAD = ("undecided", "failed"), ("WRONG", "left", "no report,", "going on")
 #: Seconds until a grading must have ended, and until its processes must have.
 GRADED_S, GONE_S = 300.0, 20.0
 SET_CHILD_SUBREAPER = 36  # linux/prctl.h
@@ -47,8 +59,7 @@ def kind_of(pid: int, grader: int) -> str:
             return "starter" if inside == (parent.st_ino, parent.st_dev) else "student"
         if any(word.endswith("/launcher.py") for word in words):
             return "student"
-        if "grader.execution.worker_main" in words:
-            return "worker"
+        return next((kind for module, kind in MODULES.items() if module in words), "")
     return ""
 
 
@@ -66,11 +77,83 @@ def outcomes(report: bytes) -> dict[str, str] | None:
     return {one["id"]: one["outcome"] for exercise in exercises for one in exercise["criteria"]}
 
 
-def graded(submission: str, scratch: str, kind: str = "", delay_s: float = 0.0) -> tuple[bytes, int, float, bool]:
-    """Grade once and kill a process; return the report, the exit code, the seconds, and whether one was killed."""
+class Single:
+    """The grading of one submission, which prints its report."""
+
+    kinds = KINDS
+
+    def __init__(self, submission: str) -> None:
+        self.command = [GRADE, submission, "--json"]
+        self._printed = b""
+
+    def take(self, printed: bytes) -> None:
+        """Take what the command has printed."""
+        self._printed = printed
+
+    def outcomes(self) -> dict[str, str] | None:
+        """Return the outcome of each criterion; None if there is no report."""
+        return outcomes(self._printed)
+
+    def settle(self, expected: dict[str, str]) -> str:
+        """Return what is wrong about going on after a kill; there is nothing to go on with."""
+        del expected
+        return ""
+
+    def begin(self) -> None:
+        """Forget the grading before."""
+        self._printed = b""
+
+
+class WholeClass:
+    """The grading of a class by two jobs: two right submissions and a wrong one.
+
+    Args:
+        place: A folder for the class and its results.
+    """
+
+    kinds = (*KINDS, "job")
+
+    def __init__(self, place: Path) -> None:
+        self._results = place / "results"
+        for number, source in enumerate((REFERENCE, ROOT / "benchmarks" / "wrong", REFERENCE)):
+            student = place / "class" / f"student_{number}"
+            shutil.copytree(source, student)
+            with (student / "velocity_publisher.py").open("a", encoding="utf-8") as file:
+                file.write(f"# student {number}\n")
+        options = ["--jobs", "2", "--seed", "1", "--spot-checks", "0%", "--no-progress"]
+        self.command = [GRADE, "batch", str(place / "class"), "-o", str(self._results), *options]
+        self._count = 3
+
+    def begin(self) -> None:
+        """Forget the results before."""
+        shutil.rmtree(self._results, ignore_errors=True)
+
+    def take(self, printed: bytes) -> None:
+        """Take what the command has printed, which is for people."""
+
+    def outcomes(self) -> dict[str, str] | None:
+        """Return the outcome of each criterion of each student, and `failed` for one who has none; None without all."""
+        found, told = {}, list(self._results.glob("students/*/result.json"))
+        for result in told:
+            report = result.with_name("report.json")
+            own = outcomes(report.read_bytes()) if report.exists() else None
+            own = {"all": json.loads(result.read_bytes())["state"]} if own is None else own
+            found.update({f"{result.parent.name}: {name}": outcome for name, outcome in own.items()})
+        return found if len(told) == self._count else None
+
+    def settle(self, expected: dict[str, str]) -> str:
+        """Go on as an instructor would, and return what is wrong about the results then; empty if nothing is."""
+        done = subprocess.run([*self.command, "--rerun", "undecided"], cwd=ROOT, capture_output=True, check=False)
+        found = self.outcomes()
+        return "" if found == expected else f"going on did not help, exit code {done.returncode}"
+
+
+def graded(grading: Single | WholeClass, scratch: str, kind: str = "", delay_s: float = 0.0) -> tuple[int, float, bool]:
+    """Grade once and kill a process; return the exit code, the seconds, and whether one was killed."""
+    grading.begin()
     began, killed = time.monotonic(), False
     with subprocess.Popen(
-        [GRADE, submission, "--json"],
+        grading.command,
         cwd=ROOT,
         env={**os.environ, "TMPDIR": scratch},
         stdout=subprocess.PIPE,
@@ -87,8 +170,9 @@ def graded(submission: str, scratch: str, kind: str = "", delay_s: float = 0.0) 
                     os.kill(random.choice(pids), signal.SIGKILL)
                     killed = True
             time.sleep(0.005)
-        report, _ = process.communicate(timeout=GRADED_S)
-    return report, process.returncode, time.monotonic() - began, killed
+        printed, _ = process.communicate(timeout=GRADED_S)
+    grading.take(printed)
+    return process.returncode, time.monotonic() - began, killed
 
 
 def left_over() -> list[str]:
@@ -104,36 +188,48 @@ def left_over() -> list[str]:
         time.sleep(0.05)
 
 
+def ending(grading: Single | WholeClass, expected: dict[str, str], kind: str, code: int, *, killed: bool) -> str:
+    """Return how a grading ended, in words; those of `BAD` if it must not end like that."""
+    found = grading.outcomes()
+    if not killed:
+        return "ended before the kill"
+    if found is None:
+        by_kill = kind == "grader" and code == -signal.SIGKILL
+        return "no report" if by_kill else f"no report, exit code {code}"
+    if found == expected:
+        return "the usual report"
+    wrong = {name: outcome for name, outcome in found.items() if outcome not in (expected.get(name), *HARMLESS)}
+    return f"WRONG: {wrong}" if wrong else "failed" if "failed" in found.values() else "undecided"
+
+
 def main() -> None:
     """Print how gradings ended by the kind of process that was killed; exit code 1 if one ended wrongly."""
-    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    submission = sys.argv[2] if len(sys.argv) > 2 else "reference_solutions"
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("runs", type=int, nargs="?", default=200)
+    parser.add_argument("submission", nargs="?", default=str(REFERENCE))
+    parser.add_argument("--class", action="store_true", dest="of_class")
+    arguments = parser.parse_args()
     ctypes.CDLL(None).prctl(SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     wrong = 0
     counts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
-    with tempfile.TemporaryDirectory() as scratch:
-        graded(submission, scratch)
-        usual, _, seconds, _ = graded(submission, scratch)
-        expected = outcomes(usual)
+    with tempfile.TemporaryDirectory() as scratch, tempfile.TemporaryDirectory() as place:
+        grading = WholeClass(Path(place)) if arguments.of_class else Single(arguments.submission)
+        graded(grading, scratch)
+        _, seconds, _ = graded(grading, scratch)
+        expected = grading.outcomes()
         assert expected, "the grading without a kill has no report"
-        for run in range(runs):
-            kind = KINDS[run % len(KINDS)]
-            report, code, _, killed = graded(submission, scratch, kind, random.uniform(0, seconds))
-            found, left = outcomes(report), left_over()
-            folders = [] if kind == "grader" else [path.name for path in Path(scratch).iterdir()]
+        for run in range(arguments.runs):
+            kind = grading.kinds[run % len(grading.kinds)]
+            code, _, killed = graded(grading, scratch, kind, random.uniform(0, seconds))
+            how, left = ending(grading, expected, kind, code, killed=killed), left_over()
+            if kind in SWEPT:
+                sweep(Path(scratch))  # as the next grading does
+            folders = [path.name for path in Path(scratch).iterdir()]
             if left or folders:
                 how = f"left {left or folders}"
-            elif not killed:
-                how = "ended before the kill"
-            elif found is None:
-                how = "no report" if kind == "grader" and code == -signal.SIGKILL else f"no report, exit code {code}"
-            elif found == expected:
-                how = "the usual report"
-            elif all(outcome in (expected[name], "undecided") for name, outcome in found.items()):
-                how = "undecided"
-            else:
-                how = "WRONG: " + str({n: o for n, o in found.items() if o not in (expected[n], "undecided")})
-            wrong += how.startswith(("WRONG", "left", "no report,"))
+            elif how in ("no report", "failed", "undecided"):
+                how = grading.settle(expected) or how
+            wrong += how.startswith(BAD)
             counts[kind][how] += 1
     for kind, hows in counts.items():
         print(kind.ljust(12), ", ".join(f"{count} {how}" for how, count in hows.most_common()))
