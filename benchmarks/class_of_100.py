@@ -80,9 +80,9 @@ def kinds(count: int) -> Iterator[str]:
         yield chosen
 
 
-def make_class(folder: Path, wanted: Sequence[str]) -> None:
+def make_class(folder: Path, wanted: Sequence[str], seed: int = SEED) -> None:
     """Write one submission of each kind wanted; no two have the same files."""
-    chance, known = random.Random(SEED), samples()
+    chance, known = random.Random(seed), samples()
     for number, kind in enumerate(wanted):
         student = folder / f"{number:03}_{kind}"
         student.mkdir(parents=True)
