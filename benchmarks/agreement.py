@@ -6,7 +6,8 @@ Usage: python benchmarks/agreement.py RESULTS [--jobs N] [--only TEXT] MODE...
        goes on. Without a MODE only the table of what RESULTS holds is printed.
 
 The reports, without their duration, are kept in the folder RESULTS.reports, by mode. If there are some of auto and of
-auto-executed, the table also says which differ; `diff -r` shows how. The exit code is 1 if an outcome differs.
+auto-executed, the table also says which differ; `diff -r` shows how. Those on the wall clock hold measured times and
+always do. The exit code is 1 if an outcome differs.
 """
 
 from __future__ import annotations
@@ -166,7 +167,8 @@ def ways_of_starting(results: Results, path: Path) -> int:
     print(f"\n{FORKED} and {EXECUTED}: {len(both)} folders, {len(others)} with other outcomes", end="")
     print(f", {len(words)} with another report")
     for folder in words:
-        print(f"  {folder}" + (": another outcome" if folder in others else ""))
+        on_wall = any(mode[folder]["wall"] for mode in (forked, executed))
+        print(f"  {folder}" + ": another outcome" * (folder in others) + ", on the wall clock" * on_wall)
     return 1 if others else 0
 
 
