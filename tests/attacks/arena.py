@@ -289,6 +289,9 @@ class Arena:
             try:
                 yield process
             finally:
+                # A program around it ends without it: who has changed the user does not die with its parent.
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(self.bystander_pid, signal.SIGKILL)
                 process.kill()
 
     def _state_of_bystander(self) -> object:
