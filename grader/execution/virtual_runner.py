@@ -143,14 +143,15 @@ class VirtualRunner(Runner):
         self._hear(student, workload)
         self._remove_done()
         self._steps += 1
-        hopeless_now = self._plan.stop_when_unfit and hopeless(self._students) and self._unfit()
         # A flood is wrong on every clock. It runs until its limit, which is the same on every machine.
-        floods = self._hops > HOPS or self._recorder.floods(self._now_ns)
-        if hopeless_now and not floods:
+        if self._plan.stop_when_unfit and hopeless([student]) and self._unfit() and not self._floods():
             self._end_ns = self._now_ns
         if self._steps >= STEPS:
             self._recorder.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
         self._end_if_full(self._now_ns)
+
+    def _floods(self) -> bool:
+        return self._hops > HOPS or self._recorder.floods(self._now_ns)
 
     def _count_hop(self) -> None:
         """Note that a process takes messages, which takes time if the nodes have not rested for long."""
@@ -218,10 +219,10 @@ class VirtualRunner(Runner):
             some = "a message" if count == 1 else f"{count:,} messages"
             self._recorder.note(f"{student.name}: {some} on {where} did not arrive in time")
             self._has_lost = True
-        sent = counts(report.get("sent"))
-        self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
-        self._collect_exchanges(sent)
-        self._forward(student, sent)
+        if sent := counts(report.get("sent")):
+            self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
+            self._collect_exchanges(sent)
+            self._forward(student, sent)
         endpoints = report.get("endpoints")
         if isinstance(endpoints, list) and report["kind"] == "idle":
             if len(endpoints) > CLAIMS:

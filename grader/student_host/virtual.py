@@ -100,13 +100,18 @@ class VirtualTime:
         self.resumed_ns = originals.processor_ns()
 
     def summary(self) -> dict[str, Any]:
-        """Return the common part of reports: the time, traffic, and endpoints if they have changed."""
+        """Return the common part of reports: the time, and what has happened since the last one, if anything has."""
         self.unreported = False
-        report: dict[str, Any] = {"now_ns": self.clock.now_ns, "counted": self.clock.counted, "moved": self._moved}
+        report: dict[str, Any] = {"now_ns": self.clock.now_ns}
+        if self.clock.counted:
+            report["counted"] = True
+        if self._moved:
+            report["moved"] = self._moved
         self.clock.counted, self._moved = False, 0
         if self._ledger is not None:
-            report["sent"] = dict(self._ledger.sent)
-            self._ledger.sent.clear()
+            if self._ledger.sent:
+                report["sent"] = dict(self._ledger.sent)
+                self._ledger.sent.clear()
             if self._ledger.lost:
                 report["lost"] = dict(self._ledger.lost)
                 self._ledger.lost.clear()
