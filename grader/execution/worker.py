@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import json
 import math
 import os
@@ -31,7 +32,7 @@ from grader.execution.launching import Launched, evaluated, expanded, renamed, u
 from grader.execution.notes import Places
 from grader.execution.plan import Plan
 from grader.execution.resource_monitor import Budget, ResourceMonitor
-from grader.execution.ros_installation import PythonRuntime
+from grader.execution.ros_installation import MESSAGE_PACKAGES, PythonRuntime
 from grader.execution.sandbox.environment import quick_discovery
 from grader.execution.sandbox.protocol import Isolation, StudentProcess
 from grader.execution.sandbox.start import die_with
@@ -82,6 +83,8 @@ class Worker:
             left_ns: Real time that is left for the submission.
             budget_words: The reason to give when that is used up.
         """
+        if self._remembers_connections():
+            raise HarnessError("worker: its network remembers connections of nodes that it recorded before")
         self._real_ns = self._starved_ns = 0
         sys.path += [folder for folder in plan.interfaces if folder not in sys.path]  # installed packages come first
         limit_processor_time(plan.limits)
@@ -94,7 +97,12 @@ class Worker:
         # not in trace_to_json, because the format of evidence does not include it
         beside = {"reached": list(trace.reached), "incomplete": trace.incomplete}
         cost = {"real_ns": self._real_ns, "starved_ns": self._starved_ns}
-        return {"trace": {**trace_to_json(trace), **beside}, **cost, "worn": is_worn(trace)}
+        worn = is_worn(trace) or self._remembers_connections()
+        return {"trace": {**trace_to_json(trace), **beside}, **cost, "worn": worn}
+
+    def _remembers_connections(self) -> bool:
+        """Return whether nodes have left TCP connections in the worker's own network; the grader uses none."""
+        return not self._isolation.shares_network and has_connections()
 
     def _record(self, plan: Plan, domain: int, budget: Budget) -> Trace:
         launched = {
@@ -246,6 +254,14 @@ def _import_runners() -> Mapping[str, Callable[..., Runner]]:
     return {"virtual": VirtualRunner, "wall": WallRunner, "bare": BareRunner}
 
 
+def _import_interfaces() -> None:
+    """Import the common message packages, and load their type supports."""
+    for package in MESSAGE_PACKAGES:
+        for message in list(vars(importlib.import_module(f"{package}.msg")).values()):
+            if hasattr(message, "__import_type_support__"):
+                message.__import_type_support__()
+
+
 def limit_memory() -> None:
     """Set the kernel's limit on the memory that this process may map; students' processes have their own."""
     _, most = resource.getrlimit(resource.RLIMIT_AS)
@@ -268,6 +284,15 @@ def is_worn(trace: Trace) -> bool:
     odd = any(f.kind in (FaultKind.KILLED, FaultKind.HUNG) for f in trace.faults()) or trace.notes or trace.incomplete
     full = any(isinstance(o, Mark) and o.name == "limit" for o in trace.observations)
     return bool(odd or full or trace.harness_problem) or usage([os.getpid()]).memory_bytes > WORN_BYTES
+
+
+def has_connections() -> bool:
+    """Return whether this network has TCP connections: the kernel keeps the ports of closed ones for a minute."""
+    rows = 0
+    for name in ("tcp", "tcp6"):
+        with suppress(OSError):
+            rows += len(Path(f"/proc/net/{name}").read_bytes().splitlines()) - 1
+    return rows > 0
 
 
 def _await_ready(student: NodeProcess) -> None:
@@ -304,7 +329,9 @@ def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
     runtime = from_json(PythonRuntime, request["runtime"])
     worker = Worker(isolation_from_name(request["isolation"]), runtime, executed)
     with suppress(Exception):  # the first plan raises it again, and answers with it
-        _import_runners()  # here, because the starter and the supervisor are still busy with imports as well
+        # here, because the starter and the supervisor are still busy with imports as well, and forks share it
+        _import_runners()
+        _import_interfaces()
     line = _own_line([request["line"], *request["lines_of_forks"]])
     commands, answers = line.makefile("r"), line.makefile("w")
     for command in commands:

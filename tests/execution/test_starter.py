@@ -274,6 +274,29 @@ OPEN_PLACES = (
 KEY_CALLS = {"x86_64": (248, 250), "aarch64": (217, 219)}
 
 
+LEAVES_A_CONNECTION = """
+import socket
+listening = socket.socket()
+try:
+    listening.bind(("127.0.0.1", 45455))  # without SO_REUSEADDR, which would take the port of a closed connection
+except OSError as error:
+    print(error)
+else:
+    print("free")
+    listening.listen()
+    calling = socket.create_connection(("127.0.0.1", 45455))
+    answering, _ = listening.accept()
+    answering.close()
+    calling.close()
+"""
+
+
+def test_a_later_start_finds_no_connection(run: Callable[..., Trace]) -> None:
+    """The kernel keeps the port of a closed TCP connection for a minute, so the network is not used again."""
+    for _ in range(3):
+        assert printed(run(LEAVES_A_CONNECTION)) == ["free"]
+
+
 @pytest.mark.parametrize("starts", [6, pytest.param(1000, marks=pytest.mark.nightly)])
 def test_nothing_of_a_start_is_found_by_a_later_one(run: Callable[..., Trace], starts: int) -> None:
     """Not in memory, modules, files or the kernel: each process is a fork of one that has run no student's code.

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import ClassVar
 
@@ -18,6 +19,7 @@ from grader.execution.sandbox import seccomp
 from grader.execution.sandbox.environment import PACKAGE, student_environment
 from grader.execution.sandbox.exposure import (
     STUDENT_GROUP,
+    View,
     make_readable,
     parents_of,
     secrets_within,
@@ -219,7 +221,10 @@ class Bubblewrap:
         return [*entry, str(self.setpriv), f"--reuid={some_user()}", f"--regid={STUDENT_GROUP}", *privileges]
 
     def _files(self, process: StudentProcess, limits: Limits, more: Sequence[str] = ()) -> list[str]:
-        view = view_of((*process.runtime.read_paths, process.runtime.executable, self.prlimit, self.setpriv))
+        runtime = process.runtime
+        view, hidden = _view(
+            (*runtime.read_paths, runtime.executable, self.prlimit, self.setpriv), runtime.python_paths
+        )
         size = str(limits.scratch_bytes)
         # Process 1 is bubblewrap, without the seccomp filter, or the placeholder: its memory must not be accessible.
         first = "/proc/1"
@@ -237,13 +242,23 @@ class Bubblewrap:
             options += ["--ro-bind", str(path), str(path)]
         for where, target in view.links:
             options += ["--symlink", target, str(where)]
-        for folder in secrets_within(view.bound, process.runtime):
+        for folder in hidden:
             options += ["--size", "4096", "--tmpfs", str(folder), "--remount-ro", str(folder)]
         options += ["--ro-bind", str(process.submission), str(SUBMISSION)]
         options += ["--ro-bind", str(process.host_folder), str(HOST)] if process.host_folder else []
         options += more
         # bubblewrap's /dev is a tmpfs without a size limit, which its owner could fill.
         return [*options, "--remount-ro", "/dev", "--remount-ro", "/"]
+
+
+@lru_cache(maxsize=8)
+def _view(paths: tuple[Path, ...], python_paths: tuple[Path, ...]) -> tuple[View, tuple[Path, ...]]:
+    """Return what a student's process sees of the machine, and the folders in it that hold secrets.
+
+    It is the same for all processes of a submission, and takes longer to find out than to build the sandbox.
+    """
+    view = view_of(paths)
+    return view, tuple(secrets_within(view.bound, python_paths))
 
 
 def _copies(process: StudentProcess) -> tuple[list[str], list[int]]:

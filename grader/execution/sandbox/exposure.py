@@ -144,13 +144,18 @@ def taken_users() -> tuple[Path, ...]:
     return ()
 
 
-def secrets_within(bound: Iterable[Path], runtime: PythonRuntime) -> list[Path]:
-    """Return the folders with rubrics and checks that are inside of a visible folder."""
+def secrets_within(bound: Iterable[Path], python_paths: Iterable[Path]) -> list[Path]:
+    """Return the folders with rubrics and checks that are inside of a visible folder.
+
+    Args:
+        bound: The visible folders.
+        python_paths: Additional entries of sys.path.
+    """
     package = Path(grader.__file__).resolve().parent
     bound = tuple(bound)
     # An editable installation has a copy of the rubrics in site-packages, apart from the code.
     installed = {Path(sysconfig.get_path(name)).resolve() / "grader" for name in ("purelib", "platlib")}
-    places = {package, *installed, *(folder.resolve() / "grader" for folder in runtime.python_paths)}
+    places = {package, *installed, *(folder.resolve() / "grader" for folder in python_paths)}
     return [place for place in sorted(places) if place.is_dir() and any(folder in place.parents for folder in bound)]
 
 
@@ -161,7 +166,7 @@ def worker_view(runtime: PythonRuntime, folder: Path) -> WorkerView:
     """
     package = Path(grader.__file__).resolve().parent
     read = (*runtime.read_paths, runtime.executable, *runtime.library_paths, *runtime.python_paths)
-    hidden = tuple(secrets_within(view_of(read).bound, runtime))
+    hidden = tuple(secrets_within(view_of(read).bound, runtime.python_paths))
     own = tuple(package / name for name in ("__init__.py", "core", "simulation", "student_host", "execution"))
     return WorkerView(read, hidden, own, (folder,))
 

@@ -8,6 +8,7 @@ import socket
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from grader.execution.sandbox.start import OWN_PROCESS
 
@@ -162,6 +163,7 @@ def supports(machine: str) -> bool:
     return machine in AUDIT_ARCHITECTURES
 
 
+@cache
 def student_filter(machine: str | None = None) -> bytes:
     """Return the filter for student processes with their own namespaces, an array of `struct sock_filter`.
 

@@ -270,7 +270,7 @@ def _confinement(process: StudentProcess, ground: Ground) -> dict[str, object]:
     own = (process.submission, *host, *(HERE.glob("loopback*.xml") if ground.loopback else ()))
     return {
         "read": [str(path) for path in (*bound, *own)],
-        "hidden": [str(path) for path in secrets_within(bound, process.runtime)],
+        "hidden": [str(path) for path in secrets_within(bound, process.runtime.python_paths)],
         "devices": DEVICES,
         "tcp": not ground.loopback,
         "reach": ground.as_root and bool(closed_folders((*bound, *own, process.runtime.executable))),
