@@ -12,11 +12,11 @@ import re
 import sys
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import grader
 from grader.app.seeds import read_key
+from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault, GraderError, RubricError
 from grader.core.shipped import shipped
 from grader.rubrics.builtin import builtin_rubrics, exercise_ids

@@ -12,9 +12,10 @@ Times are seconds since the scenario began. Add observations in any order; the t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Check, Finding, reads_sources
 from grader.core.quantities import NS_PER_S, nanoseconds
 from grader.core.trace import (

@@ -11,11 +11,11 @@ import sysconfig
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault, RubricError
 from grader.core.exercise import Exercise
 from grader.core.report import BroughtPackage, DescribedPackage

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Exercise
 from grader.core.trace import Trace
 from grader.execution.evidence.manifest import scenario_digest

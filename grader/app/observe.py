@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from grader.app.grade import Progress, builtin_recording
 from grader.app.interface_packages import provide
 from grader.app.seeds import PRACTICE
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError, SubmissionError
 from grader.core.quantities import NS_PER_S
 from grader.core.report import Summary

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import cast
@@ -16,6 +16,7 @@ from typing import cast
 from grader.app.grade import read_exercises
 from grader.app.kept_recordings import kept_traces
 from grader.app.request import GradeRequest, command_words, request_of
+from grader.core.dataclass import dataclass
 from grader.core.errors import ALL_MET, NOT_ALL_MET, UNDECIDED, UNUSABLE, EvidenceError, GraderError, exit_code
 from grader.core.exercise import Exercise
 from grader.core.report import Report, Reproduction

@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.app.seeds import PRACTICE, SeedKey
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Drawn, Exercise
 from grader.core.limits import TIME_BUDGET_S
 from grader.core.report import JsonObject, Reproduction

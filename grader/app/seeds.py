@@ -9,10 +9,11 @@ import secrets
 import stat
 import unicodedata
 from collections.abc import MutableMapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import KeyFileError, VariantError
 from grader.core.exercise import Drawn, Exercise, Value
 from grader.submissions.collected import shown

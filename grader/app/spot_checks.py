@@ -6,8 +6,9 @@ If the two recordings disagree, the wall clock decides.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Trace
 from grader.execution.plan import Plan, derive

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from grader.app.interface_packages import known_interfaces
+from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Criterion, Exercise
 from grader.core.quantities import duration

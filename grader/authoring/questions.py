@@ -5,9 +5,9 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from grader.authoring.skeleton import DraftCriterion, DraftQuantity, as_id, in_seconds
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.report import TopicSummary
 from grader.core.trace import Delivery, Message, Offer, Trace

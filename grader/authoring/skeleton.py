@@ -7,8 +7,8 @@ import math
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
+from grader.core.dataclass import dataclass
 from grader.rubrics.schema import FILE
 from grader.submissions.collected import listed
 

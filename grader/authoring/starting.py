@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -22,6 +22,7 @@ from grader.authoring.skeleton import (
     in_seconds,
     rubric_text,
 )
+from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError, RubricError, SubmissionError
 from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S, seconds

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError
 from grader.rubrics.mistakes import mistakes_of, nearest
 from grader.rubrics.yaml_tree import Mistake, YamlSyntaxError, YamlTree, read_yaml

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from grader.classroom.gradebook import Gradebook, Row, Status, exactly, exercises_of, number, remarks
@@ -13,6 +12,7 @@ from grader.classroom.roster import Person
 from grader.classroom.store import Conditions
 from grader.classroom.watching import clock_time
 from grader.core.checkup import NO_SANDBOX
+from grader.core.dataclass import dataclass
 from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RowTone, RunFacts, StudentRow
 from grader.reporting.class_page.render import REPORT_PAGE, result_link
 from grader.reporting.html.class_links import ClassLinks

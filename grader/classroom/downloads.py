@@ -10,9 +10,10 @@ import secrets
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError, HarnessError
 from grader.reporting.delivery import write_whole
 from grader.submissions.archives import (

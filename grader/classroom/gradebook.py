@@ -6,7 +6,7 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import Enum
 from fractions import Fraction
 
@@ -21,6 +21,7 @@ from grader.classroom.adjustments import (
 from grader.classroom.intake import HandedInEntry, Intake
 from grader.classroom.roster import Person, RosterMatch, fold_handle
 from grader.classroom.store import Kept, ResultStatus, State
+from grader.core.dataclass import dataclass
 from grader.reporting.escape import csv_cell, shown
 from grader.reporting.json_report import ExerciseData, ReportData
 

@@ -7,7 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 from grader.app.grade import begun, read_exercises, wanted_files
@@ -21,6 +21,7 @@ from grader.classroom.regrading import KeptRecordings, kept_recordings, regrade
 from grader.classroom.roster import Person
 from grader.classroom.store import Conditions, Kept, ResultStatus, State, Store, refused, unusable_digest
 from grader.classroom.watching import Watcher
+from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError, VariantError
 from grader.core.exercise import Exercise
 from grader.execution.recording_session import workers_for

@@ -9,10 +9,11 @@ import shutil
 import unicodedata
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from grader.classroom.downloads import AUTO, PATTERNS, DownloadLayout, Named, layout_of, unpack_download
+from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError, HarnessError, SubmissionError
 from grader.submissions.archives import ARCHIVE_SUFFIXES
 from grader.submissions.collected import is_skipped_file, is_skipped_folder, name_problem, shown, why_skipped

@@ -13,7 +13,6 @@ from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -22,6 +21,7 @@ import msgspec
 from grader.classroom import store as kept
 from grader.classroom.store import Conditions, ResultStatus, State
 from grader.core.checkup import NO_SANDBOX, missing
+from grader.core.dataclass import dataclass
 from grader.execution.recording_session import WALL
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import choose_isolation

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from grader.classroom.class_page import RunOfClass, class_page
 from grader.classroom.gradebook import Gradebook, Row, Status, number, remarks, render_gradebook
 from grader.classroom.platforms import Export, export_canvas, export_gradescope, export_moodle, feedback
 from grader.classroom.roster import Table, read_table
+from grader.core.dataclass import dataclass
 from grader.core.report import JsonObject
 from grader.reporting.class_page.contents import PageLink
 from grader.reporting.class_page.render import class_assets, render_class

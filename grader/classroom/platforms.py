@@ -6,10 +6,11 @@ import html
 import json
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from grader.classroom.gradebook import Gradebook, Row, exercises_of, number, table, text_cell
 from grader.classroom.roster import Person, Table, columns_of, fold_handle, person_of
+from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError
 from grader.reporting.escape import shown as safe
 from grader.reporting.html.final_mark import FinalMark

@@ -7,7 +7,7 @@ import signal
 import time
 from collections.abc import Generator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from grader.app.kept_recordings import PlannedRun, recorded_alike
@@ -16,6 +16,7 @@ from grader.app.request import request_to_json
 from grader.classroom.local import Attempt, Task, failed
 from grader.classroom.store import Conditions, ResultStatus, State
 from grader.classroom.worker import EVIDENCE, request_for, status_of, write_reports
+from grader.core.dataclass import dataclass
 from grader.core.errors import EvidenceError, GraderError
 from grader.core.exercise import Exercise
 from grader.execution.evidence.store import carry_over, open_evidence

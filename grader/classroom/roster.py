@@ -7,10 +7,11 @@ import io
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from grader.classroom.intake import HandedInEntry
+from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError
 from grader.submissions.collected import listed, shown
 

@@ -10,7 +10,7 @@ import secrets
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from typing import Any
 import msgspec
 
 from grader.app.spot_checks import is_drawn
+from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError
 from grader.core.exercise import Drawn
 from grader.core.limits import TIME_BUDGET_S

@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,6 +35,7 @@ from grader.cli.options import (
     time_budget_option,
 )
 from grader.core.checkup import TIERS
+from grader.core.dataclass import dataclass
 from grader.core.errors import (
     ALL_MET,
     INTERRUPTED,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 
+from grader.core.dataclass import dataclass
 from grader.core.trace import GraphSnapshot
 
 Point = tuple[float, float]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 
 #: Property names, in the order of reports, and what each one means for a student's process.

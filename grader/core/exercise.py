@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from fractions import Fraction
 from typing import Any, Protocol, TypeGuard
 
+from grader.core.dataclass import dataclass
 from grader.core.scenario import OdometryStream, Scenario
 from grader.core.trace import Trace
 

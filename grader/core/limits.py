@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import GIB, KIB, MIB, NS_PER_S, Bytes, DurationNs, Least, duration, size
 
 #: Default limit, in seconds of real time, for all recordings of one submission together; an ordinary submission takes

@@ -1,7 +1,8 @@
 """Units of time and size, comparisons of numbers, and the kinds of values that rubrics write in their own forms."""
 
-from dataclasses import dataclass
 from typing import Annotated
+
+from grader.core.dataclass import dataclass
 
 NS_PER_S = 1_000_000_000
 NS_PER_MS = 1_000_000

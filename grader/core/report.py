@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from typing import Any, TypeAlias
 
 from grader.core.chart import Excerpt, Figure, SourceFile
 from grader.core.checkup import Property
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Audience, Feedback, Location, Outcome, Problem, Variant
 from grader.core.trace import ClockKind, Endpoint, Fault, GraphSnapshot, LogRecord, Offer, OutputLine, Start
 

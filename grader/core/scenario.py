@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Annotated, Any
 
+from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S, ActionType, Kind, MessageType, ServiceType, Topic
 
@@ -303,7 +304,7 @@ class Scenario:
     span: Span  # when and how long it is observed
     stimuli: tuple[Stimulus, ...] = ()  # what the grader publishes
     # Limits of the processes and of the recording
-    limits: Limits = Limits()  # noqa: RUF009 - a value that never changes
+    limits: Limits = Limits()
     # `(process, t_ns)` of processes that start late; the others start at 0
     starts_ns: tuple[tuple[str, Time], ...] = ()
     may_exit: tuple[str, ...] = ()  # processes that may end by themselves; exit code 0 is then no fault

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
+from grader.core.dataclass import dataclass
 from grader.core.report import BroughtPackage, Environment, Reproduction
 from grader.core.trace import Trace
 

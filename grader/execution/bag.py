@@ -9,11 +9,11 @@ import stat
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import RecordingError
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.releases import DEFAULT

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.core.trace import LogRecord, OutputLine
 
 #: `[INFO] [1767225600.000000000] [node]: text`, the default of RCUTILS_CONSOLE_OUTPUT_FORMAT.

@@ -6,9 +6,9 @@ import inspect
 import math
 import random
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_MS
 from grader.core.scenario import (
     ActionGoal,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
+from grader.core.dataclass import dataclass
 from grader.student_host.packages import console_scripts, package_folders, package_name
 
 #: The most files of a package that are searched for a module or a program.

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Fault, FaultKind, LogRecord, Mark, Observation, Offer, OutputLine, Trace
 from grader.execution.ending import START_CPU_S, reported_fault

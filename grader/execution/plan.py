@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import random
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
+from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.scenario import (
     ActionGoal,
@@ -155,7 +155,7 @@ class Plan:
     numbers: tuple[PlannedNumbers, ...]
     recordings: tuple[PlannedRecording, ...]
     clock: str
-    limits: Limits = Limits()  # noqa: RUF009 - a value that never changes
+    limits: Limits = Limits()
     stop_when_unfit: bool = False
     messages: tuple[PlannedMessages, ...] = ()
     servers: tuple[PlannedServer, ...] = ()

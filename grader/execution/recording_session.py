@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import TypeVar
 
 from grader.core.checkup import Property
+from grader.core.dataclass import dataclass
 from grader.core.trace import Trace
 from grader.execution.byte_code import compile_own
 from grader.execution.domains import private_domains, shared_domains

@@ -11,8 +11,9 @@ import os
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.quantities import MIB, size
 from grader.core.trace import ClockKind, Trace

@@ -10,10 +10,10 @@ import re
 import sys
 import sysconfig
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault
 from grader.core.releases import DEFAULT
 

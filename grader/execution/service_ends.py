@@ -5,9 +5,9 @@ They have no executor and no callbacks: the runner takes requests and responses 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.core.trace import ServiceEnd
 from grader.execution.interfaces import interface_class
 

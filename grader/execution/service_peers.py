@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.core.trace import Mark, Request, Response
 from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedServer
 from grader.execution.interfaces import built, plain_fields, wanted_class

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedMessages, PlannedServer, goal_call
 from grader.execution.interfaces import message_class, plain_fields
 from grader.execution.plan import Plan, PlannedNumbers, PlannedRecording

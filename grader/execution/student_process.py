@@ -12,9 +12,10 @@ import socket
 import subprocess
 import time
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.quantities import size
 from grader.core.trace import Fault, FaultKind, LogRecord, OutputLine, Start

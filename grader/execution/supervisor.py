@@ -22,10 +22,11 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.core.quantities import MIB, NS_PER_S, size

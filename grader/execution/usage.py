@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_S
 
 #: The writable folders of a sandbox that has its own file systems.

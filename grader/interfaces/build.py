@@ -10,10 +10,10 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault
 from grader.interfaces.definitions import KINDS, DefinitionError, InterfacePackage, digest, read
 

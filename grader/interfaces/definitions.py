@@ -14,9 +14,9 @@ import re
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError
 
 KINDS = ("msg", "srv", "action")

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds, within
 from grader.core.trace import ClockKind, Delivery, Fault, GraphSnapshot, Message, Request, Response, Trace
 from grader.judging.findings import faults_before_stop

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 
 from grader.core.chart import Band, Case, Chart, Level, Look, Moment, Panel, Point, Series, Tone
+from grader.core.dataclass import dataclass
 from grader.core.quantities import seconds
 from grader.core.trace import LogRecord, OutputLine, Request, Response, Trace
 from grader.judging.output import printed_lines

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Location, Problem, ProblemKind
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace

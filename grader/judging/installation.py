@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
+from grader.core.dataclass import dataclass
 from grader.core.trace import Fault, FaultKind, Trace
 from grader.judging.findings import faults_before_stop
 from grader.judging.source import read, words

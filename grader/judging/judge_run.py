@@ -6,9 +6,10 @@ import itertools
 import math
 import statistics
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.report import NOT_JUDGED, ExerciseReport, Pace, Report, ReportedFault, Summary, TopicSummary, Verdict

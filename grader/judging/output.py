@@ -6,9 +6,10 @@ import math
 import re
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import lru_cache
 
+from grader.core.dataclass import dataclass
 from grader.core.trace import LogRecord, OutputLine, Trace
 from grader.judging.findings import AT_ONCE_NS, first_fault
 from grader.judging.texts import Printed, clean, printed_numbers, template_of, with_decimal_points

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import islice
 
 from grader.core.chart import Band, Case, Chart, Level, Look, Panel, Series, Tone
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
 from grader.core.trace import Delivery, Message, Request, Response, Trace

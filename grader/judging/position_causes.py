@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from grader.core.dataclass import dataclass
 from grader.judging.position_logs import STALE_NS, Analysis, Entry, Group, Pose, Track, Wanted, X, Y, matched
 from grader.judging.texts import Pair, Printed
 from grader.judging.wording import counted, moment, number, quote, span

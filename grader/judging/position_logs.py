@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.core.trace import ClockKind, Delivery, LogRecord, OutputLine, Trace
 from grader.judging.output import printed_lines, student_records

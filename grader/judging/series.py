@@ -9,11 +9,12 @@ import statistics
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import pairwise
 from types import MappingProxyType
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_MS, NS_PER_S, within
 from grader.judging.values import Reading
 from grader.judging.wording import counted, number

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_MS
 from grader.core.trace import ClockKind, LogRecord, Request, Response, Trace
 from grader.judging.output import Output, number_in, shape_of, written

@@ -5,9 +5,10 @@ from __future__ import annotations
 import ast
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeVar
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Location
 from grader.judging.wording import quote
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
+
+from grader.core.dataclass import dataclass
 
 #: Longest text that is read, in characters; a printed odometry message has about 3,000.
 LONGEST_TEXT = 8_000

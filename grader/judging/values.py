@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache, wraps
 from types import MappingProxyType
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_MS, SLACK, FieldNumber, Pattern, within
 from grader.core.trace import ClockKind, Delivery, Endpoint, Message, Trace
 from grader.judging.wording import number, quote

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from fnmatch import fnmatchcase
 from fractions import Fraction
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Annotated, Literal, NoReturn
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
 from grader.rubrics.builtin import NOTES

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from fractions import Fraction
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Outcome
 from grader.core.report import ExerciseReport
 

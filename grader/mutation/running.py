@@ -7,7 +7,7 @@ import random
 import shutil
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fnmatch import fnmatchcase
 from itertools import islice, zip_longest
 from pathlib import Path
@@ -18,6 +18,7 @@ from grader.app.grade import Progress, plan_jobs, read_exercises, read_recording
 from grader.app.interface_packages import provide
 from grader.app.request import GradeRequest
 from grader.app.seeds import PRACTICE
+from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
 from grader.core.submission import Submission

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 from grader.core.chart import Chart, Excerpt, Figure
+from grader.core.dataclass import dataclass
 from grader.core.exercise import DUE_DATE, OPEN, PUBLISHED, Audience, Location, Outcome, Shows, strictest, variant_notes
 from grader.core.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.reporting.wording import points

@@ -10,10 +10,11 @@ import stat
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError
 from grader.core.report import Report
 from grader.reporting.audience import ANYBODY, Readers

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Outcome
 from grader.core.report import ExerciseReport, Report, ReportedFault, Verdict
 from grader.reporting import wording

@@ -7,9 +7,10 @@ import io
 import json
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from statistics import fmean
 
+from grader.core.dataclass import dataclass
 from grader.reporting.escape import csv_cell, shown
 from grader.reporting.json_report import ReportData
 

@@ -10,11 +10,11 @@ import re
 import secrets
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path, PurePath
 from typing import Any, TypeVar
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
 from grader.core.shipped import PACKAGE, shipped

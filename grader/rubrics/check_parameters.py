@@ -7,13 +7,13 @@ import inspect
 import re
 import types
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from pydantic import AfterValidator, Field, create_model
 from pydantic.config import JsonDict
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import DurationNs, FieldOf, Hertz, Kind, Least, Unit
 from grader.core.scenario import Simulated
 from grader.rubrics.drawing import (

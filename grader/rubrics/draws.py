@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Drawn, Value
 
 

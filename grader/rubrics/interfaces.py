@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cached_property
 from pathlib import Path
 from types import UnionType
@@ -13,6 +13,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.quantities import FieldOf
 from grader.core.scenario import ActionGoal, MessageStream, NumberStream, ServiceCalls, ServiceServer, Stimulus

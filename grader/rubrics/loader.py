@@ -6,12 +6,13 @@ import ast
 import re
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Check, Criterion, Exercise, Variant
 from grader.core.limits import Limits

@@ -13,12 +13,12 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from grader.core.author_files import line_of, run, words_of
+from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.interfaces.definitions import files_in
 from grader.rubrics.check_parameters import choice_model, simulation_shape

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.quantities import NS_PER_MS
 from grader.core.scenario import Between, Choose, FieldSpec, Simulated, Written

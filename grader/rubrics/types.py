@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from typing import Annotated, Any
@@ -24,6 +23,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 from typing_extensions import Self
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import Unit
 from grader.judging.series import FormulaError, curve
 from grader.rubrics.units import QuantityError, missing_unit, parse_quantity, quantity_example, quantity_pattern

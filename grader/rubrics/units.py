@@ -2,10 +2,10 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import GIB, KIB, MIB, NS_PER_MS, NS_PER_S, Unit
 from grader.submissions.collected import listed, shown
 

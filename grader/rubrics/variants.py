@@ -7,13 +7,14 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
 from typing import Annotated
 
 from pydantic import ConfigDict, PlainValidator, WithJsonSchema, model_validator
 from typing_extensions import Self
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Value, Variant
 from grader.rubrics.mistakes import nearest
 from grader.rubrics.types import Id, Shape, must, wrong

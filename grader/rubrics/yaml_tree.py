@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import cast
 
 from ruamel.yaml import YAML
@@ -12,6 +12,7 @@ from ruamel.yaml.error import MarkedYAMLError, StreamMark, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
+from grader.core.dataclass import dataclass
 from grader.submissions.collected import shown
 
 #: Deepest nesting, and most values after expanding aliases: a small file can expand to billions of values.

@@ -8,10 +8,11 @@ import tempfile
 import tokenize
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError, GraderError
 from grader.similarity.library import (
     PIECE,

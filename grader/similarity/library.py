@@ -7,9 +7,10 @@ import signal
 import threading
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from types import FrameType
 from typing import Any
+
+from grader.core.dataclass import dataclass
 
 #: Line numbers, starting at 1, in order.
 Lines = tuple[int, ...]

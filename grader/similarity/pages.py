@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 
 from jinja2 import Template
 from markupsafe import Markup
 
+from grader.core.dataclass import dataclass
 from grader.reporting.class_page.render import REPORT_PAGE, result_link
 from grader.reporting.escape import csv_cell, shown
 from grader.reporting.html.assets import bundle, page_environment

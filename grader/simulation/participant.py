@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_S, seconds
 
 #: A message to publish: its topic, and its fields as plain values, nested by name; fields left out keep their defaults.

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Topic, seconds
 from grader.simulation.participant import Moment, Output, Simulation
 

@@ -6,7 +6,9 @@ import os
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
+
+from grader.core.dataclass import dataclass
 
 #: Longest piece of foreign text in a message, in characters.
 SHOWN_LENGTH = 80

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+
+from grader.core.dataclass import dataclass
 
 FILE, FOLDER, LINK = "a file", "a folder", "a link"
 

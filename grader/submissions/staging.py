@@ -7,10 +7,10 @@ import hashlib
 import os
 import stat
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError, SubmissionError
 from grader.submissions.collected import (
     GENERATED_MARKERS,

@@ -12,7 +12,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from distributed import Client, Future, KilledWorker, Security
@@ -22,6 +22,7 @@ from grader.classroom.cluster import jobs as remote
 from grader.classroom.cluster.sending import answer_in, files_wanted, job_for, store_result, terms_of
 from grader.classroom.local import Attempt, MakeScheduler, OnStep, Task, failed
 from grader.classroom.messages import Fitness, Terms, pack, unpack
+from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault, HarnessError
 
 #: Larger payloads are scattered to a worker instead of passing through the scheduler with the task.

@@ -7,13 +7,13 @@ import json
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 import msgspec
 
 from grader.classroom.roster import fold_handle, spellings
+from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError, GraderError
 
 #: The file of a results folder that marks are read from.

@@ -12,7 +12,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import lru_cache
 from typing import Any
 
@@ -23,6 +23,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from ruamel.yaml import YAML
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import EvidenceError
 from grader.core.quantities import NS_PER_S
 from grader.core.releases import DEFAULT

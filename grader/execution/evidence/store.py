@@ -6,12 +6,13 @@ import json
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import EvidenceError
 from grader.core.exercise import Exercise
 from grader.core.report import Environment, Reproduction

@@ -8,11 +8,11 @@ import re
 import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import ClassVar
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault
 from grader.core.limits import Limits
 from grader.execution.sandbox import seccomp

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Fact, Property, TierReport, missing
+from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox import selftest, tiers

@@ -11,10 +11,10 @@ import stat
 import sysconfig
 import threading
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 import grader
+from grader.core.dataclass import dataclass
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.protocol import WorkerView
 

@@ -11,12 +11,13 @@ import shutil
 import socket
 import stat
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import grader
 from grader.core.checkup import PROPERTIES, TIERS, Property, TierReport
+from grader.core.dataclass import dataclass
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.bubblewrap import SYSTEM_PROGRAMS
 from grader.execution.sandbox.properties import SETTINGS

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.execution.ros_installation import PythonRuntime
 

@@ -7,9 +7,9 @@ import platform
 import socket
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 
+from grader.core.dataclass import dataclass
 from grader.execution.sandbox.start import OWN_PROCESS
 
 LOAD = 0x20  # BPF_LD | BPF_W | BPF_ABS

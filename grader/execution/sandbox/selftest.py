@@ -13,11 +13,11 @@ import struct
 import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from grader.core.checkup import PROPERTIES, TIERS, Property, TierReport, missing
+from grader.core.dataclass import dataclass
 from grader.execution.codec import to_json
 from grader.execution.domains import private_domains, shared_domains
 from grader.execution.ros_installation import RosInstallation

@@ -13,11 +13,11 @@ import secrets
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
 from grader.core.checkup import TIERS
+from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault, HarnessError
 from grader.core.limits import Limits
 from grader.execution.sandbox import seccomp

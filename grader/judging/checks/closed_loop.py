@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import DurationNs, FieldNumber, FieldOf, Topic, seconds

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Literal
 
 from grader.core.chart import Band
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern, seconds, within
 from grader.core.trace import Message, Trace

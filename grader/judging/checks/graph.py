@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import DurationNs, seconds

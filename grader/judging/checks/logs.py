@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Literal
 
 from grader.core.chart import Band, Level, Look, Panel, Tone
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Location, ProblemKind
 from grader.core.quantities import DurationNs, FieldOf, Pattern, seconds, within
 from grader.core.trace import LogRecord, Message, Trace

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 from grader.core.chart import Band, Case, Chart, Look, Panel, Point, Series, Tone
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, seconds, within

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from grader.core.chart import Case, Look, Panel
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Location, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, seconds, within

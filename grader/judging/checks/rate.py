@@ -5,10 +5,10 @@ from __future__ import annotations
 import statistics
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 from grader.core.chart import Band, Chart, Level, Panel, Point, Tone
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace

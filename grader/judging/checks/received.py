@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from functools import partial
 from itertools import pairwise
 from typing import Annotated
 
 from grader.core.chart import Look, Panel, Tone
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S, FieldOf, seconds

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby, pairwise
 from typing import Annotated
 
 from grader.core.chart import Look, Panel, Tone
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, Pattern, ServiceType, seconds, within

@@ -6,11 +6,12 @@ import math
 import statistics
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 from typing import Annotated, Literal
 
 from grader.core.chart import Band, Case, Level, Tone
+from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, seconds, within

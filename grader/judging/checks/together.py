@@ -6,9 +6,10 @@ import statistics
 from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace

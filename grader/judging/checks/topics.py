@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from grader.core.chart import Level
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import SLACK, FieldNumber, FieldOf, Hertz, seconds, within
 from grader.core.trace import Endpoint, Message, Trace

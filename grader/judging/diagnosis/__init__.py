@@ -5,8 +5,9 @@ from __future__ import annotations
 import ast
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Check, Criterion, Exercise, Outcome, ProblemKind
 from grader.core.report import Verdict
 from grader.core.submission import Submission

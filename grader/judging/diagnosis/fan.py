@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Outcome, ProblemKind
 from grader.core.quantities import within
 from grader.judging.checks.fan import ThresholdResponse

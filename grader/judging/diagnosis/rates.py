@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import ProblemKind
 from grader.judging.checks.rate import TopicRate
 from grader.judging.diagnosis.rules import Case, Clue, lines_of, rule, silent_topic

@@ -5,10 +5,10 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Check, Criterion, Location, Outcome, ProblemKind
 from grader.core.report import Verdict
 from grader.core.trace import Fault, FaultKind, Trace

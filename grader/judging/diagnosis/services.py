@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from dataclasses import dataclass
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Outcome, ProblemKind
 from grader.core.trace import LogRecord
 from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ast
 import re
-from dataclasses import dataclass
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Location, Outcome
 from grader.core.quantities import seconds
 from grader.judging.checks.fan import ThresholdResponse

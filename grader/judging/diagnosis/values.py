@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import ProblemKind
 from grader.core.trace import Message
 from grader.judging.checks.fields import FieldFunction, RandomInRange

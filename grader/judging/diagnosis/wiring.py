@@ -6,9 +6,9 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import islice
 
+from grader.core.dataclass import dataclass
 from grader.judging.diagnosis.names import LOG_METHODS, SPINS
 from grader.judging.source import (
     Function,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar, cast
 
 import libcst as cst
 from libcst import matchers as m
 from libcst.metadata import CodeRange, MetadataWrapper, ParentNodeProvider, PositionProvider
+
+from grader.core.dataclass import dataclass
 
 Node = TypeVar("Node", bound=cst.CSTNode)
 #: A node and its replacement: another node, several nodes, or nothing.

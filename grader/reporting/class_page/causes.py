@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from typing import Any
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Outcome
 from grader.reporting.class_page.contents import LOST
 from grader.reporting.json_report import ReportData

@@ -5,10 +5,10 @@ from __future__ import annotations
 import statistics
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Outcome
 from grader.reporting.json_report import ReportData
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault
 from grader.reporting.escape import shown
 

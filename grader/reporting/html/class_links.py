@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from grader.core.dataclass import dataclass
 from grader.reporting.html.assets import fill
 
 

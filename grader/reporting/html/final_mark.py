@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from markupsafe import Markup
 
+from grader.core.dataclass import dataclass
 from grader.reporting.html.assets import bundle, fill, page_template
 
 

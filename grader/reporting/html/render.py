@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -13,6 +12,7 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from grader.core.chart import Chart, Excerpt, Figure, GraphFigure, Panel, Playback, Series, Stage, TopicValues
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Location, Outcome, exercise_name
 from grader.core.report import ExerciseReport, JsonObject, JsonValue, Report, ReportedFault, Verdict
 from grader.core.trace import ClockKind, Endpoint, GraphSnapshot

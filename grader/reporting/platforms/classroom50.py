@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from datetime import datetime, timezone
 from pathlib import Path
 
+from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError
 from grader.core.exercise import Outcome
 from grader.core.report import ExerciseReport, JsonObject, Report, Verdict

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import PurePosixPath
 
+from grader.core.dataclass import dataclass
 from grader.core.exercise import Location, Outcome, exercise_name
 from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
