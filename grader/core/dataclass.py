@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 __all__ = ["dataclass"]
 
+Fields = tuple[Field[Any], ...]
+
 if TYPE_CHECKING:
     from dataclasses import dataclass
 else:
@@ -38,18 +40,19 @@ def _decorated(cls: Any, *, eq: bool = True, order: bool = False, frozen: bool =
     params = cls.__dataclass_params__
     params.init = params.repr = True
     params.eq, params.order, params.frozen = eq, order, frozen
+    every = fields(cls)
     methods: dict[str, Any] = {"__init__": _Init(cls, frozen=frozen), "__repr__": _repr_of(cls)}
     if eq:
-        methods |= _comparisons_of(cls, ("__eq__", "__lt__", "__le__", "__gt__", "__ge__") if order else ("__eq__",))
+        methods |= _comparisons_of(every, ("__eq__", "__lt__", "__le__", "__gt__", "__ge__") if order else ("__eq__",))
     if frozen:
-        methods |= _frozen_methods_of(cls)
+        methods |= _frozen_methods_of(cls, every)
     if frozen and standard.get("slots"):
         methods |= {"__getstate__": _get_state, "__setstate__": _set_state}
     for name, method in methods.items():
         if name not in vars(cls):
             setattr(cls, name, method)
     if eq and not hashes:
-        cls.__hash__ = _hash_of(cls) if frozen else None
+        cls.__hash__ = _hash_of(every) if frozen else None
     return cls  # type: ignore[no-any-return]
 
 
@@ -120,16 +123,16 @@ def _values_of(names: Sequence[str]) -> Callable[[Any], tuple[Any, ...]]:
 
 
 def _repr_of(cls: type) -> Callable[[Any], str]:
-    names = [field.name for field in fields(cls) if field.repr]
-
+    @recursive_repr("...")
     def represent(self: Any) -> str:
-        return f"{type(self).__qualname__}({', '.join([f'{name}={getattr(self, name)!r}' for name in names])})"
+        shown = [f"{field.name}={getattr(self, field.name)!r}" for field in fields(cls) if field.repr]
+        return f"{type(self).__qualname__}({', '.join(shown)})"
 
-    return recursive_repr("...")(represent)
+    return represent
 
 
-def _comparisons_of(cls: type, methods: Iterable[str]) -> dict[str, Callable[[Any, Any], bool]]:
-    values = _values_of([field.name for field in fields(cls) if field.compare])
+def _comparisons_of(every: Fields, methods: Iterable[str]) -> dict[str, Callable[[Any, Any], bool]]:
+    values = _values_of([field.name for field in every if field.compare])
 
     def comparison(operation: Callable[[Any, Any], bool]) -> Callable[[Any, Any], bool]:
         def compare(self: Any, other: Any) -> bool:
@@ -140,14 +143,14 @@ def _comparisons_of(cls: type, methods: Iterable[str]) -> dict[str, Callable[[An
     return {name: comparison(getattr(operator, name)) for name in methods}
 
 
-def _hash_of(cls: type) -> Callable[[Any], int]:
-    hashed = [field for field in fields(cls) if (field.compare if field.hash is None else field.hash)]
+def _hash_of(every: Fields) -> Callable[[Any], int]:
+    hashed = [field for field in every if (field.compare if field.hash is None else field.hash)]
     values = _values_of([field.name for field in hashed])
     return lambda self: hash(values(self))
 
 
-def _frozen_methods_of(cls: Any) -> dict[str, Callable[..., None]]:
-    names = frozenset(field.name for field in fields(cls))
+def _frozen_methods_of(cls: Any, every: Fields) -> dict[str, Callable[..., None]]:
+    names = {field.name for field in every}
 
     def set_attribute(self: Any, name: str, value: Any) -> None:
         if type(self) is cls or name in names:
