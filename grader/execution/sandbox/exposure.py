@@ -11,7 +11,7 @@ import stat
 import sysconfig
 import threading
 from collections.abc import Iterable
-from pathlib import Path, PurePath
+from pathlib import Path
 
 import grader
 from grader.core.dataclass import dataclass
@@ -61,26 +61,33 @@ def parents_of(paths: Iterable[Path]) -> tuple[Path, ...]:
 
 def _follow(path: Path) -> tuple[Path | None, dict[Path, str]]:
     """Resolve a path part by part and note each link on the way; None if the path does not exist."""
+    # Text, not paths: a run looks at a thousand parts
     links: dict[Path, str] = {}
-    done, to_do = Path("/"), list(PurePath(os.path.normpath(path)).parts[1:])
+    done, to_do = "", os.path.normpath(path).strip("/").split("/")
     passed = 0
     while to_do:
-        step = done / to_do.pop(0)
-        if step.name == "..":
-            done = done.parent
-        elif step.is_symlink():
-            passed += 1
-            if passed > MOST_LINKS:
-                return None, {}
-            target = os.readlink(step)  # noqa: PTH115 -- Path.readlink drops a leading "./"
-            links[step] = target
-            to_do[:0] = [part for part in PurePath(target).parts if part != "/"]
-            done = Path("/") if target.startswith("/") else done
-        elif step.exists():
-            done = step
-        else:
+        name = to_do.pop(0)
+        if name in ("", "."):
+            continue
+        if name == "..":
+            done = done.rpartition("/")[0]
+            continue
+        step = f"{done}/{name}"
+        try:
+            is_link = stat.S_ISLNK(os.lstat(step).st_mode)
+        except (FileNotFoundError, NotADirectoryError):
             return None, {}
-    return done, links
+        if not is_link:
+            done = step
+            continue
+        passed += 1
+        if passed > MOST_LINKS:
+            return None, {}
+        target = os.readlink(step)  # noqa: PTH115 -- Path.readlink drops a leading "./"
+        links[Path(step)] = target
+        to_do[:0] = target.split("/")
+        done = "" if target.startswith("/") else done
+    return Path(done or "/"), links
 
 
 # Without a user namespace, the kernel counts processes by user. Students that run at the same time on one machine need
