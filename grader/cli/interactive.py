@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import time
-import webbrowser
 from collections.abc import Generator
 from pathlib import Path
 
@@ -67,6 +66,8 @@ def _start_of(path: Path) -> bytes:
 
 def open_page(path: Path) -> None:
     """Open a page in a browser, and say where it is; without a browser, say what to do with it."""
+    import webbrowser
+
     where = path.resolve()
     desktop = any(os.environ.get(name) for name in ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY"))
     try:

@@ -13,7 +13,6 @@ from pathlib import Path, PurePosixPath
 from grader.core.errors import SubmissionError
 from grader.core.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
 from grader.execution.executables import Executable, executables
-from grader.submissions.archives import ARCHIVE_SUFFIXES, HEAD_BYTES, MAX_ARCHIVE_BYTES, archive_kind, collect_archive
 from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, shown
 from grader.submissions.staging import collect_folder, read_start, write_files
 
@@ -99,6 +98,14 @@ def _mode(path: str, where: str) -> int:
 def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
     if not source.is_file():
         raise SubmissionError(f"{where}: expected {_EXPECTED}, found a device, pipe or socket")
+    from grader.submissions.archives import (  # noqa: PLC0415 - most submissions are folders
+        ARCHIVE_SUFFIXES,
+        HEAD_BYTES,
+        MAX_ARCHIVE_BYTES,
+        archive_kind,
+        collect_archive,
+    )
+
     content = read_start(source, MAX_ARCHIVE_BYTES + 1, where=where)
     kind = archive_kind(content[:HEAD_BYTES])
     # A program may look like an old tar archive, by chance or on purpose.
@@ -116,6 +123,8 @@ def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Col
     names = [name for name, _ in collected.files]
     if _has_python(names):
         return collected
+    from grader.submissions.archives import ARCHIVE_SUFFIXES, collect_archive  # noqa: PLC0415 - as above
+
     archives = [(name, content) for name, content in collected.files if name.casefold().endswith(ARCHIVE_SUFFIXES)]
     if len(archives) != 1:
         raise _no_python(collected, wanted, where)
@@ -132,6 +141,8 @@ def _has_python(names: Iterable[str]) -> bool:
 
 
 def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> SubmissionError:
+    from grader.submissions.archives import ARCHIVE_SUFFIXES  # noqa: PLC0415 - as above
+
     names = [name for name, _ in collected.files]
     archives = [name for name in names if name.casefold().endswith(ARCHIVE_SUFFIXES)]
     similar = [name for want in wanted for name in _similar(want, names, wanted)]

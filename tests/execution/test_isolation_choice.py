@@ -23,8 +23,8 @@ from grader.execution.sandbox import properties as remedies
 from grader.execution.sandbox.bubblewrap import Bubblewrap
 from grader.execution.sandbox.choose import choose_isolation, inspect_tier, inspect_tiers, sandbox_memory
 from grader.execution.sandbox.memory import Memory
+from grader.execution.sandbox.properties import NO_EXCHANGE
 from grader.execution.sandbox.tiers import ISOLATING, Plain, isolation_from_name
-from grader.execution.sandbox.trial import NO_EXCHANGE
 from grader.execution.temp_dirs import OWN
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,13 +9,12 @@ from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Fact, P
 from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault
 from grader.execution.ros_installation import RosInstallation
-from grader.execution.sandbox import selftest, tiers
+from grader.execution.sandbox import tiers
 from grader.execution.sandbox.bubblewrap import is_installed
 from grader.execution.sandbox.memory import Memory
-from grader.execution.sandbox.properties import NOTHING, remedy_for
+from grader.execution.sandbox.properties import NO_EXCHANGE, NOTHING, remedy_for
 from grader.execution.sandbox.protocol import Isolation
 from grader.execution.sandbox.tiers import ISOLATING, isolation_from_name
-from grader.execution.sandbox.trial import NO_EXCHANGE
 
 AUTO = "auto"
 #: How much of the reason against each tier is shown if all tiers are refused.
@@ -87,6 +86,8 @@ def inspect_tier(
     remembered = None if afresh else memory.recall()
     if remembered is not None:
         return remembered
+    from grader.execution.sandbox import selftest  # noqa: PLC0415 - most runs use the result of an earlier one
+
     progress(f"trying the sandbox {name}{'' if afresh else f' ({memory.lapse()})'}")
     report = selftest.inspect(isolation, ros)
     if report.properties and not _kept(report):

@@ -10,6 +10,8 @@ from pathlib import Path
 from grader.core.checkup import TierReport
 
 NOTHING = "none"
+#: What is noted, and under which property, if no message made the round of a self-test.
+EXCHANGE, NO_EXCHANGE = "dds_private", "no ROS message came back"
 
 _SYSTEM_LIMITS = {"vsock": "seccomp", "mem": "RLIMIT_AS", "pids": "RLIMIT_NPROC", "cpu": "RLIMIT_CPU"}
 _NAMESPACES = {

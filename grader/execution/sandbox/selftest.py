@@ -23,9 +23,8 @@ from grader.execution.domains import private_domains, shared_domains
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.environment import PACKAGE, worker_environment
 from grader.execution.sandbox.exposure import worker_view
-from grader.execution.sandbox.properties import mechanism
+from grader.execution.sandbox.properties import EXCHANGE, NO_EXCHANGE, mechanism
 from grader.execution.sandbox.protocol import Isolation
-from grader.execution.sandbox.trial import EXCHANGE, NO_EXCHANGE
 
 TRIAL_S = 45.0
 STAGED = "probe.txt"

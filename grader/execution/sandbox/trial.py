@@ -26,6 +26,7 @@ from grader.execution.codec import from_json
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox import probe
 from grader.execution.sandbox.environment import quick_discovery
+from grader.execution.sandbox.properties import EXCHANGE, NO_EXCHANGE
 from grader.execution.sandbox.protocol import Isolation, StudentProcess
 from grader.execution.sandbox.start import SPARE
 from grader.execution.sandbox.starter import StartedProcess, Starter
@@ -34,8 +35,6 @@ from grader.execution.sandbox.tiers import HOST, isolation_from_name
 #: Seconds in which a message must have come back, and between two attempts to send it.
 EXCHANGE_S, AGAIN_S = 15.0, 0.03
 LIMITS = Limits(processes=48)
-#: What is noted, and under which property, if no message made the round.
-EXCHANGE, NO_EXCHANGE = "dds_private", "no ROS message came back"
 
 
 def main() -> None:
