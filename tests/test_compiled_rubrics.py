@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from grader import compiled as compiled_module
 from grader.app.grade import builtin_recording, read_exercises
 from grader.app.request import GradeRequest
+from grader.compiled import compiled, state_of, state_of_package
 from grader.execution.bag import read_odometry
-from grader.rubrics import builtin
-from grader.rubrics.builtin import builtin_exercises, builtin_headers, builtin_odometry, compiled
+from grader.rubrics.builtin import builtin_exercises, builtin_headers, builtin_odometry
 from grader.rubrics.loader import read_rubric
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder for compiled forms."""
-    monkeypatch.setattr(builtin, "COMPILED", tmp_path / "compiled")
-    builtin.COMPILED.mkdir()
-    return builtin.COMPILED
+    monkeypatch.setattr(compiled_module, "COMPILED", tmp_path / "compiled")
+    compiled_module.COMPILED.mkdir()
+    return compiled_module.COMPILED
 
 
 @pytest.fixture
@@ -47,18 +49,42 @@ def test_the_compiled_form_equals_its_sources(folder: Path) -> None:
 
 def test_an_unchanged_source_is_not_read_again(folder: Path, source: Path) -> None:
     """The value is loaded."""
-    assert compiled("it", [source], source.read_text) == "one"
-    assert compiled("it", [source], never) == "one"
+    assert compiled("it", state_of([source]), source.read_text) == "one"
+    assert compiled("it", state_of([source]), never) == "one"
 
 
 def test_a_changed_source_is_read_again(folder: Path, source: Path) -> None:
     """Also one that was added."""
-    compiled("it", [source], source.read_text)
+    compiled("it", state_of([source]), source.read_text)
     source.write_text("three")
-    assert compiled("it", [source], source.read_text) == "three"
+    assert compiled("it", state_of([source]), source.read_text) == "three"
     other = source.with_name("other")
     other.write_text("")
-    assert compiled("it", [source, other], lambda: "more") == "more"
+    assert compiled("it", state_of([source, other]), lambda: "more") == "more"
+
+
+def test_a_changed_added_or_removed_module_changes_the_state_of_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Byte code and other files do not."""
+    monkeypatch.setattr(compiled_module, "PACKAGE", tmp_path)
+    module, inner = tmp_path / "one.py", tmp_path / "inner" / "two.py"
+    inner.parent.mkdir()
+    states = []
+    for change in (
+        lambda: module.write_text("1"),
+        lambda: inner.write_text("1"),
+        lambda: module.write_text("12"),
+        lambda: os.utime(inner, (1, 1)),
+        inner.unlink,
+    ):
+        change()
+        states.append(state_of_package.__wrapped__())
+    assert len(set(states)) == len(states)
+    (tmp_path / "__pycache__").mkdir()
+    (tmp_path / "__pycache__" / "three.py").write_text("")
+    (tmp_path / "data").write_text("")
+    assert state_of_package.__wrapped__() == states[-1]
 
 
 @pytest.mark.parametrize(
@@ -66,17 +92,17 @@ def test_a_changed_source_is_read_again(folder: Path, source: Path) -> None:
 )
 def test_a_damaged_form_is_ignored(folder: Path, source: Path, damage: Callable[[bytes], bytes]) -> None:
     """And replaced."""
-    compiled("it", [source], source.read_text)
+    compiled("it", state_of([source]), source.read_text)
     (file,) = folder.iterdir()
     file.write_bytes(damage(file.read_bytes()))
-    assert compiled("it", [source], lambda: "again") == "again"
-    assert compiled("it", [source], never) == "again"
+    assert compiled("it", state_of([source]), lambda: "again") == "again"
+    assert compiled("it", state_of([source]), never) == "again"
 
 
 def test_a_folder_that_cannot_be_written_to_does_not_matter(folder: Path, source: Path) -> None:
     """The sources are read every time, and nothing is left behind."""
     folder.rmdir()
-    assert [compiled("it", [source], source.read_text) for _ in range(2)] == ["one", "one"]
+    assert [compiled("it", state_of([source]), source.read_text) for _ in range(2)] == ["one", "one"]
     assert not folder.exists()
 
 

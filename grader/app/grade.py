@@ -15,6 +15,7 @@ from grader.app.interface_packages import definitions, known_interfaces, provide
 from grader.app.request import GradeRequest, recording_digest, reproduction
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
+from grader.compiled import compiled, state_of
 from grader.core.errors import EvidenceError, SubmissionError
 from grader.core.exercise import Exercise, exercise_name
 from grader.core.releases import TRIED
@@ -28,7 +29,7 @@ from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
 from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
-from grader.rubrics.builtin import builtin_exercises, builtin_odometry, compiled, exercise_ids
+from grader.rubrics.builtin import builtin_exercises, builtin_odometry, exercise_ids
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import read_reaches, read_sources
 from grader.submissions.submission import stage_collected, stage_submission
@@ -212,7 +213,7 @@ def builtin_recording() -> Odometry:
     """Return the built-in /odom recording."""
     folder = builtin_odometry()
     code = (PACKAGE / name for name in ("execution/bag.py", "core/scenario.py"))
-    return compiled("odometry", [*folder.iterdir(), *code], lambda: read_odometry(folder))
+    return compiled("odometry", state_of([*folder.iterdir(), *code]), lambda: read_odometry(folder))
 
 
 def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odometry | None:

@@ -7,7 +7,6 @@ Usage: python -m grader.execution.byte_code, with the interpreter and environmen
 
 from __future__ import annotations
 
-import compileall
 import importlib
 import importlib.util
 import json
@@ -20,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from grader.compiled import compiled, state_of_package
 from grader.core.checkup import Fact
 from grader.execution.ros_installation import MESSAGE_PACKAGES, PythonRuntime
 from grader.execution.sandbox.environment import PACKAGE, worker_environment
@@ -35,13 +35,22 @@ TIMEOUT_S = 120.0
 
 
 def compile_own() -> None:
-    """Compile the modules of this package, where needed and possible."""
-    compileall.compile_dir(PACKAGE, quiet=2)
+    """Compile the modules of this package, where possible, if one of them has changed since this was last done.
+
+    Byte code that was deleted since is not made again: the interpreter then compiles the module, which takes longer.
+    """
+    compiled("byte_code", state_of_package(), _compile)
+
+
+def _compile() -> bool:
+    import compileall  # noqa: PLC0415 - few runs compile anything
+
+    return bool(compileall.compile_dir(PACKAGE, quiet=2))
 
 
 def byte_code(runtime: PythonRuntime) -> Fact:
     """Check whether the byte code of an installation is up to date, and name the command that compiles it."""
-    compile_own()
+    _compile()
     with tempfile.TemporaryDirectory(prefix="grade-doctor-") as folder:
         try:
             done = subprocess.run(

@@ -12,13 +12,14 @@ import keyword
 import math
 import re
 import sys
-import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError
 
+#: The packages that come with the grader.
+SHIPPED = Path(__file__).with_name("shipped")
 KINDS = ("msg", "srv", "action")
 # What the sections of a definition are called after its name.
 SECTIONS = {"msg": ("",), "srv": ("_Request", "_Response"), "action": ("_Goal", "_Result", "_Feedback")}
@@ -179,7 +180,7 @@ def find_packages(folder: Path) -> tuple[InterfacePackage, ...]:
 
 def shipped_packages() -> tuple[InterfacePackage, ...]:
     """The packages that come with the grader: those that courses use and no wheel holds, as ROS 2 Jazzy has them."""
-    return find_packages(Path(__file__).with_name("shipped"))
+    return find_packages(SHIPPED)
 
 
 def _counts(path: Path, root: Path) -> bool:
@@ -203,6 +204,8 @@ def _package_name(home: Path) -> str:
         text = described.read_text(encoding="utf-8", errors="replace")
         if "<!ENTITY" in text:
             raise DefinitionError(name, "package.xml", 0, "it declares entities", "leave them out")
+        import xml.etree.ElementTree as ET  # noqa: PLC0415 - most runs read no manifest
+
         try:
             name = (ET.fromstring(text).findtext("name") or name).strip()  # noqa: S314 - without entities
         except ET.ParseError as error:

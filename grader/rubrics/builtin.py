@@ -1,30 +1,23 @@
-"""Files that ship with the grader: rubrics, templates and integrations; rubrics are also kept in a compiled form."""
+"""Rubrics that ship with the grader, which are also kept in a compiled form."""
 
 from __future__ import annotations
 
-import contextlib
 import difflib
-import hashlib
-import pickle
 import re
-import secrets
-import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path, PurePath
-from typing import Any, TypeVar
+from typing import Any
 
+from grader.compiled import compiled, state_of, state_of_package
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
-from grader.core.shipped import PACKAGE, shipped
+from grader.core.shipped import shipped
 from grader.submissions.collected import shown
 
-#: Where Python keeps the byte code of the package: who may write there decides what the grader executes anyway.
-COMPILED = PACKAGE / "__pycache__"
 #: Suffix of files beside rubrics that are not rubrics: notes on their self-tests.
 NOTES = ".selftest.yaml"
-_Value = TypeVar("_Value")
 
 
 def builtin_odometry() -> Path:
@@ -45,45 +38,13 @@ class Header:
 @cache
 def builtin_exercises() -> tuple[Exercise, ...]:
     """Return the built-in exercises, ordered by number; raises RubricError without any."""
-    return compiled("rubrics", [*_paths(), *PACKAGE.rglob("*.py")], _read_exercises)
+    return compiled("rubrics", state_of(_paths()) + state_of_package(), _read_exercises)
 
 
 def _read_exercises() -> tuple[Exercise, ...]:
     from grader.rubrics.loader import read_rubric  # noqa: PLC0415 - takes long, and the compiled form needs it not
 
     return tuple(read_rubric(header.path) for header in builtin_headers())
-
-
-def compiled(name: str, sources: Iterable[Path], read: Callable[[], _Value]) -> _Value:
-    """Return what `read` returns, from its compiled form if that was made from the same sources.
-
-    A compiled form that cannot be read is ignored, and one that cannot be written is not kept.
-
-    Args:
-        name: Name of the compiled form.
-        sources: The files that the value depends on, by path, size and time of change.
-        read: Reads the sources.
-    """
-    file = COMPILED / f"{name}.{sys.implementation.cache_tag}.pickle"
-    digest = hashlib.sha256()
-    for source in sorted(sources):
-        found = source.stat()
-        digest.update(f"{source} {found.st_size} {found.st_mtime_ns}\n".encode())
-    key = digest.digest()
-    with contextlib.suppress(Exception):  # whatever an incomplete file raises
-        content = file.read_bytes()
-        if content.startswith(key):
-            value: _Value = pickle.loads(content[len(key) :])  # noqa: S301 - as trusted as the byte code beside it
-            return value
-    value = read()
-    draft = file.with_name(f"{file.name}.{secrets.token_hex(8)}")
-    with contextlib.suppress(OSError):
-        try:
-            draft.write_bytes(key + pickle.dumps(value, pickle.HIGHEST_PROTOCOL))
-            draft.replace(file)
-        finally:
-            draft.unlink(missing_ok=True)
-    return value
 
 
 def builtin_rubrics() -> Mapping[str, Path]:

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from grader import compiled as compiled_module
 from grader.core.errors import EnvironmentFault
 from grader.execution import byte_code as byte_code_module
-from grader.execution.byte_code import _roots, byte_code, compile_command, is_current
+from grader.execution.byte_code import _roots, byte_code, compile_command, compile_own, is_current
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox import environment
 from grader.execution.sandbox.environment import PACKAGE
@@ -117,9 +118,23 @@ def test_a_stale_installation_is_told_with_the_command_that_mends_it(
     shutil.copytree(PACKAGE, copy)
     for module in (byte_code_module, environment):
         monkeypatch.setattr(module, "PACKAGE", copy)
-    monkeypatch.setattr(byte_code_module, "compile_own", lambda: None)
+    monkeypatch.setattr(byte_code_module, "_compile", lambda: None)
     Path(importlib.util.cache_from_source(str(copy / "student_host" / "launcher.py"))).write_bytes(b"")
     fact = byte_code(ros.runtime)
     assert fact.fits
     assert fact.value.startswith("missing or stale for 1 file:")
     assert fact.remedy.endswith(f"-m compileall -q -f {copy}")
+
+
+def test_own_modules_are_compiled_once_for_each_state(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A start looks at the byte code of the package only if a module has changed since it was last compiled."""
+    calls: list[bytes] = []
+    state = b"before"
+    monkeypatch.setattr(compiled_module, "COMPILED", tmp_path)
+    monkeypatch.setattr(byte_code_module, "state_of_package", lambda: state)
+    monkeypatch.setattr(byte_code_module, "_compile", lambda: calls.append(state))
+    compile_own()
+    compile_own()
+    state = b"after"
+    compile_own()
+    assert calls == [b"before", b"after"]
