@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import sys
@@ -432,6 +433,8 @@ app.add_command(rubric.selftest_command)
 def main() -> None:
     """Run the command line of this process, and exit."""
     gc.set_threshold(COLLECT_AFTER)
+    # The collections at the exit would look at all that was imported, to free memory that the kernel frees anyway
+    atexit.register(gc.freeze)
     from grader.cli.interactive import process_start
 
     app(prog_name="grade", obj=process_start())
