@@ -128,16 +128,16 @@ class Worker:
         students: list[NodeProcess] = []
         with ExitStack() as stack:
             stack.callback(stop, students)
-            for name, file in plan.processes:
-                start = self._start_bare if plan.bare else self._start
-                students.append(start(plan, name, file, domain))
             from grader.execution.observer import Observer  # noqa: PLC0415 - imports rclpy, which takes long
 
             if plan.clock == ClockKind.WALL.value:
                 late_numpy.load()
 
-            observer = Observer(domain, plan.limits)
+            observer = Observer(domain, plan.limits)  # while the starter is still busy with imports
             stack.callback(observer.close)
+            for name, file in plan.processes:
+                start = self._start_bare if plan.bare else self._start
+                students.append(start(plan, name, file, domain))
             monitor = stack.enter_context(ResourceMonitor(students, plan.limits, budget))
             stack.callback(self._account, monitor)
             runner = _import_runners()["bare" if plan.bare else plan.clock]

@@ -9,7 +9,7 @@ import sys
 
 from grader.execution import late_numpy
 from grader.execution.sandbox.starter_process import execute
-from grader.student_host.quick_imports import import_type_support_loader
+from grader.student_host.quick_imports import import_without_needless
 
 #: Garbage is collected after so many new objects: imports make many, and steps hardly any that are garbage.
 COLLECT_AFTER = 50_000
@@ -23,7 +23,7 @@ def main() -> None:
     executed = execute(**request["starter"]) if request["starter"] else None
     from grader.execution.worker import serve  # noqa: PLC0415 - the starter imports meanwhile
 
-    import_type_support_loader()
+    import_without_needless("rosidl_generator_py")
     serve(request, executed)
 
 

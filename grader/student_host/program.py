@@ -22,7 +22,7 @@ from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_processes
 from .packages import packages_of
-from .quick_imports import import_type_support_loader
+from .quick_imports import import_without_needless
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
@@ -47,7 +47,7 @@ class Host:
     def install_ros(self) -> None:
         """Import rclpy and install the clock in it, once."""
         if not self.has_ros:
-            import_type_support_loader()
+            import_without_needless("rosidl_generator_py")
             self.time.install_ros()
         self.has_ros = True
 

@@ -1,4 +1,4 @@
-"""Imports what loads the type supports of messages, without the generator of their classes, which no node uses."""
+"""Imports packages without those of their imports that no node uses, as if these were not installed."""
 
 from __future__ import annotations
 
@@ -6,20 +6,19 @@ import importlib
 import sys
 from typing import Any
 
-PACKAGE = "rosidl_generator_py"
+#: Package -> a module that it imports if it can, and works without: the generator of message classes, which imports two
+#: parsers, and a plugin for tests. Either takes as long as a fifth of what a node needs.
+NEEDLESS = {"rosidl_generator_py": "rosidl_generator_py.generate_py_impl", "time_machine": "pytest"}
 
 
-def import_type_support_loader() -> None:
-    """Import `rosidl_generator_py` as it is where its generator is not installed, which it allows for.
-
-    The generator imports two parsers, which takes a tenth of the time of all imports of a node.
-    """
-    generator = f"{PACKAGE}.generate_py_impl"
+def import_without_needless(package: str) -> Any:
+    """Import a package of `NEEDLESS`, and return it; what it does without can still be imported afterwards."""
+    needless = NEEDLESS[package]
     modules: dict[str, Any] = sys.modules
-    if PACKAGE in modules or generator in modules:
-        return
-    modules[generator] = None
+    if needless in modules:
+        return importlib.import_module(package)
+    modules[needless] = None  # Python then says that there is no such module
     try:
-        importlib.import_module(PACKAGE)
+        return importlib.import_module(package)
     finally:
-        del modules[generator]
+        del modules[needless]

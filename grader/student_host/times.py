@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any, SupportsIndex
 
 from .clock import VirtualClock
+from .quick_imports import import_without_needless
 from .scheduler import Scheduler
 
 NS_PER_S = 1_000_000_000
@@ -49,7 +50,7 @@ def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
 
 def install_wall_time(clock: VirtualClock) -> None:
     """Make `time.time`, `datetime.now` and related functions virtual, however they were imported."""
-    import time_machine
+    time_machine = import_without_needless("time_machine")
 
     traveller = time_machine.travel(clock.now_ns / NS_PER_S, tick=False).start()
     kind = type(traveller)

@@ -138,11 +138,6 @@ class Starter:
             connection: The process's end of its connection to the grader.
             stdin: Its standard input; None for an empty one.
         """
-        if not self._ready:
-            self._line.settimeout(READY_S)
-            if self._line.recv(16) != b"ready":
-                raise OSError("the starter has ended")
-            self._ready = True
         with ExitStack() as ours, ExitStack() as theirs:
             theirs.callback(os.close, sandbox.status_fd)
             placeholder = subprocess.Popen(
@@ -176,6 +171,7 @@ class Starter:
                 outputs.append(ours.enter_context(os.fdopen(reading, "rb", buffering=0)))
                 theirs.callback(os.close, writing)
                 passed.append(writing)
+            self._await_ready()
             control, its_end = socket.socketpair()
             ours.enter_context(control)
             theirs.enter_context(its_end)
@@ -184,6 +180,14 @@ class Starter:
             process = StartedProcess(placeholder, control, *outputs)
             ours.pop_all()
             return process
+
+    def _await_ready(self) -> None:
+        """Wait until the starter has imported what all processes need; raises OSError if it ends before."""
+        if not self._ready:
+            self._line.settimeout(READY_S)
+            if self._line.recv(16) != b"ready":
+                raise OSError("the starter has ended")
+            self._ready = True
 
     def close(self) -> None:
         """End the starter and what it has started."""
