@@ -290,8 +290,10 @@ class NodeProcess:
 
     def drain(self, reads: int = READS_AT_ONCE) -> None:
         """Read the output so far, with at most `reads` reads from each stream."""
+        ready = {self._sources[descriptor] for descriptor, _ in self._poll.poll(0)}
         for stream in ("stdout", "stderr"):
-            self._read_all(stream, reads)
+            if stream in ready:
+                self._read_all(stream, reads)
 
     def _read_all(self, stream: str, reads: int = READS_AT_ONCE) -> None:
         for _ in range(reads):

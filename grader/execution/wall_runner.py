@@ -89,9 +89,9 @@ class WallRunner(Runner):
             self._later(replace(due, t_ns=now_ns))
         self._services.take()
         self._services.record(now_ns)
-        going = [due.server for due in self._due if isinstance(due, RemoveServer)]
         for server in self._services.done():
-            if server not in going:  # removed later, because its last response would be lost otherwise
+            # removed later, because its last response would be lost otherwise
+            if not any(isinstance(due, RemoveServer) and due.server == server for due in self._due):
                 self._later(RemoveServer(now_ns + LINGER_NS, server))
         for student in self._students:
             if 0 < self._starts_ns.get(student.name, 0) <= now_ns:
@@ -109,6 +109,8 @@ class WallRunner(Runner):
     def _hear(self, student: NodeProcess, now_ns: int) -> None:
         student.drain(READS_A_LOOK)
         reports = [] if student.ended else student.reports()
+        if reports:
+            student.drain(READS_A_LOOK)  # what it has written before the report, but after the first drain
         for report in reports:
             if report is None:
                 self._recorder.add(*student.output(now_ns, final=True), student.death(now_ns))
