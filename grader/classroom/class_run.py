@@ -88,7 +88,7 @@ def grade_class(
         # If a digest is unknown, grading the submission in its own process will report why.
         keys = {name: own[name].key(digest) if digest else "" for name, digest in digests.items()}
         due = due_now(store, intake.entries, keys, course.rerun)
-        run = ClassRun(course, exercises, own, store, watcher, refusals).with_recordings(due, digests)
+        run = ClassRun(course, exercises, own, store, watcher, refusals, digests).with_recordings(due)
         before = len(intake.entries) - len(due)
         watcher.begin(len(due), before, recorded=run.from_recordings)
         book = partial(_book, store, intake, matching, adjustments, keys)

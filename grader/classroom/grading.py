@@ -131,19 +131,20 @@ class ClassRun:
     store: Store
     watcher: Watcher
     refusals: Mapping[str, SubmissionError]  # name of a submission -> why it cannot be used
+    digests: Mapping[str, str]  # name of a submission -> its digest; empty if it cannot be computed
     # Name of a submission -> its recordings that can be used instead of a run
     recordings: Mapping[str, KeptRecordings] = field(default_factory=dict)
 
-    def with_recordings(self, due: Sequence[HandedInEntry], digests: Mapping[str, str]) -> ClassRun:
+    def with_recordings(self, due: Sequence[HandedInEntry]) -> ClassRun:
         """Find the kept recordings of the submissions that are due only because of a changed rubric."""
         found: dict[str, KeptRecordings] = {}
         for entry in due:
             result, own = self.store.kept(entry.name).result, self.conditions[entry.name]
             if entry.name in self.refusals or is_asked_for(self.store, entry.name, self.course.rerun):
                 continue
-            if result is not None and result.recorded == own.recorded(digests[entry.name]):
+            if result is not None and result.recorded == own.recorded(self.digests[entry.name]):
                 exercises = _graded_by(self.course, entry, own, self.exercises)
-                kept = kept_recordings(self.store.place(entry.name), result, own, exercises, digests[entry.name])
+                kept = kept_recordings(self.store.place(entry.name), result, own, exercises, self.digests[entry.name])
                 if kept is not None and (kept.suffice or self.course.runs_here):
                     found[entry.name] = kept
         return replace(self, recordings=found)
@@ -244,6 +245,7 @@ class ClassRun:
             standalone=self.course.standalone,
             deadline_s=deadline_s(self.course.grading.time_budget_s),
             recordings=None if kept is None else kept.evidence.resolve(),
+            spot_check=self.conditions[entry.name].draws(self.digests[entry.name]),
         )
 
     def _stop_if_full(self, status: ResultStatus) -> None:

@@ -10,9 +10,9 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Protocol
 
@@ -47,6 +47,7 @@ class Task:
     variant_key: Path | None = None
     interfaces: tuple[Path, ...] = ()  # folders with interface packages for the whole class
     recordings: Path | None = None  # evidence whose recordings of unchanged exercises are used; None to record all
+    spot_check: bool = False  # whether it is drawn for a check on the wall clock, which takes long
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +91,8 @@ class LocalScheduler:
     """Grades on this machine; relative paths start at the folder, or at the current one if it is None.
 
     A submission that is recorded on the wall clock because virtual time does not suffice spends its time waiting.
-    Another one is begun beside it, so that up to twice as many as `jobs` are being graded.
+    Another one is begun beside it, so that up to twice as many as `jobs` are being graded. Of those that are drawn for
+    a spot check, as many as `jobs` are graded at a time, from the beginning, so that the class does not end with them.
     """
 
     def __init__(self, jobs: int, command: Sequence[str] = WORKER, *, folder: Path | None = None) -> None:
@@ -101,6 +103,7 @@ class LocalScheduler:
         self._lock = threading.Lock()
         self._running: set[subprocess.Popen[bytes]] = set()
         self._idle: list[subprocess.Popen[bytes]] = []
+        self._checked = 0  # submissions that are being graded and are drawn for a spot check
         self._closed = False
 
     def prepare(self, isolation: str) -> Sequence[str]:
@@ -127,8 +130,7 @@ class LocalScheduler:
             pool.shutdown(wait=True, cancel_futures=True)
 
     def _next(self, waiting: deque[Task], on_step: OnStep, places: threading.Semaphore) -> Attempt:
-        with _Place(places) as place:
-            task = waiting.popleft()
+        with _Place(places) as place, self._taken(waiting) as task:
             on_step(task.name, "starting")
             process = self._idle_one()
             if process is not None:
@@ -142,6 +144,20 @@ class LocalScheduler:
             except OSError as error:
                 return failed(task, f"the grader cannot be started: {error.strerror}")
             return self._attempt(process, task, on_step, place)
+
+    @contextmanager
+    def _taken(self, waiting: deque[Task]) -> Iterator[Task]:
+        """Take the task that is graded next."""
+        with self._lock:
+            checked = self._checked < self._jobs
+            task = next((task for task in waiting if task.spot_check == checked), waiting[0])
+            waiting.remove(task)
+            self._checked += task.spot_check
+        try:
+            yield task
+        finally:
+            with self._lock:
+                self._checked -= task.spot_check
 
     def _attempt(self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place) -> Attempt:
         """Grade in a process, and keep it for the next submission unless it failed."""

@@ -284,11 +284,16 @@ class Conditions:
             del depends_on[scenarios]
         return self._digest(depends_on, submission)
 
+    def draws(self, submission: str) -> bool:
+        """Return whether a submission is drawn for a spot check, given its digest."""
+        return is_drawn(self.spot_checks, self.seed or 0, submission)
+
     def _digest(self, depends_on: dict[str, Any], submission: str) -> str:
         if not self.interfaces:
             del depends_on["interfaces"]  # results of earlier versions know none
         # A changed share affects only submissions that are drawn with one share and not with the other.
-        if is_drawn(depends_on.pop("spot_checks"), self.seed or 0, submission):
+        del depends_on["spot_checks"]
+        if self.draws(submission):
             depends_on["spot_check"] = True
         text = json.dumps(depends_on, sort_keys=True)
         return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"

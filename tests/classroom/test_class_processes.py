@@ -132,6 +132,15 @@ def test_another_submission_is_begun_beside_one_that_waits_for_the_wall_clock(tm
     assert heard["waits"] >= "4"
 
 
+def test_spot_checks_begin_early_and_leave_room_for_others(tmp_path: Path) -> None:
+    """As many as jobs are graded at a time, while there are others."""
+    here = LocalScheduler(1, (sys.executable, "-c", WAITING))
+    tasks = [replace(task(tmp_path, label), spot_check=label[0] == "w") for label in ("a", "b", "waits", "waits too")]
+    begun: list[str] = []
+    assert all(a.status.state is State.GRADED for a in here.run(tasks, lambda name, _: begun.append(name)))
+    assert list(dict.fromkeys(begun)) == ["waits", "a", "b", "waits too"]
+
+
 @pytest.mark.parametrize("clock", ["wall", "auto"])
 def test_a_class_that_is_graded_on_the_wall_clock_keeps_to_its_jobs(tmp_path: Path, clock: str) -> None:
     """Recordings in real time disturb each other, so only single ones have others beside them."""
