@@ -4,8 +4,9 @@ Usage: python benchmarks/memory.py [SUBMISSIONS]      a class of 300 unless told
 
 Memory is the proportional set size, which counts shared pages once. It is looked at four times a second, for `grade`
 with the reference solutions, and for `grade batch` with one job and a mixed class; the grader of a class serves all
-jobs and counts for none. Whether memory stays flat is asked of grader and job, in the first and in the last third.
-The exit code is 1 if it does not, or if a job takes too much; what hostile submissions take is their own.
+jobs and counts for none. No submission is drawn for a spot check, because a second one would be graded beside it.
+Whether memory stays flat is asked of grader and job, in the first and in the last third. The exit code is 1 if it does
+not, or if a job takes too much; what hostile submissions take is their own.
 """
 
 from __future__ import annotations
@@ -100,7 +101,7 @@ def of_class(count: int, place: Path) -> bool:
     submissions, results = place / "class", place / "results"
     make_class(submissions, list(kinds(count)))
     order = sorted(path.name for path in submissions.iterdir())
-    options = ["-o", str(results), "--jobs", "1", "--no-progress"]
+    options = ["-o", str(results), "--jobs", "1", "--spot-checks", "0%", "--no-progress"]
     looks = watched(
         [GRADE, "batch", str(submissions), *options], lambda: len(list(results.glob("students/*/result.json")))
     )
