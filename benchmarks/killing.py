@@ -7,7 +7,8 @@ Usage: python benchmarks/killing.py [RUNS] [SUBMISSION | --class]
 The process is drawn from one kind at a time: the grader, a worker, a starter, a student's process, bubblewrap, or a job
 of a class, at a moment that is drawn from the time that a grading takes. A criterion has to have its usual outcome or
 be undecided, or the student's result is marked as failed. No process and no temporary folder may stay, but that of a
-killed grader or job until the next grading. The same command, which goes on with a class, has to complete it.
+killed grader or job until the next grading, and for a minute if it is empty. The same command, which goes on with a
+class, has to complete it.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from grader.execution.temp_dirs import sweep
+from grader.execution.temp_dirs import FRESH_S, sweep
 from grader.execution.usage import families
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -224,13 +225,18 @@ def main() -> None:
             how, left = ending(grading, expected, kind, code, killed=killed), left_over()
             if kind in SWEPT:
                 sweep(Path(scratch))  # as the next grading does
-            folders = [path.name for path in Path(scratch).iterdir()]
+            folders = [path.name for path in Path(scratch).iterdir() if any(path.iterdir())]
             if left or folders:
                 how = f"left {left or folders}"
             elif how in ("no report", "failed", "undecided"):
                 how = grading.settle(expected) or how
             wrong += how.startswith(BAD)
             counts[kind][how] += 1
+        time.sleep(FRESH_S)
+        sweep(Path(scratch))
+        if folders := [path.name for path in Path(scratch).iterdir()]:
+            print(f"left {folders} for longer than {FRESH_S:.0f} s")
+            wrong += 1
     for kind, hows in counts.items():
         print(kind.ljust(12), ", ".join(f"{count} {how}" for how, count in hows.most_common()))
     sys.exit(bool(wrong))

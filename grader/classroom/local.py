@@ -160,7 +160,7 @@ class LocalScheduler:
                 self._checked -= task.spot_check
 
     def _attempt(self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place) -> Attempt:
-        """Grade in a process, and keep it for the next submission unless it failed."""
+        """Grade in a process, and keep it for the next submission unless it failed, or others have taken its place."""
         overdue, status = threading.Event(), None
 
         def give_up() -> None:
@@ -174,7 +174,7 @@ class LocalScheduler:
             status = self._listen(process, task, on_step, place)
         finally:
             timer.cancel()
-            if status is None or status.state is State.FAILED:
+            if status is None or status.state is State.FAILED or not place.taken:
                 self._end(process)
             else:
                 with self._lock:
@@ -257,11 +257,11 @@ class _Place:
 
     def __init__(self, places: threading.Semaphore) -> None:
         self._places = places
-        self._taken = False
+        self.taken = False
 
     def __enter__(self) -> _Place:
         self._places.acquire()
-        self._taken = True
+        self.taken = True
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -269,8 +269,8 @@ class _Place:
 
     def leave(self) -> None:
         """Leave the place to the next submission."""
-        if self._taken:
-            self._taken = False
+        if self.taken:
+            self.taken = False
             self._places.release()
 
 

@@ -132,6 +132,17 @@ def test_another_submission_is_begun_beside_one_that_waits_for_the_wall_clock(tm
     assert heard["waits"] >= "4"
 
 
+def test_a_process_that_others_were_begun_beside_ends_with_its_submission(tmp_path: Path) -> None:
+    """Otherwise two processes for each job would be kept, with all that they have started."""
+    program = WAITING.replace("str(len(os.listdir(begun)))", "str(os.getpid())")
+    here = LocalScheduler(1, (sys.executable, "-c", program))
+    pids: dict[str, str] = {}
+    for attempt in here.run([task(tmp_path, label) for label in ("waits", "a", "b", "c", "d")], pids.__setitem__):
+        if attempt.task.name == "waits":
+            assert not Path(f"/proc/{pids['waits']}").exists()
+    assert len({pids[label] for label in "abcd"}) == 1 < len(set(pids.values()))
+
+
 def test_spot_checks_begin_early_and_leave_room_for_others(tmp_path: Path) -> None:
     """As many as jobs are graded at a time, while there are others."""
     here = LocalScheduler(1, (sys.executable, "-c", WAITING))
