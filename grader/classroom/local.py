@@ -103,7 +103,7 @@ class LocalScheduler:
         self._lock = threading.Lock()
         self._running: set[subprocess.Popen[bytes]] = set()
         self._idle: list[subprocess.Popen[bytes]] = []
-        self._checked = 0  # submissions that are being graded and are drawn for a spot check
+        self._checks = 0  # submissions that are being graded and are drawn for a spot check
         self._closed = False
 
     def prepare(self, isolation: str) -> Sequence[str]:
@@ -130,7 +130,7 @@ class LocalScheduler:
             pool.shutdown(wait=True, cancel_futures=True)
 
     def _next(self, waiting: deque[Task], on_step: OnStep, places: threading.Semaphore) -> Attempt:
-        with _Place(places) as place, self._taken(waiting) as task:
+        with _Place(places) as place, self._next_task(waiting) as task:
             on_step(task.name, "starting")
             process = self._idle_one()
             if process is not None:
@@ -146,18 +146,18 @@ class LocalScheduler:
             return self._attempt(process, task, on_step, place)
 
     @contextmanager
-    def _taken(self, waiting: deque[Task]) -> Iterator[Task]:
-        """Take the task that is graded next."""
+    def _next_task(self, waiting: deque[Task]) -> Iterator[Task]:
+        """Take the task that is graded next, and count it while it is graded."""
         with self._lock:
-            checked = self._checked < self._jobs
-            task = next((task for task in waiting if task.spot_check == checked), waiting[0])
+            wanted = self._checks < self._jobs
+            task = next((task for task in waiting if task.spot_check == wanted), waiting[0])
             waiting.remove(task)
-            self._checked += task.spot_check
+            self._checks += task.spot_check
         try:
             yield task
         finally:
             with self._lock:
-                self._checked -= task.spot_check
+                self._checks -= task.spot_check
 
     def _attempt(self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place) -> Attempt:
         """Grade in a process, and keep it for the next submission unless it failed, or others have taken its place."""

@@ -107,10 +107,8 @@ class WallRunner(Runner):
             self._next_graph_ns = now_ns + GRAPH_EVERY_NS
 
     def _hear(self, student: NodeProcess, now_ns: int) -> None:
-        student.drain(READS_A_LOOK)
         reports = [] if student.ended else student.reports()
-        if reports:
-            student.drain(READS_A_LOOK)  # what it has written before the report, but after the first drain
+        student.drain(READS_A_LOOK)  # after the reports, so that all that it has written before them is found
         for report in reports:
             if report is None:
                 self._recorder.add(*student.output(now_ns, final=True), student.death(now_ns))
