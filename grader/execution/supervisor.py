@@ -85,6 +85,7 @@ class Worker(ABC):
         worn: Whether it reports that it should be replaced.
         shares: Whether it shares its sandbox with another worker.
         gone: Whether it has ended with another worker.
+        forked: Its forks.
     """
 
     def __init__(self, line: socket.socket, domains: Iterator[int]) -> None:
@@ -93,10 +94,15 @@ class Worker(ABC):
         self._interfaces: tuple[str, ...] = ()
         self._pid = 0
         self.worn = self.shares = self.gone = False
+        self.forked: list[ForkedWorker] = []
 
     def suits(self, plan: Plan) -> bool:
         """Return whether this worker is there and has used no other interface packages than those of a plan."""
         return not self.gone and self._interfaces in ((), plan.interfaces)
+
+    def has_forks(self) -> bool:
+        """Return whether there are forks of this worker, which would end with it."""
+        return any(not fork.gone for fork in self.forked)
 
     def run(self, plan: Plan, budget: RealTimeBudget) -> Trace:
         """Run one plan; raises HarnessError if the worker fails, WorkerLostError if it has ended or times out."""
@@ -193,9 +199,6 @@ class ExecutedWorker(Worker):
         domains: Yields ROS domains that no other program uses.
         scratch: A folder for files that ROS writes, such as logs.
         forks: How many forks it makes; each costs less than another start.
-
-    Attributes:
-        forked: The forks.
     """
 
     def __init__(
@@ -338,7 +341,7 @@ class Recorder:
         self._alive: list[Worker] = []
         self._lock = threading.Lock()
         self._closed = False
-        self._count = workers
+        self._count = self._places = workers
         self._scratch = scratch
         self._on_wall_clock = on_wall_clock
         self._on_the_wall = threading.Lock()  # in real time, recordings would disturb each other
@@ -354,12 +357,33 @@ class Recorder:
         self.close()
 
     def warm_up(self, count: int) -> None:
-        """Start so many workers before anything is recorded: one, and forks that it makes of itself."""
-        # This runs in the caller's thread, which outlives the recorder.
-        places = [self._idle.get() for _ in range(min(count, self._count))]
-        executed = self._start(forks=len(places) - 1)
+        """Start so many workers before anything is recorded: one, and forks that it makes of itself.
+
+        The thread that calls this has to outlive the recorder, as those of the pool do.
+        """
+        count = min(count, self._count)
+        executed = self._start(forks=count - 1)
+        for _ in range(count):
+            self._idle.get()
         for worker in (*executed.forked, executed):  # the last one is the next to be taken, and is ready first
             self._idle.put(worker)
+
+    def _prepare(self, plans: Sequence[Plan]) -> None:
+        """Start a worker with forks if none is busy and plans lack workers; forks share its memory and its starter."""
+        with self._lock:
+            idle = [self._idle.get_nowait() for _ in range(self._idle.qsize())]
+            suitable = [w for w in idle if w is not None and all(map(w.suits, plans))]
+            if len(idle) < self._places or len(suitable) >= min(len(plans), self._count):
+                for worker in reversed(idle):
+                    self._idle.put(worker)
+                return
+            alive, self._alive = self._alive, []
+            self._places = self._count
+            for _ in range(self._count):
+                self._idle.put(None)
+        for worker in alive:
+            worker.close()
+        self.warm_up(self._count)
 
     def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
         """Record every job and return the traces in the same order."""
@@ -370,6 +394,7 @@ class Recorder:
 
         With several workers, the longest scenarios begin first, so that no worker is left alone with one at the end.
         """
+        self._pool.submit(self._prepare, [job.plan for job in jobs]).result()
         order = sorted(range(len(jobs)), key=lambda at: 0 if self._count == 1 else -_length(jobs[at]))
         futures = {at: self._pool.submit(self._record, jobs[at], progress) for at in order}
         return (futures[at].result() for at in range(len(jobs)))
@@ -396,6 +421,8 @@ class Recorder:
             if not job.budget.left_ns:
                 return job.budget.unrecorded(job.plan)
             worker = self._idle.get()
+            while worker is not None and worker.gone and self._drops_place():
+                worker = self._idle.get()
             usable = None
             try:
                 if worker is not None and not worker.suits(job.plan):
@@ -403,10 +430,10 @@ class Recorder:
                     worker = None
                 worker = worker or self._start()
                 trace = worker.run(job.plan, job.budget)
-                if worker.worn:
-                    self._discard(worker)
-                else:
+                if not worker.worn:
                     usable = worker
+                elif not worker.has_forks():
+                    self._discard(worker)
                 return trace
             except HarnessError as error:
                 problem = error.message
@@ -417,7 +444,8 @@ class Recorder:
                 if late or self._closed:
                     break
             finally:
-                self._idle.put(usable)
+                if usable is not None or not self._drops_place():
+                    self._idle.put(usable)
         clock = ClockKind(job.plan.clock)
         if len(limits) == TRIES:
             faults = tuple(
@@ -431,6 +459,13 @@ class Recorder:
             )
             return Trace(job.plan.scenario, clock, stop_ns=job.plan.duration_ns, observations=faults)
         return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
+
+    def _drops_place(self) -> bool:
+        """Return whether a worker is not replaced until none is busy: the others go on, and a start takes long."""
+        with self._lock:
+            drops = self._places > 1
+            self._places -= drops
+            return drops
 
     def _start(self, *, forks: int = 0) -> ExecutedWorker:
         with self._lock:

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import pytest
 
@@ -492,6 +492,56 @@ def test_a_worn_worker_does_no_more(make: Callable[..., tuple[Recorder, Stage]])
     found = [note(recorder.record(jobs("alone"), nothing)[0]) for _ in range(4)]
     assert [text.partition(",")[0] for text in found] == ["worker 0", "worker 1", "worker 2", "worker 2"]
     assert len(stage.pids()) == 3
+
+
+@pytest.fixture
+def forks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return how many forks each worker has made that was started, in order."""
+    made: list[int] = []
+
+    class Counted(module.ExecutedWorker):
+        def __init__(self, *of: Any, forks: int) -> None:
+            made.append(forks)
+            super().__init__(*of, forks=forks)
+
+    monkeypatch.setattr(module, "ExecutedWorker", Counted)
+    return made
+
+
+def test_worn_workers_are_replaced_by_one_with_forks(
+    make: Callable[..., tuple[Recorder, Stage]], forks: list[int]
+) -> None:
+    """Once none is busy, and some are needed: forks share the memory of the worker that made them."""
+    recorder, _ = make("is worn", workers=3)
+    for names in ("abc", "abc", "a", "a"):
+        recorder.record(jobs(*names), nothing)
+    assert forks == [2, 2, 2]
+
+
+def test_a_worn_worker_is_not_replaced_while_others_go_on(
+    make: Callable[..., tuple[Recorder, Stage]], forks: list[int]
+) -> None:
+    """Only the last one is, and then by one without forks."""
+    recorder, _ = make(*["is worn"] * 4, "answers", workers=3)
+    assert len(recorder.record(jobs(*"abcdef"), nothing)) == 6
+    assert forks == [2, 0, 0]
+    recorder.record(jobs(*"abc"), nothing)
+    assert forks == [2, 0, 0, 2]
+
+
+def test_a_lost_worker_with_forks_is_replaced_by_another(
+    make: Callable[..., tuple[Recorder, Stage]], forks: list[int]
+) -> None:
+    """Its forks end with it; the plans that come next find all places taken again."""
+    recorder, stage = make("answers", workers=3)
+    recorder.record(jobs(*"abc"), nothing)
+    wait_for(lambda: len(stage.pids()) == 3)
+    for worker in list(recorder._alive):
+        if isinstance(worker, module.ExecutedWorker):
+            worker.close()
+    traces = recorder.record(jobs(*"abc"), nothing)
+    assert [trace.harness_problem for trace in traces] == ["", "", ""]
+    assert forks == [2, 2]
 
 
 LIMITS = {"reaches its processor time": "120 s of processor time", "grows": "100 MiB of memory"}
