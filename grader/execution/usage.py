@@ -40,7 +40,8 @@ NS_PER_TICK = NS_PER_S // os.sysconf("SC_CLK_TCK")
 #: State in /proc/PID/stat of a process that was stopped by a signal.
 HALTED = b"T"
 #: Memory in /proc/PID/status, in KiB, that is not backed by a file.
-OWN_MEMORY = (b"RssAnon:", b"RssShmem:", b"VmSwap:")
+OWN_MEMORY = (b"\nRssAnon:", b"\nRssShmem:", b"\nVmSwap:")
+THREADS = b"\nThreads:"
 #: Indexes of fields in /proc/PID/stat after the name in parentheses, which may contain spaces. Index 0 is the third
 #: field of proc(5), which counts from 1.
 PARENT, USER_TIME, CHILDREN_SYSTEM_TIME = 1, 11, 14
@@ -105,13 +106,14 @@ def thread_starved_ns(pid: int, thread: int | str) -> int:
 
 def _status(pid: int) -> tuple[int, int]:
     """Return the own memory of a process in KiB, and its number of threads."""
-    memory_kib = threads = 0
-    for line in _read(f"/proc/{pid}/status").splitlines():
-        if line.startswith(OWN_MEMORY):
-            memory_kib += int(line.split()[1])
-        elif line.startswith(b"Threads:"):
-            threads = int(line.split()[1])
-    return memory_kib, threads
+    status = _read(f"/proc/{pid}/status")
+    return sum(_number(status, key) for key in OWN_MEMORY), _number(status, THREADS)
+
+
+def _number(status: bytes, key: bytes) -> int:
+    """Return the first number of a line of /proc/PID/status; 0 if there is no such line."""
+    _, found, rest = status.partition(key)
+    return int(rest.split(None, 1)[0]) if found else 0
 
 
 def _stat(pid: int) -> list[bytes]:
@@ -130,9 +132,17 @@ def _names(folder: str) -> list[str]:
 
 
 def _read(path: str) -> bytes:
-    """Read a file in /proc; empty if the process has ended."""
+    """Read a file in /proc; empty if the process has ended.
+
+    Without a file object, because usage is read many times a second.
+    """
     try:
-        with open(path, "rb", buffering=0) as file:  # noqa: PTH123 - many times a second
-            return file.read(1 << 16)
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     except OSError:
         return b""
+    try:
+        return os.read(descriptor, 1 << 16)
+    except OSError:
+        return b""
+    finally:
+        os.close(descriptor)
