@@ -24,7 +24,7 @@ from grader.classroom.watching import Watcher
 from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError, VariantError
 from grader.core.exercise import Exercise
-from grader.execution.recording_session import workers_for
+from grader.execution.recording_session import MORE_IN_CLASS, workers_for
 from grader.execution.supervisor import MARGIN_S, TRIES
 from grader.execution.temp_dirs import scratch_folder
 from grader.reporting.html.assets import bundle
@@ -241,7 +241,7 @@ class ClassRun:
             conditions=self.conditions[entry.name],
             variant_key=grading.variant_key,
             interfaces=grading.interfaces,
-            workers=workers_for(len(os.sched_getaffinity(0)) // self._jobs),
+            workers=workers_for(len(os.sched_getaffinity(0)) // self._jobs, MORE_IN_CLASS),
             standalone=self.course.standalone,
             deadline_s=deadline_s(self.course.grading.time_budget_s),
             recordings=None if kept is None else kept.evidence.resolve(),

@@ -24,9 +24,11 @@ from grader.execution.temp_dirs import scratch_folder
 
 #: The name of a run without a sandbox in reports.
 NO_ISOLATION = "none"
-#: Most scenarios of a submission that are recorded at once: one more than there are processors, because nodes wait for
-#: discovery in between, and each takes memory.
-MOST_WORKERS = 4
+#: How many more scenarios than there are processors are recorded at once, because nodes wait for discovery in between:
+#: of a submission alone, and of one in a class, whose others use the processors as well.
+MORE_ALONE, MORE_IN_CLASS = 3, 1
+#: The most scenarios of a submission that are recorded at once, because each takes memory.
+MOST_WORKERS = 6
 #: The values of `--clock`: `auto` is virtual time, with the wall clock where virtual time is unsuitable.
 VIRTUAL, WALL, AUTO = "virtual", "wall", "auto"
 
@@ -96,9 +98,9 @@ class RecordingSession:
         return {key: traces[key] for key in jobs}
 
 
-def workers_for(processors: int) -> int:
+def workers_for(processors: int, more: int = MORE_ALONE) -> int:
     """Return how many scenarios of one submission to record in parallel on so many processors."""
-    return min(max(1, processors) + 1, MOST_WORKERS)
+    return min(max(1, processors) + more, MOST_WORKERS)
 
 
 def _unfit(trace: Trace, clock: str) -> bool:
