@@ -63,7 +63,7 @@ def main() -> None:
                 return
             os.chdir(request["folder"])
             task = msgspec.convert(request["task"], Task, dec_hook=lambda type_, value: type_(value))
-            status = attempt(task, lambda step: _send({"step": step}), sessions.grade)
+            status = attempt(task, lambda step: _send({"step": step}), sessions.grade, sessions.ended_s)
             _send({"done": json.loads(kept.dump(status))})
 
 
@@ -74,6 +74,10 @@ class Sessions:
         self._stack = stack
         self._on_wall_clock = on_wall_clock
         self._opened: dict[tuple[str, int | None], RecordingSession] = {}
+
+    def ended_s(self) -> float:
+        """Return the processor time of the workers that were replaced."""
+        return sum(session.recorder.ended_ns for session in self._opened.values()) / NS_PER_S
 
     def grade(
         self, request: GradeRequest, progress: Progress, on_recorded: Callable[[Run, Sequence[Exercise]], None]
@@ -91,9 +95,12 @@ class Sessions:
 Grade = Callable[[GradeRequest, Progress, Callable[[Run, Sequence[Exercise]], None]], Report]
 
 
-def attempt(task: Task, progress: Progress, grade: Grade) -> ResultStatus:
-    """Grade a submission, write the result, and return its status; never raises because of the submission."""
-    started, before_s = time.perf_counter(), _processor_s()
+def attempt(task: Task, progress: Progress, grade: Grade, ended_s: Callable[[], float] = lambda: 0.0) -> ResultStatus:
+    """Grade a submission, write the result, and return its status; never raises because of the submission.
+
+    `ended_s` returns processor time that the kernel does not count as used by this process and its descendants.
+    """
+    started, before_s = time.perf_counter(), _processor_s() + ended_s()
     try:
         status = _graded(task, progress, grade)
     except SubmissionError as error:
@@ -104,7 +111,7 @@ def attempt(task: Task, progress: Progress, grade: Grade) -> ResultStatus:
         status = _failed(task, f"the result cannot be written: {error.strerror}")
     except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
         status = _failed(task, f"the grader failed: {type(error).__name__}: {error}")
-    duration_s, processor_s = time.perf_counter() - started, _processor_s() - before_s
+    duration_s, processor_s = time.perf_counter() - started, _processor_s() + ended_s() - before_s
     used = {"processor_s": round(processor_s, 3), "peak_bytes": float(_peak_bytes())}
     return replace(status, duration_s=round(duration_s, 3), usage=used)
 

@@ -86,6 +86,7 @@ class Worker(ABC):
         shares: Whether it shares its sandbox with another worker.
         gone: Whether it has ended with another worker.
         forked: Its forks.
+        used_ns: Processor time that was used in its sandbox; 0 before it was closed.
     """
 
     def __init__(self, line: socket.socket, domains: Iterator[int]) -> None:
@@ -95,6 +96,7 @@ class Worker(ABC):
         self._pid = 0
         self.worn = self.shares = self.gone = False
         self.forked: list[ForkedWorker] = []
+        self.used_ns = 0
 
     def suits(self, plan: Plan) -> bool:
         """Return whether this worker is there and has used no other interface packages than those of a plan."""
@@ -256,6 +258,8 @@ class ExecutedWorker(Worker):
         """Kill the worker, its forks, and everything that they started."""
         for fork in self.forked:
             fork.gone = True
+        # The kernel adds it to nobody's, because those who would wait for the processes are killed with them.
+        self.used_ns = usage(families([self._process.pid])[self._process.pid]).processor_ns
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, 9)
         self._process.wait()
@@ -322,6 +326,9 @@ class Recorder:
             folder. The caller removes it.
         workers: How many scenarios to record at the same time.
         on_wall_clock: Called before each recording on the wall clock, which takes much time and little of a processor.
+
+    Attributes:
+        ended_ns: Processor time of the workers that were replaced.
     """
 
     def __init__(  # noqa: PLR0913  what it records with, and who is told
@@ -340,6 +347,7 @@ class Recorder:
         self._idle: queue.LifoQueue[Worker | None] = queue.LifoQueue()  # a warm worker first
         self._alive: list[Worker] = []
         self._lock = threading.Lock()
+        self.ended_ns = 0
         self._closed = False
         self._count = self._places = workers
         self._scratch = scratch
@@ -382,7 +390,7 @@ class Recorder:
             for _ in range(self._count):
                 self._idle.put(None)
         for worker in alive:
-            worker.close()
+            self._close(worker)
         self.warm_up(self._count)
 
     def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
@@ -479,7 +487,11 @@ class Recorder:
         with self._lock:
             if worker in self._alive and worker is not None:
                 self._alive.remove(worker)
-                worker.close()
+                self._close(worker)
+
+    def _close(self, worker: Worker) -> None:
+        worker.close()
+        self.ended_ns += worker.used_ns
 
     def close(self) -> None:
         """Kill every worker; running jobs are abandoned."""
