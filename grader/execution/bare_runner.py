@@ -13,7 +13,7 @@ from grader.execution.ending import reported_fault
 from grader.execution.observer import Observer
 from grader.execution.plan import Plan
 from grader.execution.student_process import NodeProcess
-from grader.execution.wall_runner import LOOK_S, MESSAGES_A_LOOK, WallRunner
+from grader.execution.wall_runner import MESSAGES_A_LOOK, PAUSE_S, WallRunner
 
 #: How long, in real time, to wait for the first node.
 FIRST_NODE_NS = 15 * NS_PER_S
@@ -48,7 +48,8 @@ class BareRunner(WallRunner):
                 for message in taken:
                     self._record(0, message)
                 break
-            time.sleep(LOOK_S)
+            time.sleep(PAUSE_S)
+            self._observer.await_arrival(FIRST_LOOK_NS)
         self._started = time.monotonic_ns()
 
     def _look(self, now_ns: int) -> None:

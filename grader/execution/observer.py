@@ -78,6 +78,7 @@ class Observer:
         self._writers: dict[str, Any] = {}
         self._participants: dict[bytes, int] = {}
         self._logs: Any = None
+        self._woken = rclpy_implementation.GuardCondition(self.node.context.handle)
         self.services = ServiceEnds(self.node)
         self._broken: Counter[str] = Counter()
         self._large: Counter[str] = Counter()
@@ -225,6 +226,30 @@ class Observer:
         """Return how many publishers are matched with the subscription for a topic, type and reliability."""
         reader = self._readers.get((topic, interface, reliable))
         return 0 if reader is None else int(reader.get_publisher_count())
+
+    def wake(self) -> None:
+        """End a wait for arrivals; called from another thread."""
+        self._woken.trigger_guard_condition()
+
+    def await_arrival(self, wait_ns: int) -> None:
+        """Wait, in real time, until a message, a request or a response can be taken, or `wake` was called.
+
+        Args:
+            wait_ns: How long to wait at most.
+        """
+        readers = [*self._readers.values(), *([self._logs] if self._logs is not None else [])]
+        servers, clients = self.services.ends()
+        counts = len(readers), 1, 0, len(clients), len(servers), 0
+        arrivals = rclpy_implementation.WaitSet(*counts, self.node.context.handle)
+        arrivals.clear_entities()
+        for reader in readers:
+            arrivals.add_subscription(reader.handle)
+        for client in clients:
+            arrivals.add_client(client.handle)
+        for server in servers:
+            arrivals.add_service(server.handle)
+        arrivals.add_guard_condition(self._woken)
+        arrivals.wait(wait_ns)
 
     def take(self, at_once: int = AT_ONCE) -> list[Taken]:
         """Take the messages that have arrived since the last call, topic by topic, up to a limit.

@@ -63,6 +63,11 @@ class ServiceEnds:
         client = self._node.create_client(interface_class(interface, "srv"), service)
         self._clients.setdefault(service, {})[number] = client
 
+    def ends(self) -> tuple[list[Any], list[Any]]:
+        """Return all servers and all clients."""
+        clients = [client for numbered in self._clients.values() for client in numbered.values()]
+        return list(self._servers.values()), clients
+
     def is_matched(self, service: str) -> bool:
         """Return whether every client of a service is matched with a server."""
         return all(client.service_is_ready() for client in self._clients.get(service, {}).values())

@@ -176,6 +176,10 @@ class NodeProcess:
         self._poll.register(descriptor, select.POLLIN)
         self._sources[descriptor] = stream
 
+    def descriptors(self) -> tuple[int, ...]:
+        """Return what the process writes to, until it has ended; may be called from another thread."""
+        return () if self.ended else tuple(self._sources)
+
     def tell(self, answer: Mapping[str, Any]) -> None:
         """Send an answer. A dead process is noticed at its next report."""
         try:

@@ -23,8 +23,10 @@ from grader.execution.topic_peers import LINGER_NS, WallTopicPeers
 
 #: The most messages of a topic, and reads of a stream, in one iteration, so that a flood does not delay the loop.
 MESSAGES_A_LOOK, READS_A_LOOK = 100, 2
-#: The pause between two iterations, and the longest delay of the loop before the run counts as invalid.
-LOOK_S = 0.001
+#: The shortest pause between two iterations, and the longest, if nothing arrives; and the longest delay of the loop
+#: before the run counts as invalid.
+PAUSE_S = 0.0002
+LONGEST_PAUSE_NS = 10 * NS_PER_MS
 HELD_UP_NS = 150 * NS_PER_MS
 #: How long before its first message a publisher is created, so that subscriptions can discover it.
 LEAD_NS = 300 * NS_PER_MS
@@ -66,7 +68,15 @@ class WallRunner(Runner):
             self.held_up_ns = max(self.held_up_ns, now_ns - before_ns)
             before_ns = now_ns
             self._look(now_ns)
-            time.sleep(LOOK_S)
+            self._pause()
+
+    def _pause(self) -> None:
+        """Wait until something has arrived or is due, but not for long: many things are only noticed by looking."""
+        time.sleep(PAUSE_S)
+        moments = [self._end_ns, *self._starts_ns.values(), *(event.t_ns for event in self._due[:1])]
+        left_ns = min(LONGEST_PAUSE_NS, min(moments) - self._time_ns())
+        if left_ns > 0:
+            self._observer.await_arrival(left_ns)
 
     def _last_look(self) -> int:
         self._look_at_graph(self._end_ns)

@@ -31,6 +31,7 @@ from grader.execution.codec import from_json, trace_to_json
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.execution.launching import Launched, evaluated, expanded, renamed, unstarted
 from grader.execution.notes import Places
+from grader.execution.output_watch import OutputWatch
 from grader.execution.plan import Plan
 from grader.execution.resource_monitor import Budget, ResourceMonitor
 from grader.execution.ros_installation import MESSAGE_PACKAGES, PythonRuntime
@@ -147,6 +148,8 @@ class Worker:
             if not plan.bare:
                 for student in students:
                     _await_ready(student)
+            if plan.clock == ClockKind.WALL.value:
+                stack.enter_context(OutputWatch(students, observer.wake))
             trace = monitor.reviewed(runner(plan, students, observer).run())
             return replace(trace, reached=tuple(dict.fromkeys(what for s in students for what in s.reached)))
 

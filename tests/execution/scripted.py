@@ -274,6 +274,9 @@ class ScriptedObserver:
         claims = [c for claims in self._world.claims.values() for c in claims]
         return sum((c["kind"], c["name"], c["type"]) == ("publisher", topic, interface) for c in claims)
 
+    def await_arrival(self, wait_ns: int) -> None:
+        """Return at once: there is always something to look at."""
+
     def take(self, at_once: int = 1000) -> list[Taken]:
         """Return what flies."""
         taken, self._world.flying = self._world.flying, []
