@@ -86,7 +86,6 @@ class Worker(ABC):
         shares: Whether it shares its sandbox with another worker.
         gone: Whether it has ended with another worker.
         forked: Its forks.
-        used_ns: Processor time that was used in its sandbox; 0 before it was closed.
     """
 
     def __init__(self, line: socket.socket, domains: Iterator[int]) -> None:
@@ -96,11 +95,14 @@ class Worker(ABC):
         self._pid = 0
         self.worn = self.shares = self.gone = False
         self.forked: list[ForkedWorker] = []
-        self.used_ns = 0
 
     def suits(self, plan: Plan) -> bool:
         """Return whether this worker is there and has used no other interface packages than those of a plan."""
         return not self.gone and self._interfaces in ((), plan.interfaces)
+
+    def used_ns(self) -> int:
+        """Return the processor time that was used in its sandbox; 0 for a fork, which has none of its own."""
+        return 0
 
     def has_forks(self) -> bool:
         """Return whether there are forks of this worker, which would end with it."""
@@ -238,6 +240,10 @@ class ExecutedWorker(Worker):
         for _, theirs in lines:
             theirs.close()
 
+    def used_ns(self) -> int:
+        """Return the processor time that was used in its sandbox, by forks and students' processes as well."""
+        return usage(families([self._process.pid])[self._process.pid]).processor_ns
+
     def _end(self) -> str:
         try:
             code = self._process.wait(END_S)
@@ -258,8 +264,6 @@ class ExecutedWorker(Worker):
         """Kill the worker, its forks, and everything that they started."""
         for fork in self.forked:
             fork.gone = True
-        # The kernel adds it to nobody's, because those who would wait for the processes are killed with them.
-        self.used_ns = usage(families([self._process.pid])[self._process.pid]).processor_ns
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, 9)
         self._process.wait()
@@ -490,8 +494,9 @@ class Recorder:
                 self._close(worker)
 
     def _close(self, worker: Worker) -> None:
+        # The kernel adds it to nobody's, because those who would wait for the processes are killed with them.
+        self.ended_ns += worker.used_ns()
         worker.close()
-        self.ended_ns += worker.used_ns
 
     def close(self) -> None:
         """Kill every worker; running jobs are abandoned."""
