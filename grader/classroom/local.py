@@ -80,6 +80,8 @@ class ClassScheduler(Protocol):
 MakeScheduler = Callable[[int], ClassScheduler]
 
 
+#: How many submissions may wait on the wall clock beside each of those that need a processor; each takes memory.
+WAITING_PER_JOB = 2
 #: The hint of a failure.
 AGAIN = "run the same command again"
 #: Longest line read from a process.
@@ -91,13 +93,13 @@ class LocalScheduler:
     """Grades on this machine; relative paths start at the folder, or at the current one if it is None.
 
     A submission that is recorded on the wall clock because virtual time does not suffice spends its time waiting.
-    Another one is begun beside it, so that up to twice as many as `jobs` are being graded. Of those that are drawn for
-    a spot check, as many as `jobs` are graded at a time, from the beginning, so that the class does not end with them.
+    Another one is begun beside it, and up to `WAITING_PER_JOB` wait for each of the jobs. That many of those that are
+    drawn for a spot check are graded at a time, from the beginning, so that the class does not end with them.
     """
 
     def __init__(self, jobs: int, command: Sequence[str] = WORKER, *, folder: Path | None = None) -> None:
         self._jobs = jobs
-        self._at_once = 2 * jobs
+        self._waiting = WAITING_PER_JOB * jobs
         self._command = command
         self._folder = folder
         self._lock = threading.Lock()
@@ -114,13 +116,13 @@ class LocalScheduler:
         if choice.isolation.shares_network and name != NO_SANDBOX:
             if self._jobs > 1:
                 warnings.append(f"sandbox {name}: submissions share the network, so they are graded one at a time")
-            self._jobs = self._at_once = 1
+            self._jobs, self._waiting = 1, 0
         return warnings
 
     def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
         """Yield an attempt for each task; see `ClassScheduler`."""
         # The kernel kills a worker when the thread that started it ends, so the threads live until all tasks are done.
-        pool = ThreadPoolExecutor(self._at_once, thread_name_prefix="batch")
+        pool = ThreadPoolExecutor(self._jobs + self._waiting, thread_name_prefix="batch")
         places, waiting = threading.Semaphore(self._jobs), deque(tasks)
         try:
             for future in as_completed([pool.submit(self._next, waiting, on_step, places) for _ in tasks]):
@@ -149,7 +151,7 @@ class LocalScheduler:
     def _next_task(self, waiting: deque[Task]) -> Iterator[Task]:
         """Take the task that is graded next, and count it while it is graded."""
         with self._lock:
-            wanted = self._checks < self._jobs
+            wanted = self._checks < max(1, self._waiting)
             task = next((task for task in waiting if task.spot_check == wanted), waiting[0])
             waiting.remove(task)
             self._checks += task.spot_check

@@ -123,7 +123,7 @@ for line in sys.stdin:
 
 
 def test_another_submission_is_begun_beside_one_that_waits_for_the_wall_clock(tmp_path: Path) -> None:
-    """It would never end otherwise. Twice as many as jobs are graded at most."""
+    """It would never end otherwise."""
     here = LocalScheduler(2, (sys.executable, "-c", WAITING))
     tasks = [task(tmp_path, label) for label in ("waits", "waits too", "a", "b", "c")]
     heard: dict[str, str] = {}
@@ -144,12 +144,13 @@ def test_a_process_that_others_were_begun_beside_ends_with_its_submission(tmp_pa
 
 
 def test_spot_checks_begin_early_and_leave_room_for_others(tmp_path: Path) -> None:
-    """As many as jobs are graded at a time, while there are others."""
+    """Twice as many as jobs are graded at a time, while there are others."""
     here = LocalScheduler(1, (sys.executable, "-c", WAITING))
-    tasks = [replace(task(tmp_path, label), spot_check=label[0] == "w") for label in ("a", "b", "waits", "waits too")]
+    labels = ("a", "b", "waits", "waits too", "waits last")
+    tasks = [replace(task(tmp_path, label), spot_check=label[0] == "w") for label in labels]
     begun: list[str] = []
     assert all(a.status.state is State.GRADED for a in here.run(tasks, lambda name, _: begun.append(name)))
-    assert list(dict.fromkeys(begun)) == ["waits", "a", "b", "waits too"]
+    assert list(dict.fromkeys(begun)) == ["waits", "waits too", "a", "b", "waits last"]
 
 
 @pytest.mark.parametrize("clock", ["wall", "auto"])
