@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,15 +37,17 @@ def trace(clock: ClockKind = ClockKind.VIRTUAL, *, rate_hz: float = 20.0, **fiel
 
 
 class Recorder:
-    """Gives traces of the wall clock in order, and remembers the plans."""
+    """Gives traces of the wall clock in order, and remembers the plans, and which jobs were recorded in parallel."""
 
     def __init__(self, *traces: Trace) -> None:
         self.traces = list(traces)
         self.plans: list[Plan] = []
+        self.parallel: list[str] = []
 
-    def __call__(self, planned: Job) -> Trace:
-        self.plans.append(planned.plan)
-        return self.traces.pop(0)
+    def __call__(self, jobs: Sequence[Job]) -> Sequence[Trace]:
+        self.plans += [job.plan for job in jobs]
+        self.parallel += [job.title for job in jobs if job.parallel]
+        return [self.traces.pop(0) for _ in jobs]
 
 
 def checked(
@@ -91,6 +94,17 @@ def test_where_they_disagree_the_wall_clock_decides() -> None:
     assert decided.clock is ClockKind.WALL
     assert decided.clock_reason.endswith("/x had 20.0 Hz in virtual time and 1.0 Hz on the wall clock")
     assert [plan.duration_ns for plan in recorder.plans] == [6 * S, 6 * S, 10 * S]
+
+
+def test_only_what_disagrees_beside_others_is_recorded_alone() -> None:
+    """Others can make the clocks disagree, never agree; so what disagrees beside them does not count."""
+    keys = ("one", "alone"), ("two", "alone"), ("two", "beside")
+    jobs = {key: job(f"{key[0]} {key[1]}") for key in keys}
+    recorder = Recorder(SAME, BUSY, OTHER, SAME, OTHER, OTHER, OTHER, OTHER)
+    found = check(SpotChecks(1.0, 1, "sha256:0"), jobs, dict.fromkeys(keys, trace()), recorder, lambda *_: None)
+    assert recorder.parallel == [f"{one} {two}, checked on the wall clock" for one, two in keys]
+    assert [plan.scenario for plan in recorder.plans[3:6]] == ["two alone", "two beside", "two beside"]
+    assert [found[key].clock for key in keys] == [ClockKind.VIRTUAL, ClockKind.WALL, ClockKind.WALL]
 
 
 def test_a_disagreement_that_does_not_come_again_is_none() -> None:

@@ -138,7 +138,7 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         traces = session.record(jobs, request.clock, progress, first, budget_s=budget_s, under_way=meanwhile)
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
-            record = partial(_record_one, session, progress, RealTimeBudget(request.time_budget_s))
+            record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
             traces = check(checks, jobs, traces, record, take or (lambda *_: None))
         run = replace(run, traces={**kept, **traces}, duration_s=time.perf_counter() - started)
         run = replace(run, definitions=definitions(run.traces.values(), provided))
@@ -179,8 +179,10 @@ def _kept(  # noqa: PLR0913  all that a recording depends on
         return {}
 
 
-def _record_one(session: RecordingSession, progress: Progress, budget: RealTimeBudget, job: Job) -> Trace:
-    return session.recorder.record([replace(job, budget=budget)], progress)[0]
+def _record_checks(
+    session: RecordingSession, progress: Progress, budget: RealTimeBudget, jobs: Sequence[Job]
+) -> Sequence[Trace]:
+    return session.recorder.record([replace(job, budget=budget) for job in jobs], progress)
 
 
 def read_exercises(

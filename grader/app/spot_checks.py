@@ -5,7 +5,7 @@ If the two recordings disagree, the wall clock decides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from grader.core.dataclass import dataclass
@@ -28,7 +28,7 @@ BUSY = "the machine was too busy for a check on the wall clock"
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
-Record = Callable[[Job], Trace]
+Record = Callable[[Sequence[Job]], Sequence[Trace]]
 Finished = Callable[[Key, Trace], None]
 
 
@@ -100,14 +100,18 @@ def check(
 ) -> dict[Key, Trace]:
     """Run the spot checks that are due; where the clocks disagree, replace the exercise's traces by wall-clock ones.
 
+    All are recorded at the same time first. That can make the clocks disagree, never agree, so whatever disagrees is
+    recorded again, one at a time, and only this counts.
+
     If the machine is too busy for a check, the trace in virtual time counts and gets a note. Only for a program that
     accesses internals of its process, the result is then undecided. Each trace of a checked exercise is passed to
     `finished`.
     """
     found = dict(traces)
     due = checks.due(jobs, traces)
+    agreed = _agreed(due, jobs, traces, record)
     for exercise in dict.fromkeys(exercise for exercise, _ in due):
-        own = [key for key in due if key[0] == exercise]
+        own = [key for key in due if key[0] == exercise and key not in agreed]
         difference = None
         for key in own:
             difference, busy = _disagreement(jobs[key], traces[key], record)
@@ -133,14 +137,29 @@ def _is_due(plan: Plan, trace: Trace, *, drawn: bool, suspect: bool) -> bool:
     return wanted and not trace.harness_problem and not plan.starts_ns
 
 
+def _agreed(due: Sequence[Key], jobs: Mapping[Key, Job], traces: Mapping[Key, Trace], record: Record) -> set[Key]:
+    """Record what is due in parallel, and return where the clocks agree; a single one needs no such round."""
+    if len(due) < 2:
+        return set()
+    walls = record([replace(_check_of(jobs[key], traces[key]), parallel=True) for key in due])
+    return {key for key, wall in zip(due, walls, strict=True) if not _differences(jobs[key], traces[key], wall)}
+
+
+def _check_of(job: Job, virtual: Trace) -> Job:
+    return Job(f"{job.title}, checked on the wall clock", shortened(job.plan, virtual))
+
+
+def _differences(job: Job, virtual: Trace, wall: Trace) -> Sequence[Difference]:
+    return differences(virtual, wall, job.plan.first_message_on)
+
+
 def _disagreement(job: Job, virtual: Trace, record: Record) -> tuple[Difference | None, bool]:
     """Return a difference that occurred in repeated attempts, and whether the machine was too busy to find out."""
-    plan = shortened(job.plan, virtual)
     seen: list[Difference] = []
     busy = 0
     while busy < BUSY_TIMES:
-        wall = record(Job(f"{job.title}, checked on the wall clock", plan))
-        found = differences(virtual, wall, plan.first_message_on)
+        (wall,) = record([_check_of(job, virtual)])
+        found = _differences(job, virtual, wall)
         if not found:
             return None, False  # a busy machine makes clocks disagree, never agree
         if wall.harness_problem:
@@ -168,6 +187,6 @@ def _decided(
         if virtual.harness_problem:
             continue
         plan = replace(bare_plan(job.plan, virtual), bare=not job.plan.starts_ns)
-        wall = record(Job(f"{job.title}, on the wall clock", plan))
+        (wall,) = record([Job(f"{job.title}, on the wall clock", plan)])
         decided[key] = replace(wall, clock_reason=sentence(difference, virtual.clock), starts=virtual.starts)
     return decided

@@ -241,10 +241,12 @@ def test_what_begins_first_takes_longest(make: Callable[..., tuple[Recorder, Sta
 
 
 def test_recordings_on_the_wall_clock_are_made_one_at_a_time(make: Callable[..., tuple[Recorder, Stage]]) -> None:
-    """In real time they would disturb each other; in virtual time they do not."""
+    """In real time they would disturb each other, unless they are said not to; in virtual time they do not."""
     recorder, _ = make("wants to be alone", workers=3)
     on_the_wall = [Job(name, plan(name, "wall")) for name in "abcdef"]
     assert {note(trace) for trace in recorder.record(on_the_wall, nothing)} == {"alone"}
+    parallel = [replace(job, parallel=True) for job in on_the_wall]
+    assert {note(trace) for trace in recorder.record(parallel, nothing)} == {"alone", "not alone"}
     assert {note(trace) for trace in recorder.record(jobs(*"abcdef"), nothing)} == {"alone", "not alone"}
 
 
