@@ -47,6 +47,8 @@ EXERCISE_1 = ("reference_solutions", "--exercise", "velocity_publisher")
 FIVE_SECONDS = ("--rubric", str(ROOT / "benchmarks" / "five_seconds.yaml"), "--clock", "wall")
 #: Submissions that are judged from their text alone.
 TEXTS = {"syntax error": "def main(:\n", "empty file": ""}
+#: Exit codes of `grade`.
+NOT_ALL_MET, UNDECIDED = 1, 3
 #: Submissions that are judged again at a time.
 COPIES = 200
 #: A measure that grew by more than this factor is warned of.
@@ -84,9 +86,9 @@ def cost_of(*command: str, codes: Sequence[int] = (0,)) -> Cost:
     return Cost(wall_s, found.processor_s, found.instructions)
 
 
-def graded(grade: str, *arguments: str) -> Cost:
-    """Return what one run of a `grade` command took."""
-    return cost_of(*shlex.split(grade), *arguments, codes=(0, 1, 2, 3))
+def graded(grade: str, *arguments: str, codes: Sequence[int] = (0,)) -> Cost:
+    """Return what one run of a `grade` command took; ends with its words at another exit code."""
+    return cost_of(*shlex.split(grade), *arguments, codes=codes)
 
 
 def rejudged_a_second(grade: str) -> float:
@@ -108,12 +110,12 @@ def of_references(grade: str) -> Sequence[float]:
 def of_exercise_1(grade: str) -> Sequence[float]:
     """Return the real time of exercise 1, and how much longer its judgement on the wall clock takes."""
     wall_s = graded(grade, *EXERCISE_1).wall_s
-    return wall_s, graded(grade, *EXERCISE_1, *FIVE_SECONDS).wall_s / wall_s
+    return wall_s, graded(grade, *EXERCISE_1, *FIVE_SECONDS, codes=(0, UNDECIDED)).wall_s / wall_s
 
 
-def wall_of(*arguments: str) -> Callable[[str], Sequence[float]]:
-    """Return a function that measures the real time of a command with some arguments."""
-    return lambda grade: (graded(grade, *arguments).wall_s,)
+def wall_of(*arguments: str, code: int = 0) -> Callable[[str], Sequence[float]]:
+    """Return a function that measures the real time of a command with some arguments, which ends with an exit code."""
+    return lambda grade: (graded(grade, *arguments, codes=(code,)).wall_s,)
 
 
 def rows(place: Path, *, classes: bool) -> list[Rows]:
@@ -127,7 +129,7 @@ def rows(place: Path, *, classes: bool) -> list[Rows]:
         folder = place / what
         folder.mkdir()
         (folder / "velocity_publisher.py").write_text(text)
-        found.append(([(f"{what}, real time", "s")], wall_of(str(folder), *EXERCISE_1[1:])))
+        found.append(([(f"{what}, real time", "s")], wall_of(str(folder), *EXERCISE_1[1:], code=NOT_ALL_MET)))
     found += [
         ([("--help, real time", "s")], wall_of("--help")),
         ([("--version, real time", "s")], wall_of("--version")),
@@ -149,7 +151,7 @@ def rows(place: Path, *, classes: bool) -> list[Rows]:
 def class_of(grade: str, place: Path, size: int, jobs: int) -> Cost:
     """Return what a class took; its results are thrown away."""
     with tempfile.TemporaryDirectory() as results:
-        return graded(grade, "batch", str(place / str(size)), "-o", results, "--jobs", str(jobs))
+        return graded(grade, "batch", str(place / str(size)), "-o", results, "--jobs", str(jobs), codes=(0, UNDECIDED))
 
 
 def plain_start() -> Cost:
