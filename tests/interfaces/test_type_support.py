@@ -147,7 +147,11 @@ node.create_service(BasicTypes, "/s", serve, callback_group=group)
 client = node.create_client(BasicTypes, "/s", callback_group=group)
 executor = MultiThreadedExecutor(4)
 executor.add_node(node)
-spinner = threading.Thread(target=executor.spin)
+done = threading.Event()
+def spin():  # with a timeout, because an executor can miss that it is shut down
+    while not done.is_set():
+        executor.spin_once(timeout_sec=0.1)
+spinner = threading.Thread(target=spin)
 spinner.start()
 answers = []
 def use(n):
@@ -163,8 +167,9 @@ for each in threads: each.join()
 deadline = time.monotonic() + 20
 while len(heard) < 160 and time.monotonic() < deadline: time.sleep(0.01)
 print(len(heard), sorted(answers) == sorted(list(range(40)) * 4))
-executor.shutdown()
+done.set()
 spinner.join()
+executor.shutdown()
 """
 
 
