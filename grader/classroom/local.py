@@ -99,7 +99,7 @@ class LocalScheduler:
 
     def __init__(self, jobs: int, command: Sequence[str] = WORKER, *, folder: Path | None = None) -> None:
         self._jobs = jobs
-        self._waiting = WAITING_PER_JOB * jobs
+        self._on_wall_clock = WAITING_PER_JOB * jobs
         self._command = command
         self._folder = folder
         self._lock = threading.Lock()
@@ -116,13 +116,13 @@ class LocalScheduler:
         if choice.isolation.shares_network and name != NO_SANDBOX:
             if self._jobs > 1:
                 warnings.append(f"sandbox {name}: submissions share the network, so they are graded one at a time")
-            self._jobs, self._waiting = 1, 0
+            self._jobs, self._on_wall_clock = 1, 0
         return warnings
 
     def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
         """Yield an attempt for each task; see `ClassScheduler`."""
         # The kernel kills a worker when the thread that started it ends, so the threads live until all tasks are done.
-        pool = ThreadPoolExecutor(self._jobs + self._waiting, thread_name_prefix="batch")
+        pool = ThreadPoolExecutor(self._jobs + self._on_wall_clock, thread_name_prefix="batch")
         places, waiting = threading.Semaphore(self._jobs), deque(tasks)
         try:
             for future in as_completed([pool.submit(self._next, waiting, on_step, places) for _ in tasks]):
@@ -151,7 +151,7 @@ class LocalScheduler:
     def _next_task(self, waiting: deque[Task]) -> Iterator[Task]:
         """Take the task that is graded next, and count it while it is graded."""
         with self._lock:
-            wanted = self._checks < max(1, self._waiting)
+            wanted = self._checks < max(1, self._on_wall_clock)
             task = next((task for task in waiting if task.spot_check == wanted), waiting[0])
             waiting.remove(task)
             self._checks += task.spot_check
