@@ -3,7 +3,8 @@
 Usage: python benchmarks/speed.py [--runs N] [--against COMMAND] [--class] [--keep FILE [--warn FILE]]
 
 Medians of N runs (5), in turn with those of the other command. --class adds classes of 100 and 300, which take minutes.
-A plain start is a Python process that imports rclpy, makes a node with one publisher, logs once and ends. Processor
+Another `grade` may have rubrics that observe for longer or shorter: virtual seconds are counted in its recordings. A
+plain start is a Python process that imports rclpy, makes a node with one publisher, logs once and ends. Processor
 time is that of all processes together. Run it on an idle machine; processor times and ratios say most.
 
 --keep measures only one small run instead, and writes it to FILE as JSON: its processor time in plain starts, and its
@@ -13,6 +14,7 @@ instructions where `perf` can count them. --warn compares it with such a FILE, a
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import shlex
 import shutil
@@ -27,6 +29,9 @@ from pathlib import Path
 
 from class_of_100 import kinds, make_class
 from counting import counted, counts
+from rosbags.rosbag2 import Reader
+
+from grader.core.quantities import NS_PER_S
 
 ROOT = Path(__file__).resolve().parent.parent
 GRADE = str(Path(sys.executable).with_name("grade"))
@@ -41,12 +46,11 @@ node.get_logger().info("started")
 node.destroy_node()
 rclpy.shutdown()
 """
-#: Virtual seconds that the scenarios of the three exercises observe: 10 + 26 + 12.2 + 17 + 20.2.
-OBSERVED_S = 10.0 + 26.0 + 12.2 + 17.0 + 20.2
 EXERCISE_1 = ("reference_solutions", "--exercise", "velocity_publisher")
 FIVE_SECONDS = ("--rubric", str(ROOT / "benchmarks" / "five_seconds.yaml"), "--clock", "wall")
 #: Submissions that are judged from their text alone.
 TEXTS = {"syntax error": "def main(:\n", "empty file": ""}
+MS_PER_S = 1000
 #: Exit codes of `grade`.
 NOT_ALL_MET, UNDECIDED = 1, 3
 #: Submissions that are judged again at a time.
@@ -101,10 +105,29 @@ def rejudged_a_second(grade: str) -> float:
         return COPIES / graded(grade, "rejudge", str(Path(folder) / "class"), "--jobs", "1").processor_s
 
 
+@functools.cache
+def observed_s(grade: str) -> float:
+    """Return how many virtual seconds the recordings of the reference solutions last, up to their last records."""
+    with tempfile.TemporaryDirectory() as folder:
+        kept = Path(folder) / "evidence"
+        graded(grade, "reference_solutions", "-o", f"evidence={kept}")
+        return sum(duration_ns(recording.parent) for recording in kept.glob("*/metadata.yaml")) / NS_PER_S
+
+
+def duration_ns(recording: Path) -> int:
+    """Return how long a recording lasts, in nanoseconds."""
+    with Reader(recording) as reader:
+        return reader.duration
+
+
 def of_references(grade: str) -> Sequence[float]:
-    """Return processor time and real time of the reference solutions, and virtual seconds in a real one."""
+    """Return what the reference solutions cost.
+
+    Processor time and real time, virtual seconds in a real one, and milliseconds of processor time for a virtual one.
+    """
+    virtual_s = observed_s(grade)
     cost = graded(grade, "reference_solutions")
-    return cost.processor_s, cost.wall_s, OBSERVED_S / cost.wall_s
+    return cost.processor_s, cost.wall_s, virtual_s / cost.wall_s, MS_PER_S * cost.processor_s / virtual_s
 
 
 def of_exercise_1(grade: str) -> Sequence[float]:
@@ -121,8 +144,9 @@ def wall_of(*arguments: str, code: int = 0) -> Callable[[str], Sequence[float]]:
 def rows(place: Path, *, classes: bool) -> list[Rows]:
     """Return what is measured."""
     references = [("grade reference_solutions, processor", "s"), ("the same, real time", "s")]
+    of_virtual = [("virtual in a real second", "s"), ("processor for a virtual second", "ms")]
     found: list[Rows] = [
-        ([*references, ("virtual in a real second", "s")], of_references),
+        ([*references, *of_virtual], of_references),
         ([("exercise 1, real time", "s"), ("wall clock of 5 s / virtual time", "")], of_exercise_1),
     ]
     for what, text in TEXTS.items():
