@@ -117,7 +117,7 @@ def observed_s(grade: str) -> float:
 def duration_ns(recording: Path) -> int:
     """Return how long a recording lasts, in nanoseconds."""
     with Reader(recording) as reader:
-        return reader.duration
+        return int(reader.duration)
 
 
 def of_references(grade: str) -> Sequence[float]:
