@@ -1,6 +1,6 @@
 """Judges the whole set of test submissions on each clock, with and without load, and prints where the outcomes differ.
 
-Usage: python benchmarks/agreement.py RESULTS [--jobs N] [--only TEXT] MODE...
+Usage: python benchmarks/agreement.py RESULTS [--jobs N] [--only TEXT] [--isolation TIER] MODE...
        MODE is virtual, wall, auto, auto-load (two busy loops per core), or auto-executed (every student's process is
        executed, none is forked from a starter); RESULTS is a JSON file that is added to, so that a run that was stopped
        goes on. Without a MODE only the table of what RESULTS holds is printed.
@@ -116,7 +116,7 @@ def run(  # noqa: PLR0913  one parameter a choice
             write_whole(path, json.dumps(results, indent=1).encode())  # a run that is killed here loses nothing
             print(f"{mode} {number}/{len(left)} {futures[future]}", flush=True)
             forked = forked or bool(starters())
-        assert forked == session.isolation.can_enter or not left, "processes were started in the other way"
+        assert forked == session.isolation.can_fork or not left, "processes were started in the other way"
 
 
 def session_of(mode: str, opened: RecordingSession, jobs: int) -> AbstractContextManager[RecordingSession]:
@@ -185,13 +185,14 @@ def main() -> int:
     parser.add_argument("modes", nargs="*", metavar="MODE")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", default="")
+    parser.add_argument("--isolation", default="auto")
     arguments = parser.parse_intermixed_args()
     if unknown := set(arguments.modes) - set(MODES):
         parser.error(f"expected modes of {', '.join(MODES)}, found {', '.join(sorted(unknown))}")
     expected, results = what_is_known(arguments.results)
     chosen = {folder: entry for folder, entry in expected.items() if arguments.only in folder}
     for mode in arguments.modes:
-        how = GradeRequest("", clock=mode.partition("-")[0])
+        how = GradeRequest("", clock=mode.partition("-")[0], isolation=arguments.isolation)
         run(mode, how, chosen, results, arguments.results, jobs=arguments.jobs)
     table(expected, results)
     return ways_of_starting(results, arguments.results)

@@ -45,6 +45,7 @@ def examined(monkeypatch: pytest.MonkeyPatch, *tiers: TierReport) -> Checkup:
     monkeypatch.setattr(doctor, "find_ros", lambda: SimpleNamespace(runtime=None))
     monkeypatch.setattr(doctor, "inspect_tiers", lambda ros: tiers)
     monkeypatch.setattr(doctor, "byte_code", lambda runtime: Fact("byte code", "up to date"))
+    monkeypatch.setattr(doctor, "isolation_from_name", lambda name: SimpleNamespace(can_fork=name == "landlock"))
     monkeypatch.setattr(doctor, "sandbox_memory", lambda ros: Fact("sandbox check", "remembered"))
     return doctor.examine(lambda step: None)
 
@@ -56,6 +57,18 @@ def test_the_strongest_tier_that_holds_is_used(
     checkup = examined(monkeypatch, BY_ROOT, BY_USER, HOLDS)
     assert (checkup.safe, checkup.used, checkup.remedy) == (True, "landlock", "")
     assert [isolation for isolation, _ in stand_in] == ["landlock"]
+
+
+def test_it_says_where_nodes_cannot_be_forked(monkeypatch: pytest.MonkeyPatch, stand_in: list[tuple[str, str]]) -> None:
+    """Every start takes longer there: entering all namespaces at once needs a newer kernel."""
+    nested = TierReport("bubblewrap", "A1", usable=True, why="")
+    forked, executed = (
+        next(fact.value for fact in examined(monkeypatch, tier).facts if fact.name == "start of nodes")
+        for tier in (HOLDS, nested)
+    )
+    assert forked == "each is forked from a process that has imported ROS"
+    assert executed.endswith("to be forked into bubblewrap, it needs Linux 5.8 or newer")
+    assert len(stand_in) == 2
 
 
 def test_without_a_sandbox_messages_are_tried_all_the_same(

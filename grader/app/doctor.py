@@ -17,8 +17,9 @@ from grader.core.quantities import NS_PER_S
 from grader.execution.byte_code import byte_code
 from grader.execution.machine import software, system
 from grader.execution.ros_installation import RosInstallation, find_ros
+from grader.execution.sandbox.bubblewrap import ENTERABLE
 from grader.execution.sandbox.choose import inspect_tiers, sandbox_memory
-from grader.execution.sandbox.tiers import is_for_others
+from grader.execution.sandbox.tiers import is_for_others, isolation_from_name
 from grader.submissions.foreign_archives import install_command, is_installed
 
 #: Messages that the trial node sends, one every 0.1 s starting at 0.1 s, and how long it is observed.
@@ -49,6 +50,7 @@ def examine(progress: Progress) -> Checkup:
     progress("trying every sandbox")
     tiers = inspect_tiers(ros)
     used = next((tier.name for tier in tiers if tier.usable), "")
+    facts += (_node_start(used or NO_SANDBOX),)
     progress("exchanging messages")
     exchange = _exchange(used or NO_SANDBOX, progress)
     return Checkup(facts, exchange, tiers, used, "" if used else _remedy(tiers), Limits())
@@ -60,6 +62,14 @@ def _ros() -> tuple[RosInstallation | None, tuple[Fact, ...]]:
         return find_ros(), ()
     except EnvironmentFault as fault:
         return None, (Fact("ROS 2", fault.message.removeprefix("ROS 2: "), fits=False, remedy=fault.hint),)
+
+
+def _node_start(tier: str) -> Fact:
+    """Report how students' nodes are started in a tier."""
+    if isolation_from_name(tier).can_fork:
+        return Fact("start of nodes", "each is forked from a process that has imported ROS")
+    text = "each executes Python and imports ROS, which takes longer: to be forked"
+    return Fact("start of nodes", f"{text} into {tier}, it needs Linux {'.'.join(map(str, ENTERABLE))} or newer")
 
 
 def _archives() -> Fact:

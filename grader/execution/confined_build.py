@@ -14,7 +14,7 @@ from grader.core.quantities import GIB, MIB
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.environment import PACKAGE, worker_environment
 from grader.execution.sandbox.exposure import view_of, worker_view
-from grader.execution.sandbox.protocol import Isolation
+from grader.execution.sandbox.protocol import Isolation, start_request
 from grader.execution.sandbox.seccomp import student_filter
 from grader.execution.sandbox.start import landlock_version
 from grader.execution.sandbox.tiers import DEVICES, PLAIN_NAME, start_command
@@ -69,13 +69,13 @@ def build_confined(  # noqa: PLR0913  where it runs, what it reads, where it wri
         "tcp": False,
         "reach": False,
     }
-    start = start_command(
+    restrictions = start_request(
         str(into),
         limits=limits,
         confinement=confinement if confined else None,
         filter=student_filter().hex() if confined else "",
     )
-    argv = (*start, str(runtime.executable), "-s", "-B", "-m", MODULE)
+    argv = (*start_command(restrictions), str(runtime.executable), "-s", "-B", "-m", MODULE)
     command = isolation.worker_command(argv, worker_environment(runtime, into), (), view)
     try:
         done = subprocess.run(

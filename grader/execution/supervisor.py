@@ -220,7 +220,7 @@ class ExecutedWorker(Worker):
             "line": numbers[0],
             "lines_of_forks": numbers[1:],
             "runtime": to_json(runtime),
-            "starter": starter_command(clock, runtime, host, users=len(lines)) if isolation.can_enter else None,
+            "starter": starter_command(clock, runtime, host, users=len(lines)) if isolation.can_fork else None,
         }
         argv = [str(runtime.executable), "-s", "-S", "-u", "-m", MODULE.decode(), json.dumps(request)]
         environment, view = _environment(runtime, scratch), worker_view(runtime, scratch)

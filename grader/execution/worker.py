@@ -198,7 +198,7 @@ class Worker:
             copied=files_beside(Path(plan.root), file),
         )
         try:
-            if told or not self._isolation.can_enter:  # a fork of the starter has imported rclpy, which takes no part
+            if told or not self._isolation.can_fork:  # a fork of the starter has imported rclpy, which takes no part
                 command = self._isolation.student_command(process, plan.limits)
                 student = NodeProcess.start(name, root, command, ours, plan.limits)
             else:

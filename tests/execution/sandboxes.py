@@ -20,9 +20,10 @@ import pytest
 import grader
 from grader.core.errors import EnvironmentFault
 from grader.core.limits import Limits
+from grader.execution.codec import to_json
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.bubblewrap import Bubblewrap
-from grader.execution.sandbox.environment import runtime_environment
+from grader.execution.sandbox.environment import runtime_environment, worker_environment
 from grader.execution.sandbox.exposure import closed_folders, view_of, worker_view
 from grader.execution.sandbox.protocol import Command, Isolation, StudentProcess
 from grader.execution.sandbox.tiers import FlatBubblewrap, Landlock, isolation_from_name
@@ -41,14 +42,43 @@ sys.exit(student.returncode)
 """
 
 
+# Another one, which has the student's process forked.
+FORKING_RELAY = """
+import json, shutil, socket, sys, threading
+from grader.execution.codec import from_json
+from grader.execution.ros_installation import PythonRuntime
+from grader.execution.sandbox.protocol import PreparedSandbox
+from grader.execution.sandbox.starter import Starter
+told = json.loads(sys.argv[1])
+starter = Starter("", from_json(PythonRuntime, told["runtime"]), told["host"])
+ours, theirs = socket.socketpair()
+sandbox = PreparedSandbox(told["restrictions"], told["environment"])
+student = starter.start(sandbox, {}, tuple(told["command"]), theirs)
+streams = (student.stdout, sys.stdout.buffer.raw), (student.stderr, sys.stderr.buffer.raw)
+copying = [threading.Thread(target=shutil.copyfileobj, args=(*pair, 1)) for pair in streams]
+for thread in copying:
+    thread.start()
+code = student.wait()
+for thread in copying:
+    thread.join()
+student.close()
+starter.close()
+sys.exit(code)
+"""
+
+
 @dataclass(frozen=True)
 class Sandbox:
-    """A tier, with what starts its worker as another user where the tests run as root."""
+    """A tier, with what starts its worker as another user where the tests run as root.
+
+    Students' processes are executed, or if `forks`, which needs a tier without namespaces around them, forked.
+    """
 
     isolation: Isolation
     ros: RosInstallation
     submission: Path
     start_as: tuple[str, ...] = ()
+    forks: bool = False
 
     def student(
         self,
@@ -70,10 +100,23 @@ class Sandbox:
             beside=self.submission,
             copied=copied,
         )
-        return self.isolation.student_command(process, limits or Limits())
+        if not self.forks:
+            return self.isolation.student_command(process, limits or Limits())
+        sandbox = self.isolation.prepared_sandbox(process, limits or Limits())
+        told = {
+            "runtime": to_json(self.ros.runtime),
+            "host": self.isolation.host_seen_at,
+            "restrictions": dict(sandbox.restrictions),
+            "environment": dict(sandbox.environment),
+            "command": (str(self.ros.runtime.executable), *process.arguments),
+        }
+        environment = worker_environment(self.ros.runtime, Path("/tmp"))
+        return Command((sys.executable, "-s", "-B", "-c", FORKING_RELAY, json.dumps(told)), environment, ())
 
     def around(self, student: Command, **variables: str) -> Command:
         """Return the command of a worker that runs a student's command and ends as that ends."""
+        if self.forks:  # it is that of a worker already
+            return self.worker(student.argv, pass_fds=(), **{**student.environment, **variables})
         told = {"argv": student.argv, "environment": dict(student.environment), "pass_fds": student.pass_fds}
         argv = (sys.executable, "-I", "-S", "-c", RELAY, json.dumps(told))
         return self.worker(argv, pass_fds=student.pass_fds, **variables)

@@ -127,7 +127,7 @@ class Stage:
     name = "stage"
     submission_seen_at = ""
     host_seen_at = ""
-    can_enter = False
+    can_fork = False
 
     def __init__(self, folder: Path, behaviours: list[str]) -> None:
         self._folder = folder

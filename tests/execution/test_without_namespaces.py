@@ -6,6 +6,7 @@ import secrets
 import signal
 import socket
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -26,9 +27,14 @@ MIB = 1 << 20
 PACKAGE = Path(grader.__file__).resolve().parent
 
 
+@pytest.fixture(params=["executed", "forked"])
+def way(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
 @pytest.fixture(params=["bubblewrap-flat", "bubblewrap-flat-user", "landlock", "landlock-user"])
-def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
-    return sandbox_or_skip(request.param, ros, submission)
+def sandbox(request: pytest.FixtureRequest, way: str, ros: RosInstallation, submission: Path) -> Sandbox:
+    return replace(sandbox_or_skip(request.param, ros, submission), forks=way == "forked")
 
 
 TRIES = """

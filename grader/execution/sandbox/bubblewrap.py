@@ -30,6 +30,7 @@ from grader.execution.sandbox.exposure import (
 from grader.execution.sandbox.properties import install_command
 from grader.execution.sandbox.protocol import (
     Command,
+    Placeholder,
     PreparedSandbox,
     StudentProcess,
     WorkerView,
@@ -61,7 +62,7 @@ class Bubblewrap:
     prlimit: Path  # the program of util-linux that sets resource limits
     setpriv: Path  # the program of util-linux that changes the user; used only as root
     cat: Path  # the program of coreutils that is the placeholder in a sandbox
-    can_enter: bool  # whether a process can enter all namespaces of another at once (Linux 5.8)
+    can_fork: bool  # whether a process can enter all namespaces of another at once (Linux 5.8)
     as_root: bool  # whether this process is root; students then run as another user instead of in a user namespace
     can_forbid_userns: bool  # whether bubblewrap has `--disable-userns` (0.8 and newer); seccomp forbids them anyway
 
@@ -80,7 +81,7 @@ class Bubblewrap:
             prlimit=_program("prlimit", install_command("util-linux")),
             setpriv=_program("setpriv", install_command("util-linux")),
             cat=_program("cat", install_command("coreutils")),
-            can_enter=_kernel() >= ENTERABLE,
+            can_fork=_kernel() >= ENTERABLE,
             as_root=os.geteuid() == 0,
             can_forbid_userns=b"--disable-userns" in told.stdout + told.stderr,
         )
@@ -172,7 +173,7 @@ class Bubblewrap:
         return Command(argv, {}, (*process.pass_fds, *opened), opened)
 
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
-        """Return the sandbox that `student_command` builds, for a process that enters it."""
+        """Return the sandbox that `student_command` builds, for a process that is forked into it."""
         if self.as_root:
             make_readable(process.submission)
         status_read, status_write = os.pipe()
@@ -194,7 +195,8 @@ class Bubblewrap:
             filter=seccomp.student_filter().hex(),
         )
         environment = {**student_environment(process, HOME), "PWD": str(WORK)}  # bubblewrap sets it
-        return PreparedSandbox(Command(argv, {}, opened, opened), status_read, restrictions, environment)
+        placeholder = Placeholder(Command(argv, {}, opened, opened), status_read)
+        return PreparedSandbox(restrictions, environment, placeholder)
 
     def _namespaces(self, kept: Sequence[str]) -> list[str]:
         shared = ["--die-with-parent", "--new-session", "--unshare-pid", "--unshare-ipc", "--unshare-uts"]

@@ -56,13 +56,20 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
-class PreparedSandbox:
-    """A sandbox that a process enters after a fork, and the restrictions that the process then puts on itself."""
+class Placeholder:
+    """A process in a sandbox that writes what it reads, and keeps the sandbox until it ends."""
 
-    command: Command  # starts a placeholder in it, which writes what it reads and keeps the sandbox until it ends
+    command: Command
     status_fd: int  # where bubblewrap writes the pid of its child as JSON
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedSandbox:
+    """A sandbox for a process that is forked: what it enters, and the restrictions that it then puts on itself."""
+
     restrictions: Mapping[str, object]  # the request of `start.prepare`
     environment: Mapping[str, str]  # the complete environment of the process
+    placeholder: Placeholder | None = None  # its namespaces are entered; None to stay in those of the starter
 
 
 def start_request(folder: str, **further: object) -> dict[str, object]:
@@ -118,8 +125,8 @@ class Isolation(Protocol):
         """Return the command that starts a student process inside the worker, which shares only its network."""
 
     @property
-    def can_enter(self) -> bool:
-        """Whether a process can enter a sandbox of this tier, so that it need not be executed in it."""
+    def can_fork(self) -> bool:
+        """Whether a process can be forked into a sandbox of this tier, so that it need not be executed in it."""
 
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
-        """Return the sandbox that `student_command` builds, for a process that enters it."""
+        """Return the sandbox that `student_command` builds, for a process that is forked into it."""

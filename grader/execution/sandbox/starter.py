@@ -16,7 +16,7 @@ from typing import IO, Any
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox import start
 from grader.execution.sandbox.environment import quick_discovery, student_environment
-from grader.execution.sandbox.protocol import PreparedSandbox, StudentProcess
+from grader.execution.sandbox.protocol import Placeholder, PreparedSandbox, StudentProcess
 from grader.execution.sandbox.starter_process import StarterProcess, execute
 
 #: Seconds until the starter has imported rclpy, and until a sandbox is ready or a process has been forked.
@@ -34,7 +34,11 @@ class StartedProcess:
     stderr: IO[bytes]
 
     def __init__(
-        self, placeholder: subprocess.Popen[bytes], control: socket.socket, stdout: IO[bytes], stderr: IO[bytes]
+        self,
+        placeholder: subprocess.Popen[bytes] | None,
+        control: socket.socket,
+        stdout: IO[bytes],
+        stderr: IO[bytes],
     ) -> None:
         self._placeholder = placeholder
         self._control = control
@@ -47,8 +51,8 @@ class StartedProcess:
 
     @property
     def roots(self) -> tuple[int, ...]:
-        """The process, and the first process of its sandbox, which adopts its orphans."""
-        return (self.pid, self._placeholder.pid)
+        """The process, and the first process of its sandbox, if it has one: that adopts its orphans."""
+        return (self.pid,) if self._placeholder is None else (self.pid, self._placeholder.pid)
 
     def poll(self) -> int | None:
         """Return the exit code, or the signal as a negative number; None if the process is running."""
@@ -84,7 +88,8 @@ class StartedProcess:
     def close(self) -> None:
         """End what is left of the process and its sandbox."""
         self._control.close()
-        _end(self._placeholder)
+        if self._placeholder is not None:
+            _end(self._placeholder)
 
 
 def starter_command(clock: str, runtime: PythonRuntime, host_folder: str, users: int = 1) -> dict[str, Any]:
@@ -139,21 +144,15 @@ class Starter:
             stdin: Its standard input; None for an empty one.
         """
         with ExitStack() as ours, ExitStack() as theirs:
-            theirs.callback(os.close, sandbox.status_fd)
-            placeholder = subprocess.Popen(
-                sandbox.command.argv,
-                env=dict(sandbox.command.environment),
-                pass_fds=sandbox.command.pass_fds,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                start_new_session=True,
-                bufsize=0,
-            )
-            ours.callback(_end, placeholder)
-            for descriptor in sandbox.command.opened_fds:
-                os.close(descriptor)
+            placeholder: subprocess.Popen[bytes] | None = None
+            inside = 0
+            if sandbox.placeholder is not None:
+                theirs.callback(os.close, sandbox.placeholder.status_fd)
+                placeholder = _begun(sandbox.placeholder)
+                ours.callback(_end, placeholder)
+                inside = _pid_inside(placeholder, sandbox.placeholder.status_fd)
             request = {
-                "enter": _pid_inside(placeholder, sandbox.status_fd),
+                "enter": inside,
                 "environment": dict(sandbox.environment),
                 "restrictions": dict(sandbox.restrictions),
                 "program": dict(program),
@@ -194,6 +193,23 @@ class Starter:
         self._line.close()
         self._process.kill()
         self._process.wait()
+
+
+def _begun(placeholder: Placeholder) -> subprocess.Popen[bytes]:
+    """Start a placeholder."""
+    try:
+        return subprocess.Popen(
+            placeholder.command.argv,
+            env=dict(placeholder.command.environment),
+            pass_fds=placeholder.command.pass_fds,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+            bufsize=0,
+        )
+    finally:
+        for descriptor in placeholder.command.opened_fds:
+            os.close(descriptor)
 
 
 def _pid_inside(placeholder: subprocess.Popen[bytes], status_fd: int) -> int:

@@ -1,6 +1,6 @@
 """The sandbox tiers: `bubblewrap-flat`, `landlock` and `none`, and every tier by its name.
 
-The first two start a student's process through `start.py`, which sandboxes and limits it without namespaces.
+The three have no namespaces around a student's process: `start.py` restricts it in those of the worker.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ import platform
 import secrets
 import sys
 import tempfile
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from grader.core.checkup import TIERS
 from grader.core.dataclass import dataclass
@@ -83,20 +84,25 @@ def is_for_others(name: str) -> bool:
     return name == (USER_NAME if as_root else ROOT_NAME)
 
 
-class _WithoutEntry:
-    """What the tiers have in common that have no namespaces, so that no process can enter their sandbox."""
+class InPlace(ABC):
+    """What the tiers have in common whose students' processes stay in the namespaces of the worker."""
 
     __slots__ = ()
-    can_enter: ClassVar[bool] = False
+    can_fork: ClassVar[bool] = True
 
+    @abstractmethod
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
-        """Raise HarnessError: a student's process is executed."""
-        del process, limits
-        raise HarnessError("isolation: expected namespaces to enter, found none")
+        """Return the restrictions of a student's process."""
+
+    def student_command(self, process: StudentProcess, limits: Limits) -> Command:
+        """Return the command that starts a student's process, from inside the worker."""
+        sandbox = self.prepared_sandbox(process, limits)
+        argv = (*start_command(sandbox.restrictions), str(process.runtime.executable), *process.arguments)
+        return Command(argv, sandbox.environment, tuple(process.pass_fds))
 
 
 @dataclass(frozen=True, slots=True)
-class FlatBubblewrap(_WithoutEntry):
+class FlatBubblewrap(InPlace):
     """The tier `bubblewrap-flat`: bubblewrap around the worker; Landlock, seccomp and limits around each student in it.
 
     It is for systems that let bubblewrap create namespaces, but do not let it be nested, such as Ubuntu with its
@@ -125,12 +131,12 @@ class FlatBubblewrap(_WithoutEntry):
         """Return the command that starts the trusted worker; see `Bubblewrap.worker_command`."""
         return self.outer.worker_command(argv, environment, pass_fds, view)
 
-    def student_command(self, process: StudentProcess, limits: Limits) -> Command:
-        """Return the command that starts a student's process, from inside the worker."""
-        return sandboxed_command(process, limits, Ground(SCRATCH, loopback=False, as_root=self.outer.as_root))
+    def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
+        """Return the restrictions of a student's process."""
+        return confined(process, limits, Ground(SCRATCH, loopback=False, as_root=self.outer.as_root))
 
 
-class _OnSharedNetwork(_WithoutEntry):
+class _OnSharedNetwork(InPlace):
     """What the tiers have in common that use the caller's network."""
 
     __slots__ = ()
@@ -151,7 +157,7 @@ class _OnSharedNetwork(_WithoutEntry):
         """
         del view
         environment = {**environment, **loopback_only(environment)}
-        return Command((*start_command("/"), *argv), environment, tuple(pass_fds))
+        return Command((*start_command(start_request("/")), *argv), environment, tuple(pass_fds))
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,11 +176,10 @@ class Landlock(_OnSharedNetwork):
         require_landlock()
         return cls(as_root=os.geteuid() == 0)
 
-    def student_command(self, process: StudentProcess, limits: Limits) -> Command:
-        """Return the command that starts a student's process; raises HarnessError without a ROS domain."""
+    def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
+        """Return the restrictions of a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, LANDLOCK_NAME)
-        ground = Ground(Path(tempfile.gettempdir()), loopback=True, as_root=self.as_root)
-        return sandboxed_command(process, limits, ground)
+        return confined(process, limits, Ground(Path(tempfile.gettempdir()), loopback=True, as_root=self.as_root))
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,15 +192,14 @@ class Plain(_OnSharedNetwork):
 
     name: ClassVar[str] = PLAIN_NAME
 
-    def student_command(self, process: StudentProcess, limits: Limits) -> Command:
-        """Return the command that starts a student's process; raises HarnessError without a ROS domain."""
+    def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
+        """Return the limits of a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, PLAIN_NAME)
         folder = Path(tempfile.gettempdir()) / f"grade-student-{secrets.token_hex(8)}"
-        start = start_command(str(folder), made=True, limits=by_resource(limits), **copies(process))
         environment = student_environment(process, folder / "home")
         environment |= loopback_only(environment)
-        argv = (*start, str(process.runtime.executable), *process.arguments)
-        return Command(argv, environment, tuple(process.pass_fds))
+        request = start_request(str(folder), made=True, limits=by_resource(limits), **copies(process))
+        return PreparedSandbox(request, environment)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,9 +211,9 @@ class Ground:
     as_root: bool  # whether this process is root; the student's then runs as another user
 
 
-def start_command(folder: str, **further: Any) -> tuple[str, ...]:
-    """Return the beginning of a command line; the program and its arguments follow. See `start_request`."""
-    return (sys.executable, "-I", "-S", str(HERE / "start.py"), json.dumps(start_request(folder, **further)))
+def start_command(request: Mapping[str, object]) -> tuple[str, ...]:
+    """Return the beginning of a command line; the program and its arguments follow. See `start.prepare`."""
+    return (sys.executable, "-I", "-S", str(HERE / "start.py"), json.dumps(request))
 
 
 def copies(process: StudentProcess) -> dict[str, object]:
@@ -239,8 +243,8 @@ def require_landlock() -> None:
         )
 
 
-def sandboxed_command(process: StudentProcess, limits: Limits, ground: Ground) -> Command:
-    """Return the command of a student's process behind Landlock and a filter, in the caller's own namespaces.
+def confined(process: StudentProcess, limits: Limits, ground: Ground) -> PreparedSandbox:
+    """Return the restrictions of a student's process behind Landlock and a filter, in the caller's own namespaces.
 
     As root the process becomes another user, and the staged copy is made readable by everyone.
     """
@@ -249,19 +253,19 @@ def sandboxed_command(process: StudentProcess, limits: Limits, ground: Ground) -
     folder = ground.scratch / f"grade-student-{secrets.token_hex(8)}"
     environment = student_environment(process, folder / "home")
     environment |= loopback_only(environment) if ground.loopback else {}
-    # Without RLIMIT_RTPRIO a privileged parent's would hold.
-    start = start_command(
+    request = start_request(
         str(folder),
         made=True,
         **copies(process),
         scratch=limits.scratch_bytes,
+        # Without RLIMIT_RTPRIO a privileged parent's would hold.
         limits={**by_resource(limits), "RLIMIT_RTPRIO": 0, "RLIMIT_MSGQUEUE": 0},
         processes=limits.processes,
         user=[some_user(), STUDENT_GROUP] if ground.as_root else None,
         confinement=_confinement(process, ground),
         filter=flat_filter(signals=_version() < WITH_SIGNALS).hex(),
     )
-    return Command((*start, str(process.runtime.executable), *process.arguments), environment, tuple(process.pass_fds))
+    return PreparedSandbox(request, environment)
 
 
 def _confinement(process: StudentProcess, ground: Ground) -> dict[str, object]:

@@ -92,7 +92,7 @@ def started(request: dict[str, Any], segment: str, stdin: int) -> Iterator[subpr
     """Start the probe in the way in which students' processes are started here, and end it."""
     isolation, process = probe_process(request, segment)
     with ExitStack() as stack:
-        if isolation.can_enter:
+        if isolation.can_fork:
             starter = Starter("", process.runtime, isolation.host_seen_at)
             stack.callback(starter.close)
             _, theirs = (stack.enter_context(end) for end in socket.socketpair())
