@@ -35,7 +35,8 @@ ROOT = Path(__file__).resolve().parent.parent
 GRADE = str(Path(sys.executable).with_name("grade"))
 KINDS = ("grader", "worker", "starter", "student", "bubblewrap")
 REFERENCE = ROOT / "reference_solutions"
-MODULES = {"grader.execution.worker_main": "worker", "grader.classroom.worker": "job"}
+STARTS_STARTER = "grader.execution.worker_main"
+MODULES = {STARTS_STARTER: "worker", "grader.classroom.worker": "job"}
 #: Kinds that remove their temporary folder themselves; after a kill, the next grading does it.
 SWEPT = ("grader", "job")
 #: Outcomes that cost no student anything, and the beginnings of the words about a grading that ended wrongly.
@@ -50,18 +51,27 @@ def kind_of(pid: int, grader: int) -> str:
     if pid == grader:
         return "grader"
     with contextlib.suppress(OSError, UnicodeDecodeError):
-        words = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
+        words = words_of(pid)
         if Path(words[0]).name == "bwrap":
             return "bubblewrap"
-        if any(word.endswith("/starter.py") for word in words):
-            # A fork keeps the words of the starter, and has its own root once it is a student's process.
-            inside = Path(f"/proc/{pid}/root").stat().st_ino, Path(f"/proc/{pid}/root").stat().st_dev
-            parent = Path(f"/proc/{parent_of(pid)}/root").stat()
-            return "starter" if inside == (parent.st_ino, parent.st_dev) else "student"
+        if is_of_starter(words):
+            # Its forks keep its words: those that start students' processes, these, and what deletes their folders.
+            above = words_of(parent_of(pid))
+            return "student" if is_of_starter(above) else "starter" if STARTS_STARTER in above else ""
         if any(word.endswith("/launcher.py") for word in words):
             return "student"
         return next((kind for module, kind in MODULES.items() if module in words), "")
     return ""
+
+
+def words_of(pid: int) -> list[str]:
+    """Return the command line of a process; raises OSError if it has ended."""
+    return Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
+
+
+def is_of_starter(words: list[str]) -> bool:
+    """Return whether a command line is that of a starter, or of a fork of it."""
+    return any(word.endswith("/starter.py") for word in words)
 
 
 def parent_of(pid: int) -> int:

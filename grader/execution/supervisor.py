@@ -375,16 +375,27 @@ class Recorder:
         The thread that calls this has to outlive the recorder, as those of the pool do.
         """
         count = min(count, self._count)
-        executed = self._start(forks=count - 1)
         for _ in range(count):
             self._idle.get()
-        for worker in (*executed.forked, executed):  # the last one is the next to be taken, and is ready first
-            self._idle.put(worker)
+        self._fill(count)
+
+    def _fill(self, count: int) -> None:
+        """Fill so many places, which nobody else can take before, with a worker and forks of it; empty if it fails."""
+        workers: Sequence[Worker | None] = [None] * count
+        try:
+            executed = self._start(forks=count - 1)
+            workers = (*executed.forked, executed)  # the last one is the next to be taken, and is ready first
+        finally:
+            for worker in workers:
+                self._idle.put(worker)
 
     def _prepare(self, plans: Sequence[Plan]) -> None:
         """Start a worker with forks if none is busy and plans lack workers; forks share its memory and its starter."""
         with self._lock:
-            idle = [self._idle.get_nowait() for _ in range(self._idle.qsize())]
+            idle: list[Worker | None] = []
+            with contextlib.suppress(queue.Empty):
+                while True:
+                    idle.append(self._idle.get_nowait())
             suitable = [w for w in idle if w is not None and all(map(w.suits, plans))]
             if len(idle) < self._places or len(suitable) >= min(len(plans), self._count):
                 for worker in reversed(idle):
@@ -392,11 +403,9 @@ class Recorder:
                 return
             alive, self._alive = self._alive, []
             self._places = self._count
-            for _ in range(self._count):
-                self._idle.put(None)
         for worker in alive:
             self._close(worker)
-        self.warm_up(self._count)
+        self._fill(self._count)
 
     def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
         """Record every job and return the traces in the same order."""

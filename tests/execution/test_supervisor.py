@@ -541,6 +541,22 @@ def test_a_worn_worker_is_not_replaced_while_others_go_on(
     assert forks == [2, 0, 0, 2]
 
 
+def test_callers_at_the_same_time_wear_workers_and_lose_no_place(make: Callable[..., tuple[Recorder, Stage]]) -> None:
+    """While the places of one are filled again, nobody else takes or drops one of them: all would wait for it."""
+    recorder, _ = make("is worn", workers=2)
+
+    def record() -> None:
+        for _ in range(20):
+            recorder.record(jobs("a", "b"), nothing)
+
+    callers = [threading.Thread(target=record, daemon=True) for _ in range(3)]
+    for caller in callers:
+        caller.start()
+    for caller in callers:
+        caller.join(60)
+    assert not any(caller.is_alive() for caller in callers)
+
+
 def test_a_lost_worker_with_forks_is_replaced_by_another(
     make: Callable[..., tuple[Recorder, Stage]], forks: list[int]
 ) -> None:
