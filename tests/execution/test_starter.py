@@ -19,9 +19,10 @@ from executed import executing
 from hostile import hostile, record, staging
 from sandboxes import DOMAIN, Sandbox, finish, said, sandbox_or_skip
 
+from grader.core.errors import EnvironmentFault
 from grader.core.trace import FaultKind, Trace
 from grader.execution.codec import to_json
-from grader.execution.recording_session import RecordingSession
+from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.bubblewrap import Bubblewrap
 from grader.execution.sandbox.environment import worker_environment
@@ -191,6 +192,33 @@ def test_a_node_has_the_same_surroundings_in_both_ways(studio: RecordingSession,
     found["mounts"] = [mount for mount in found["mounts"] if mount[0] != "/grader_host/cat"]
     assert (expected.pop("leads"), found.pop("leads")) == ([False, False], [True, True])
     assert found == expected
+
+
+@pytest.mark.parametrize("tier", ["bubblewrap-flat", "landlock"])
+def test_a_folder_of_a_forked_process_has_a_size_and_ends_with_it(tier: str, tmp_path: Path) -> None:
+    """In tiers without namespaces another fork sees to both, in real time, whatever the host makes of the clock."""
+    tmp_path.chmod(0o755)
+    fills = """
+        import os, sys
+        print(os.getcwd(), flush=True)
+        for number in range(8):
+            open(f"file-{number}", "wb").write(bytes(4 << 20))
+        sum(range(60_000_000))
+        """
+    try:
+        with open_session(tier, 1) as session:
+            trace = record(staging(session), tmp_path / "s", hostile(before=fills), duration_ns=2 * S)
+            assert [fault.kind for fault in trace.faults()] == [FaultKind.KILLED]
+            assert "MiB" in trace.faults()[0].text
+            calm = record(staging(session), tmp_path / "calm", "import os\nprint(os.getcwd())", duration_ns=S)
+    except EnvironmentFault as fault:
+        pytest.skip(fault.message)
+    for folder in (*printed(trace), *printed(calm)):
+        deadline = time.monotonic() + 10
+        while Path(folder).exists() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert "grade-student-" in folder
+        assert not Path(folder).exists()
 
 
 def test_a_program_does_not_see_the_starter(run: Callable[..., Trace]) -> None:

@@ -23,12 +23,12 @@ import ctypes
 import json
 import os
 import resource
-import select
 import shutil
 import signal
 import struct
 import sys
 from collections.abc import Iterator
+from select import select  # the real one: in a starter, the host replaces that of the module later
 from typing import Any
 
 SET_PARENT_DEATH_SIGNAL = 1  # linux/prctl.h
@@ -167,12 +167,12 @@ def clean_up_after_end(folder: str, scratch: int) -> None:
     os.dup2(os.dup(watched[0]), 0)
     os.dup2(os.dup(watched[1]), 1)
     os.closerange(2, os.sysconf("SC_OPEN_MAX"))
-    while not select.select([0, 1], [], [], LOOK_S if scratch else None)[0]:
+    while not select([0, 1], [], [], LOOK_S if scratch else None)[0]:
         if outgrown(folder, scratch):
             # The signal distinguishes this end from all others; a program gains nothing by catching it.
             with contextlib.suppress(OSError):
                 os.kill(process, OUTGROWN)
-            select.select([0, 1], [], [], LOOK_S)
+            select([0, 1], [], [], LOOK_S)
             end_group(process)
     end_group(process)
     shutil.rmtree(folder, ignore_errors=True)
