@@ -111,7 +111,10 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         kept = _kept(request, exercises, submission, odometry, seed, environment, provided.offered)
         done = {exercise for exercise, _ in kept}
         unrecorded = [exercise for exercise in exercises if exercise.id not in done]
-        prefixes = install_shares(submission.root, Path(prefix), session.ros) if unrecorded else ()
+        prefixes: tuple[str, ...] = ()
+        if unrecorded:
+            prefixes, problems = install_shares(submission.root, submission.projects, Path(prefix), session.ros)
+            submission = replace(submission, notes=(*submission.notes, *problems))
         jobs = plan_jobs(request, unrecorded, submission, odometry, seed, provided.folders, prefixes)
         run = Run(
             submission=submission,

@@ -95,11 +95,11 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
     made = Launched()
     for node in _dicts(report.get("nodes"), NODES):
         package, wanted = _text(node.get("package")), _text(node.get("executable"))
-        found = find_executable(root, package, wanted)
+        found = find_executable(root, plan.projects, package, wanted)
         where = _place(name, node, places)
         if found is None or found.file is None:
-            if has_package(root, package):
-                text = _not_found(package, wanted, found, executables(root))
+            if has_package(plan.projects, package):
+                text = _not_found(package, wanted, found, executables(root, plan.projects))
                 file, _, line = where.rpartition(":")
                 return Launched(
                     fault=Fault(0, name, FaultKind.EXCEPTION, text, file if line else "", int(line or 0)),
@@ -108,7 +108,7 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
             sentence = f"{where}: {package}/{wanted} was not started: the submission has no package {package}"
             (notes if package in ONLY_LOOKING else left_out).append(sentence)
             continue
-        if not found.target and not has_package(root, package):
+        if not found.target and not has_package(plan.projects, package):
             notes.append(f"{where}: the submission has no package {package}; {found.file} was started")
         made = _added(made, name, node, found, where, known)
     if not made.processes and not left_out:

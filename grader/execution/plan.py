@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
+from grader.core.projects import Project
 from grader.core.scenario import (
     ActionGoal,
     Between,
@@ -44,6 +45,7 @@ from grader.execution.exchanges import (
     plan_server,
     plan_simulation,
 )
+from grader.student_host.packages import layout_of
 
 if TYPE_CHECKING:
     from grader.core.submission import Submission
@@ -143,6 +145,7 @@ class Plan:
             each is in the folder of what was built with it.
         prefixes: The AMENT_PREFIX_PATH of the nodes, first the folder of what the submission's packages share; empty if
             it has none.
+        projects: The ROS packages of the submission, outermost first.
     """
 
     scenario: str
@@ -171,10 +174,16 @@ class Plan:
     interfaces: tuple[str, ...] = ()
     prefixes: tuple[str, ...] = ()
     starts: tuple[PlannedStart, ...] = ()
+    projects: tuple[Project, ...] = ()
 
     def start_of(self, process: str) -> PlannedStart:
         """Return what a process is started with."""
         return next((start for start in self.starts if start.process == process), PlannedStart(process))
+
+    def scripts_of(self, file: str) -> tuple[tuple[str, str, str], ...]:
+        """Return the console scripts of the package that a file is in; none if it is in none."""
+        package = layout_of(self.root, file).package
+        return next((project.scripts for project in self.projects if project.folder == package), ())
 
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage
@@ -224,6 +233,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         may_exit=scenario.may_exit,
         shutdown_ns=scenario.shutdown_ns,
         starts=tuple(start for name in scenario.processes if (start := _start(name, scenario, submission)) is not None),
+        projects=submission.projects,
     )
 
 

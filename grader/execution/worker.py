@@ -119,7 +119,10 @@ class Worker:
     def _evaluate(self, plan: Plan, name: str, file: str, domain: int) -> Launched:
         """Return what a launch file describes, which a process in a sandbox of its own evaluates."""
         start = plan.start_of(name)
-        told = {"launch": {"arguments": start.launch_arguments, "provided": start.provided}}
+        packages = [(project.name, project.folder) for project in plan.projects]
+        told = {
+            "launch": {"arguments": start.launch_arguments, "provided": start.provided, "packages": packages},
+        }
         students: list[NodeProcess] = []
         with ExitStack() as stack:
             stack.callback(stop, students)
@@ -172,6 +175,7 @@ class Worker:
             "arguments": start.arguments,
             "ros_arguments": start.ros_arguments,
             "parameter_files": start.parameter_files,
+            "scripts": plan.scripts_of(file),
             "seed": plan.host_seed,
             "clock": plan.clock,
             "log_format": LOG_FORMAT,
@@ -230,7 +234,7 @@ class Worker:
                 runtime=replace(runtime, python_paths=(*runtime.python_paths, *map(Path, plan.interfaces))),
                 host_folder=None,
                 submission=Path(plan.root),
-                arguments=bare_arguments(Path(plan.root), root, file, plan.start_of(name)),
+                arguments=bare_arguments(Path(plan.root), root, file, plan.start_of(name), plan.scripts_of(file)),
                 environment={"ROS_DOMAIN_ID": str(domain)},
                 pass_fds=(),
                 beside=Path(plan.root, file).parent,
