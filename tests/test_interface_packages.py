@@ -35,11 +35,13 @@ from grader.app.start import grade
 from grader.classroom.store import Conditions
 from grader.cli import main
 from grader.core.report import Report
+from grader.core.submission import Submission
 from grader.execution.evidence.store import open_evidence
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.ros_installation import find_ros
 from grader.reporting.json_report import report_to_json
 from grader.rubrics.interfaces import Interfaces
+from grader.submissions.projects import read_projects
 
 REAL = Path(__file__).parent / "real_checks"
 RUBRIC_FILE = REAL / "brought.yaml"
@@ -140,7 +142,8 @@ def provided(session: RecordingSession, folder: Path, files: Mapping[str, str]) 
         path = folder / "own" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    return provide(session, (), (), folder / "own")
+    submission = Submission("own", str(folder), folder / "own", "", projects=read_projects(folder / "own")[0])
+    return provide(session, (), (), submission)
 
 
 @pytest.mark.sandbox

@@ -73,7 +73,7 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         submission = _stage(targets, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
-        provided = provide(session, (), request.interfaces, submission.root)
+        provided = provide(session, (), request.interfaces, submission)
         installed = session.folder / "installed"
         prefixes, _ = install_shares(submission.root, submission.projects, installed, session.ros)
         plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)

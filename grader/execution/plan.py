@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import random
 from collections.abc import Iterable, Iterator, Mapping
 from shlex import quote
@@ -50,6 +51,9 @@ from grader.student_host.packages import layout_of
 if TYPE_CHECKING:
     from grader.core.submission import Submission
 
+#: The most characters of what a process is started with, as JSON. It is handed over as one argument of a program, for
+#: which Linux allows 128 KiB (MAX_ARG_STRLEN, execve(2)); a large parameter file of a course has 10.
+MOST_START_CHARACTERS = 64 << 10
 #: A number to publish, or the limit it lies just above (1) or just below (-1) in the student's own type.
 PlannedNumber = tuple[float, int]
 
@@ -109,6 +113,14 @@ class PlannedStart:
         files = [f"--params-file {quote(name)}" for name, _ in self.parameter_files]
         ros = [*map(quote, self.ros_arguments), *files]
         return " ".join([*map(quote, self.arguments), *(["--ros-args", *ros] if ros else [])])
+
+    @property
+    def problem(self) -> str:
+        """Why no process can be started with this, as a phrase; empty if one can."""
+        given = (self.arguments, self.ros_arguments, self.parameter_files)
+        most = f"{MOST_START_CHARACTERS >> 10} KiB"
+        long = len(json.dumps(given)) > MOST_START_CHARACTERS
+        return f"stopped: its arguments and parameter files have more than {most}" if long else ""
 
 
 @dataclass(frozen=True, slots=True)
