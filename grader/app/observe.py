@@ -22,7 +22,7 @@ from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import open_session, planned_clock
 from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
-from grader.judging.judge_run import summarise
+from grader.judging.summary import summarise
 from grader.submissions.collected import listed
 from grader.submissions.submission import stage_submission
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib
 import importlib.util
+import inspect
 import os
 import sys
 import tempfile
@@ -167,7 +168,8 @@ def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, notify:
     nodes = _node_classes(namespace)
     if "main" not in namespace and len(nodes) == 1:
         notify({"code": "class_not_started", "class": nodes[0].__name__})
-        spin(nodes[0])
+        if _needs_nothing(nodes[0]):
+            spin(nodes[0])
 
 
 def _calls_at_top_level(statements: Sequence[ast.stmt], name: str) -> bool:
@@ -185,6 +187,15 @@ def _node_classes(namespace: dict[str, Any]) -> list[Any]:
         and issubclass(value, node)
         and value.__module__ == namespace["__name__"]
     ]
+
+
+def _needs_nothing(node_class: Any) -> bool:
+    """Return whether a class can be called without arguments; one that cannot is for other modules to use."""
+    try:
+        inspect.signature(node_class).bind()
+    except TypeError:
+        return False
+    return True
 
 
 def spin(node_class: Any) -> None:

@@ -28,7 +28,12 @@ from .watch import Watch
 from .watchdog import Watchdog
 
 if TYPE_CHECKING:
+    from types import TracebackType
+
     from .wall import WallTime
+
+#: Files whose frames lead to the program's own: this package, and the importing of a module.
+STARTING = (os.path.join(os.path.dirname(__file__), ""), importlib.__file__, "<frozen importlib.")
 
 
 class Host:
@@ -170,12 +175,20 @@ def play(request: dict[str, Any], describer: Describer, link: Link, install_ros:
         ending["code"] = 130
     except BaseException as error:  # whatever the student's code raises becomes a fault
         ending = {"code": 1, "fault": describer.exception(error)}
+        error.__traceback__ = of_program(error.__traceback__)
         sys.last_type, sys.last_value, sys.last_traceback = type(error), error, error.__traceback__
         sys.excepthook(type(error), error, error.__traceback__)
     with contextlib.suppress(BaseException):
         finish_threads()
         atexit._run_exitfuncs()
     return ending
+
+
+def of_program(frames: TracebackType | None) -> TracebackType | None:
+    """Return a traceback without the frames that started the program, as Python prints it for `python3 FILE`."""
+    while frames is not None and frames.tb_frame.f_code.co_filename.startswith(STARTING):
+        frames = frames.tb_next
+    return frames
 
 
 def forget_modules(root: str) -> None:
