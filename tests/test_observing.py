@@ -205,6 +205,55 @@ def test_a_class_that_needs_arguments_is_not_started(tmp_path: Path, clock: str)
     assert [note.split(",")[0] for note in summary.notes] == ["relay.py: nothing starts Relay"]
 
 
+def a_package(folder: Path, name: str, **files: str) -> None:
+    """Write a Python package with an entry point for each module; a name may have `__` for a folder."""
+    scripts = ", ".join(f"'{n.replace('__', '_')} = {name}.{n.replace('__', '.')}:main'" for n in files)
+    inner = folder / name / name
+    inner.mkdir(parents=True)
+    (inner.parent / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    (inner.parent / "setup.py").write_text(
+        f"from setuptools import setup\nsetup(name='{name}', entry_points={{'console_scripts': [{scripts}]}})\n"
+    )
+    for module, text in files.items():
+        path = inner / f"{module.replace('__', '/')}.py"
+        path.parent.mkdir(exist_ok=True)
+        (path.parent / "__init__.py").touch()
+        (inner / "__init__.py").touch()
+        path.write_text(text)
+
+
+LOGS = "import rclpy\n{}\ndef main():\n    rclpy.init()\n    rclpy.create_node('n').get_logger().info({})\n"
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("above", ["src", "anything", "src/repository"])
+@pytest.mark.parametrize("target", ["two/two/speaker.py", "two/speaker", "two/launch/all.launch.py"])
+def test_the_packages_beside_one_are_there(tmp_path: Path, above: str, target: str) -> None:
+    """As in a workspace that is built, whatever its folder is called and whatever is named."""
+    a_package(tmp_path / above, "one", words="TEXT = 'from the other package'\n")
+    a_package(tmp_path / above, "two", speaker=LOGS.format("from one.words import TEXT", "TEXT"))
+    launch = tmp_path / above / "two" / "launch" / "all.launch.py"
+    launch.parent.mkdir()
+    launch.write_text(
+        "from launch import LaunchDescription\nfrom launch_ros.actions import Node\n"
+        "def generate_launch_description():\n"
+        "    return LaunchDescription([Node(package='two', executable='speaker')])\n"
+    )
+    summary = observe(ObserveRequest((tmp_path / above / target,), NS_PER_S, clock="virtual"), lambda _: None)
+    assert [r.text for r in summary.records] == ["from the other package"]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("room", ["hall", "kitchen"])
+def test_the_file_that_is_named_runs(tmp_path: Path, room: str) -> None:
+    """A package may have two files of a name."""
+    a_package(tmp_path, "rooms", hall__main=LOGS.format("", "'hall'"), kitchen__main=LOGS.format("", "'kitchen'"))
+    file = tmp_path / "rooms" / "rooms" / room / "main.py"
+    summary = observe(ObserveRequest((file,), NS_PER_S, clock="virtual"), lambda _: None)
+    assert [r.text for r in summary.records] == [room]
+    assert [note for note in summary.notes if "not graded" in note] == []
+
+
 WORKSPACE = ROOT / "tests" / "packages" / "workspace"
 ROBOT = WORKSPACE / "src" / "robot"
 TARGETS = {

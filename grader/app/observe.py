@@ -13,7 +13,7 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError, SubmissionError
 from grader.core.quantities import NS_PER_S
 from grader.core.report import Summary
-from grader.core.scenario import OdometryStream, Scenario, Span, is_launch_file
+from grader.core.scenario import OdometryStream, Scenario, Span
 from grader.core.submission import Submission
 from grader.core.trace import Trace
 from grader.execution.bag import read_odometry
@@ -139,21 +139,32 @@ def _stage(targets: list[_Target], into: Path) -> Submission:
     names, files = [target.name for target in targets], [target.file for target in targets]
     folder = Path(os.path.commonpath([target.folder for target in targets]))
     package = next((up for up in (folder, *folder.parents) if (up / "package.xml").is_file()), folder)
-    starts_others = any(map(is_launch_file, names)) and package.parent.name == "src"
-    for place, root in enumerate(dict.fromkeys((package.parent if starts_others else package, package, folder))):
+    for place, root in enumerate(dict.fromkeys((_workspace_of(package), package, folder))):
         staged = into / f"submission_{place}"
         staged.mkdir()
+        meant = {
+            name: file.resolve().relative_to(root).as_posix() for name, file in zip(names, files, strict=True) if file
+        }
         try:
-            submission = stage_submission(str(root), names, staged)
+            submission = stage_submission(str(root), names, staged, meant)
         except SubmissionError:
             if root == folder and (len(files) > 1 or files[0] is None):
                 raise
             continue
-        # A package may have several files of a name.
-        found = [submission.files[name].found for name in names]
-        meant = [file and file.resolve().relative_to(root).as_posix() for file in files]
-        if root == folder or all(one == other or other is None for one, other in zip(found, meant, strict=True)):
+        if all(submission.files[name].found == path for name, path in meant.items()):  # a copy leaves some folders out
             return submission
     alone = into / "alone"
     alone.mkdir()
     return stage_submission(str(files[0]), names, alone)
+
+
+def _workspace_of(package: Path) -> Path:
+    """Return the folder with the packages that one may need: the `src` above it, or the next if it holds others."""
+    source = next((up for up in package.parents[:MOST_LEVELS] if up.name == "src"), package.parent)
+    found = (manifest for level in ("*", "*/*") for manifest in source.glob(f"{level}/package.xml"))
+    beside = (manifest for manifest in found if manifest.parent != package)
+    return source if (package / "package.xml").is_file() and any(beside) else package
+
+
+#: How far above a package the folder `src` of its workspace may be: packages lie in it or in a repository in it.
+MOST_LEVELS = 3

@@ -7,8 +7,9 @@ import os
 import re
 import stat
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
+from types import MappingProxyType
 
 from grader.core.errors import SubmissionError
 from grader.core.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
@@ -34,7 +35,9 @@ _EXTENSIONS = re.compile(r"(?:\.(?:txt|bak|orig|old|save|py|ipynb))+$")
 _COPY_MARK = re.compile(r"[\s_-]*(?:\(\d+\)|copy|copia|kopie)\s*\d*$")
 
 
-def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission:
+def stage_submission(
+    path: str, wanted: Sequence[str], into: Path, meant: Mapping[str, str] = MappingProxyType({})
+) -> Submission:
     """Copy a submission and find the wanted files in it.
 
     Args:
@@ -42,13 +45,14 @@ def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission
             one archive, that archive is used: learning platforms deliver uploads this way.
         wanted: File names of all exercises being graded; a missing one has the names that look like it.
         into: Empty folder that receives the copy.
+        meant: Wanted file name -> the path inside the submission that is meant, where several files may have the name.
 
     Raises:
         SubmissionError: There is no such path, it is not a folder, archive or .py file, it holds no .py file, a limit
             is exceeded, or an archive cannot be used.
         HarnessError: The copy cannot be written.
     """
-    return stage_collected(collect_submission(path, wanted, into), path, wanted, into)
+    return stage_collected(collect_submission(path, wanted, into), path, wanted, into, meant)
 
 
 def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collected:
@@ -60,14 +64,16 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
     return _collect_file(source, wanted, where)
 
 
-def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into: Path) -> Submission:
+def stage_collected(
+    collected: Collected, path: str, wanted: Sequence[str], into: Path, meant: Mapping[str, str] = MappingProxyType({})
+) -> Submission:
     """Write files that were read, here or on another machine, and find the wanted ones; raises HarnessError."""
     digest = write_files(collected, into)
     programs = executables(into) if any("/" in name for name in wanted) or _lacks(wanted, collected) else []
     files = {
         name: _look_for_executable(name, programs, collected.files, wanted)
         if "/" in name
-        else _look_for(name, collected.files, wanted, programs)
+        else _look_for(name, collected.files, wanted, programs, meant.get(name, ""))
         for name in wanted
     }
     several = tuple(note for file in files.values() for note in _notes_on(file))
@@ -197,9 +203,15 @@ def _notes_on(file: StudentFile) -> Iterator[str]:
 
 
 def _look_for(
-    wanted: str, files: Sequence[tuple[str, bytes]], all_wanted: Sequence[str], programs: Sequence[Executable]
+    wanted: str,
+    files: Sequence[tuple[str, bytes]],
+    all_wanted: Sequence[str],
+    programs: Sequence[Executable],
+    meant: str,
 ) -> StudentFile:
     names = [name for name, _ in files]
+    if meant in names:
+        return StudentFile(wanted, meant)
     exact = sorted((name for name in names if PurePosixPath(name).name == wanted), key=_nearest_the_top)
     if exact:
         return StudentFile(wanted, exact[0], others=tuple(exact[1:]))
