@@ -16,6 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from grader.app.ros_packages import Lent, copied, lent_to
 from grader.compiled import compiled, state_of, state_of_package
 from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault, RubricError
@@ -62,11 +63,12 @@ class Provided:
     offered: str = ""  # digest of all packages of rubrics and class, used or not; empty if there are none
     notes: tuple[str, ...] = ()  # sentences for whoever runs the grader
     problems: tuple[str, ...] = ()  # sentences for the student, about packages of the submission
+    lent: tuple[Path, ...] = ()  # the folder of the other Python packages of ROS that the run gets, if it gets any
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """Where their modules are, the first one first."""
-        return tuple(BuiltInterfaces(prefix, ()).python for prefix in self.builds)
+        """Where all modules are, the first one first."""
+        return (*(BuiltInterfaces(prefix, ()).python for prefix in self.builds), *self.lent)
 
 
 def is_installed(name: str, ros: RosInstallation) -> bool:
@@ -187,7 +189,9 @@ def provide(session: RecordingSession, exercises: Sequence[Exercise], course: Se
     given = offers((Path(folder) for e in exercises for folder in e.interfaces), course, ros)
     taken = {offer.package.name for offer in given}
     ready = [p for p in _shipped() if p.name not in taken and not is_installed(p.name, ros)]
-    text = b"".join([repr(exercises).encode("utf-8", "replace"), *_programs(root)])
+    programs = b"".join(_programs(root))
+    lent = lent_to(programs, lambda name: is_installed(name, ros))
+    text = repr(exercises).encode("utf-8", "replace") + programs + lent.text
     named = [package for package in ready if package.name.encode() in text]
     used = needed([*(offer.package for offer in given), *named], ready)
     given += [Offer(package, GRADER) for package in used if package.name not in taken]
@@ -197,7 +201,9 @@ def provide(session: RecordingSession, exercises: Sequence[Exercise], course: Se
     builds += [_copied(folder, root.parent) for folder in own.builds]
     packages = tuple(sorted([*brought, *own.packages], key=lambda package: package.name))
     offered = offered_digest(course, exercises)
-    return Provided(packages, tuple(builds), offered, tuple(_notes(packages)), own.problems)
+    lent_at = (copied(lent.names, session.folder),) if lent.names else ()
+    notes = tuple(_notes(packages, lent))
+    return Provided(packages, tuple(builds), offered, notes, own.problems, lent_at)
 
 
 def definitions(traces: Iterable[Trace], provided: Provided) -> dict[str, Definition]:
@@ -272,11 +278,13 @@ def _copied(folder: Path, into: Path) -> Path:
     return copy
 
 
-def _notes(packages: Iterable[BroughtPackage]) -> Iterator[str]:
-    """Yield the note on the packages of a run, in words."""
+def _notes(packages: Iterable[BroughtPackage], lent: Lent) -> Iterator[str]:
+    """Yield the notes on the packages of a run, in words."""
     by_origin: dict[str, list[str]] = {}
     for package in packages:
         by_origin.setdefault(package.origin, []).append(package.name)
     parts = [f"{listed(names, 'and')} of {_WORDS[origin]}" for origin, names in sorted(by_origin.items())]
     if parts:
         yield f"interface packages that are not installed: {'; '.join(parts)}"
+    if lent.names:
+        yield f"{listed(lent.names, 'and')}: not installed, the grader's own version was used"
