@@ -63,7 +63,7 @@ if TYPE_CHECKING:
 
 _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
-    "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
+    "given cannot be used, or a rubric has a mistake, 3 undecided through no fault of the student, 130 interrupted."
 )
 _TIERS = ("auto", *TIERS)
 # Environment variable that chooses the sandbox of a machine, such as a container that can have one only.
