@@ -395,22 +395,21 @@ def _doctor(*, as_json: bool) -> int:
 
 
 @click.command(name="explain")
-@click.argument("name", metavar="CRITERION", shell_complete=complete_criterion)
+@click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_criterion)
 @click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Look in this rubric; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
-def _explain(*, name: str, rubrics: tuple[Path, ...], as_json: bool) -> int:
-    """Explain a CRITERION, or a check by its name.
+def _explain(*, name: str | None, rubrics: tuple[Path, ...], as_json: bool) -> int:
+    """Explain the criterion or the check NAME; without a name, list all of them.
 
     Says what is asked, in which situation and with which tolerance it is measured, and which part of the chapter asks
     for it.
     """
-    from grader.app.explain import explain
-    from grader.reporting.explained import explanations_to_json, render_explanations
+    from grader.app.explain import everything, explain
+    from grader.reporting.explained import explanations_to_json, list_all, render_explanations
 
-    found = explain(name, rubrics)
-    print_result(
-        lambda: explanations_to_json(found), lambda page: render_explanations(found, width=page.width), as_json=as_json
-    )
+    found = everything(rubrics) if name is None else explain(name, rubrics)
+    render = list_all if name is None else render_explanations
+    print_result(lambda: explanations_to_json(found), lambda page: render(found, width=page.width), as_json=as_json)
     return ALL_MET
 
 
