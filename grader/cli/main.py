@@ -26,6 +26,7 @@ from grader.cli.options import (
     complain,
     drawn_by,
     drawn_with,
+    inputs_options,
     interfaces_option,
     parse_outputs,
     parse_percent,
@@ -347,6 +348,7 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
 @click.option("--odom-bag", type=PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
 @click.option("--isolation", type=click.Choice(_TIERS), default="auto", envvar=_ISOLATION, help="As for grading.")
+@inputs_options
 @interfaces_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
 def _observe(  # noqa: PLR0913  one parameter an option
@@ -356,6 +358,8 @@ def _observe(  # noqa: PLR0913  one parameter an option
     odom_bag: Path | None,
     clock: str,
     isolation: str,
+    sent: tuple[str, ...],
+    simulations: tuple[str, ...],
     interfaces: tuple[Path, ...],
     as_json: bool,
 ) -> int:
@@ -365,9 +369,19 @@ def _observe(  # noqa: PLR0913  one parameter an option
     Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
     """
     from grader.app import observe
+    from grader.app.inputs import read_sent, read_simulations
     from grader.reporting.observed import render_summary, summary_to_json
 
-    request = observe.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation, interfaces)
+    request = observe.ObserveRequest(
+        files,
+        round(duration * 1e9),
+        odom_bag,
+        clock,
+        isolation,
+        interfaces,
+        read_simulations(simulations),
+        read_sent(sent),
+    )
     with shown_progress(wanted=True) as progress:
         summary = observe.observe(request, progress)
     print_result(lambda: summary_to_json(summary), lambda _: render_summary(summary), as_json=as_json)

@@ -9,6 +9,7 @@ import click
 from grader.cli.options import (
     PATH,
     complain,
+    inputs_options,
     interfaces_option,
     print_for_programs,
     print_result,
@@ -108,9 +109,7 @@ def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", type=PATH, metavar="PATH", help="Write it there; by default it is printed.")
 @click.option("--id", "id_", default="", metavar="ID", help="Id of the exercise; by default made of the first file.")
-@click.option(
-    "--send", "sent", metavar="TOPIC={FIELD: VALUE}", multiple=True, help="A message to send to them; repeatable."
-)
+@inputs_options
 @click.option("--duration", type=click.FloatRange(4, 600), default=10.0, show_default=True, help="Seconds observed.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
 @click.option("--isolation", type=click.Choice(("auto", *TIERS)), default="auto", help="As for grading.")
@@ -120,6 +119,7 @@ def _new(  # noqa: PLR0913  one parameter an option
     output: Path | None,
     id_: str,
     sent: tuple[str, ...],
+    simulations: tuple[str, ...],
     duration: float,
     clock: str,
     isolation: str,
@@ -129,6 +129,7 @@ def _new(  # noqa: PLR0913  one parameter an option
     It is a skeleton: comments tell what was seen, and what its author has to decide. The reference meets all of it.
     With -o, rubric.schema.json is written beside it, with which editors complete and check it.
     """
+    from grader.app.inputs import read_sent, read_simulations
     from grader.app.observe import ObserveRequest
     from grader.authoring.starting import new_rubric
     from grader.reporting.escape import shown
@@ -137,8 +138,10 @@ def _new(  # noqa: PLR0913  one parameter an option
     if output is not None and output.exists():
         raise GraderError(f"{output}: expected a new file, found one that is there", "name another, or remove it")
     with shown_progress(wanted=True) as progress:
-        request = ObserveRequest(files, round(duration * 1e9), None, clock, isolation)
-        skeleton = new_rubric(request, progress, id_=id_, sent=sent)
+        request = ObserveRequest(
+            files, round(duration * 1e9), None, clock, isolation, (), read_simulations(simulations), read_sent(sent)
+        )
+        skeleton = new_rubric(request, progress, id_=id_, beside=output.parent if output is not None else Path())
     for remark in skeleton.remarks:
         complain(remark)
     if output is None:
