@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import field, replace
 from pathlib import Path
 
 from grader.app.grade import Progress, builtin_recording
+from grader.app.inputs import NamedSimulation, SentMessages, messages, simulated
 from grader.app.interface_packages import provide
 from grader.app.seeds import PRACTICE
 from grader.core.dataclass import dataclass
@@ -23,6 +25,7 @@ from grader.execution.recording_session import open_session, planned_clock
 from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
 from grader.judging.summary import summarise
+from grader.judging.values import student_endpoints
 from grader.submissions.collected import listed
 from grader.submissions.submission import stage_submission
 
@@ -41,6 +44,8 @@ class ObserveRequest:
     clock: str = "auto"  # `virtual`, `wall` or `auto`
     isolation: str = "auto"  # `auto` or `none`
     interfaces: tuple[Path, ...] = ()  # folders with interface packages
+    simulations: tuple[NamedSimulation, ...] = ()  # participants that react to what the programs publish
+    sent: SentMessages = field(default_factory=dict)  # messages to send to them
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,17 +58,29 @@ class Watched:
 
 
 def observe(request: ObserveRequest, progress: Progress) -> Summary:
-    """Run the programs together and summarise what they did."""
+    """Run the programs together and summarise what they did; twice if messages are sent, to learn their types first.
+
+    Raises:
+        GraderError: Nobody subscribes to a topic of a message to send, or it does not fit the type.
+    """
     watched = watch(request, progress)
+    if request.sent:
+        types = {end.topic: end.type for end in student_endpoints(watched.trace, "subscription")}
+        sent = messages(request.sent, types, request.duration_ns / NS_PER_S, request.interfaces)
+        scenario = undisturbed(request, watched.processes)
+        watched = watch(request, progress, replace(scenario, stimuli=(*scenario.stimuli, *sent)))
     return summarise(watched.trace, watched.processes, watched.isolation)
 
 
 def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None = None) -> Watched:
-    """Run the programs together and return the trace; without a scenario, only the given recording is played."""
+    """Run the programs together and return the trace.
+
+    Without a scenario, only the simulations take part, and the given recording is played.
+    """
     targets = _targets(request.files)
     names = [target.name for target in targets]
     if scenario is None:
-        scenario = _undisturbed(request, names)
+        scenario = undisturbed(request, names)
     plays = any(isinstance(stimulus, OdometryStream) for stimulus in scenario.stimuli)
     odometry = None
     if plays:
@@ -81,9 +98,11 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
     return Watched(trace, tuple(names), session.isolation.name)
 
 
-def _undisturbed(request: ObserveRequest, names: list[str]) -> Scenario:
+def undisturbed(request: ObserveRequest, names: Sequence[str]) -> Scenario:
+    """Return the scenario of programs with the simulations and the recording of a request, and no messages."""
     stream = OdometryStream("/odom", ODOMETRY_AFTER_NS, max(NS_PER_S, request.duration_ns - ODOMETRY_AFTER_NS))
-    return Scenario("observed", tuple(names), Span(request.duration_ns), (stream,) if request.odom_bag else ())
+    stimuli = (*simulated(request.simulations, request.interfaces), *((stream,) if request.odom_bag else ()))
+    return Scenario("observed", tuple(names), Span(request.duration_ns), stimuli)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from dataclasses import field
 from enum import Enum
 from typing import Any, TypeVar
 
+from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
 from grader.core.quantities import seconds
 
@@ -287,6 +288,8 @@ class Trace:
     left_out: tuple[str, ...] = ()
     # Whether a wait for the middleware timed out, so that something may be missing: a reason to record again
     incomplete: bool = False
+    # The mistake in a simulation of the rubric's author that prevents judging, as `harness_problem` does; None without
+    author_mistake: AuthorMistake | None = None
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

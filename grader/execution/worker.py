@@ -15,7 +15,7 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +43,7 @@ from grader.execution.sandbox.starter_process import StarterProcess
 from grader.execution.sandbox.tiers import isolation_from_name
 from grader.execution.student_process import LOG_FORMAT, NodeProcess
 from grader.execution.usage import usage
+from grader.simulation.loading import SimulationError
 from grader.student_host.starter import CONNECTED
 
 if TYPE_CHECKING:
@@ -351,6 +352,8 @@ def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
         try:
             plan: Plan = from_json(Plan, data["plan"])
             answer: dict[str, Any] = worker.run(plan, data["domain"], data["left_ns"], data["budget"])
+        except SimulationError as error:
+            answer = {"problem": error.message, "author_mistake": asdict(error.mistake)}
         except HarnessError as error:
             answer = {"problem": error.message}
         except Exception:

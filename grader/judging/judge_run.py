@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import asdict, field, replace
 from fractions import Fraction
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
-from grader.core.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
+from grader.core.report import AUTHOR_MISTAKE, NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import EXPORT_NOTEBOOK, Run, Submission, is_notebook
 from grader.core.trace import ClockKind, Fault, GraphSnapshot, StartWay, Trace
@@ -168,6 +168,7 @@ class VerdictBuilder:
             return self._blocked(criterion, needed, self._outcome(needed))
         if answer.finding is None:
             evidence: dict[str, object] = {"error": answer.error} if answer.error else {}
+            evidence |= {AUTHOR_MISTAKE: asdict(answer.mistake)} if answer.mistake is not None else {}
             evidence |= {FAULT_KEY: fault_evidence(answer.fault)} if answer.fault is not None else {}
             problem, hint = answer.problem, answer.hint
             return _without_points(criterion, Outcome.UNDECIDED, problem, hint=hint, evidence=evidence)
