@@ -93,12 +93,17 @@ def _mode(path: str, where: str) -> int:
     try:
         return os.stat(path).st_mode  # noqa: PTH116 - a Path would change what was typed, e.g. `x.py/`
     except (FileNotFoundError, NotADirectoryError):
-        text = f"{where}: expected {_EXPECTED}, found nothing there"
-        raise SubmissionError(text, "check the path, and the folder you are in") from None
+        raise not_there(path) from None
     except OSError as error:
         raise SubmissionError(f"{where}: cannot be read: {error.strerror}") from None
     except ValueError:
         raise SubmissionError(f"{where}: expected a path, found one that no file can have") from None
+
+
+def not_there(path: str, hint: str = "") -> SubmissionError:
+    """Return the error for a path at which there is nothing."""
+    text = f"{shown(path, 500)}: expected {_EXPECTED}, found nothing there"
+    return SubmissionError(text, hint or "check the path, and the folder you are in")
 
 
 def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
@@ -120,8 +125,17 @@ def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
             raise SubmissionError(f"{where}: expected at most {MAX_FILE_BYTES >> 20} MiB, found more")
         return Collected(((source.name, content),))
     if kind is None and not source.name.casefold().endswith(ARCHIVE_SUFFIXES):
-        raise SubmissionError(f"{where}: expected {_EXPECTED}, found another kind of file")
+        raise SubmissionError(f"{where}: expected {_EXPECTED}, found another kind of file", _other_kind(source, wanted))
     return _with_python(collect_archive(content, where=where), wanted, where)
+
+
+def _other_kind(source: Path, wanted: Sequence[str]) -> str:
+    """Return a hint for a file that is neither a program nor an archive: a notebook, or a program of another name."""
+    if is_notebook(source.name):
+        return f"{shown(source.name)} is a notebook: {EXPORT_NOTEBOOK}"
+    if any(_similar(name, [source.name], wanted) for name in wanted) or ".py" in source.suffixes:
+        return f"rename {shown(source.name)} so that it ends in .py"
+    return ""
 
 
 def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Collected:

@@ -197,6 +197,15 @@ def test_a_file_that_is_not_there_comes_after_one_that_is() -> None:
     assert render(report(renamed, located())).splitlines()[1] == "Fix first: b.py: not in the submission"
 
 
+def test_an_exercise_that_was_not_begun_is_never_the_first_to_fix() -> None:
+    """A folder with the files of one exercise, all of it right, has nothing to fix first."""
+    absent = exercise("f", "2", "F", *missing("b.py"))
+    right = exercise("g", "1", "G", criterion("r", "R", 5, Outcome.MET, reason="fine"))
+    assert "Fix first" not in render(report(right, absent))
+    partner = exercise("h", "3", "H", *missing("c.py"), criterion("r", "R", 5, Outcome.MET, reason="fine"))
+    assert "Fix first: c.py: not in the submission" in render(report(absent, partner))
+
+
 def missing(file: str, **evidence: str) -> tuple[Verdict, Verdict]:
     known = {"missing": file, "similar": [], **evidence}
     first = criterion("f", "F", 5, Outcome.NOT_MET, reason=f"{file}: not in the submission", evidence=known)
