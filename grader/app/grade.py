@@ -110,12 +110,15 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         odometry = read_recording(request, exercises)
         seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
         environment = _environment(session)
-        provided = provide(session, exercises, request.interfaces, submission.root)
+        provided = provide(session, exercises, request.interfaces, submission, request.time_budget_s)
         submission = replace(submission, notes=(*submission.notes, *provided.problems))
         kept = _kept(request, exercises, submission, odometry, seed, environment, provided.offered)
         done = {exercise for exercise, _ in kept}
         unrecorded = [exercise for exercise in exercises if exercise.id not in done]
-        prefixes = install_shares(submission.root, Path(prefix), session.ros) if unrecorded else ()
+        prefixes: tuple[str, ...] = ()
+        if unrecorded:
+            prefixes, problems = install_shares(submission.root, submission.projects, Path(prefix), session.ros)
+            submission = replace(submission, notes=(*submission.notes, *problems))
         jobs = plan_jobs(request, unrecorded, submission, odometry, seed, provided.folders, prefixes)
         run = Run(
             submission=submission,
@@ -138,8 +141,8 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
             _judge()
             under_way()
 
-        budget_s = request.time_budget_s
-        traces = session.record(jobs, request.clock, progress, first, budget_s=budget_s, under_way=meanwhile)
+        budget = RealTimeBudget(request.time_budget_s, spent_s=provided.spent_s)
+        traces = session.record(jobs, request.clock, progress, first, budget=budget, under_way=meanwhile)
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))

@@ -19,7 +19,7 @@ from grader.core.scenario import OdometryStream, Scenario, Span
 from grader.core.submission import Submission
 from grader.core.trace import Trace
 from grader.execution.bag import read_odometry
-from grader.execution.executables import executables
+from grader.execution.executables import Executable, executables
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import open_session, planned_clock
 from grader.execution.shares import install_shares
@@ -27,6 +27,7 @@ from grader.execution.supervisor import Job
 from grader.judging.summary import summarise
 from grader.judging.values import student_endpoints
 from grader.submissions.collected import listed
+from grader.submissions.projects import read_projects
 from grader.submissions.submission import stage_submission
 
 #: When a given recording starts playing; before that the nodes receive no odometry.
@@ -89,8 +90,9 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         submission = _stage(targets, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
-        provided = provide(session, (), request.interfaces, submission.root)
-        prefixes = install_shares(submission.root, session.folder / "installed", session.ros)
+        provided = provide(session, (), request.interfaces, submission)
+        installed = session.folder / "installed"
+        prefixes, _ = install_shares(submission.root, submission.projects, installed, session.ros)
         plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)
         trace = session.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
     if trace.harness_problem:
@@ -131,13 +133,13 @@ def _of_path(path: Path) -> list[_Target]:
     if path.is_file() and path.suffix == ".py":
         return [_Target(path.name, path.resolve().parent, path)]
     if path.is_dir():
-        found = [one for one in executables(path.resolve()) if one.file is not None]
+        found = [one for one in _executables(path.resolve()) if one.file is not None]
         if not found:
             text = f"{path}: expected a package or workspace with entry points, found none"
             raise SubmissionError(text, "name the files of the nodes to run, or add console_scripts to setup.py")
         return [_Target(one.words, path.resolve()) for one in found]
     here = path.resolve().parent
-    known = executables(here) if not path.exists() and here.is_dir() and path.suffix == "" else []
+    known = _executables(here) if not path.exists() and here.is_dir() and path.suffix == "" else []
     named = [one for one in known if one.name == path.name and one.file is not None]
     if len(named) == 1:
         return [_Target(named[0].words, here)]
@@ -147,6 +149,11 @@ def _of_path(path: Path) -> list[_Target]:
             f"{path}: expected an executable ({names}), found {'several' if named else 'none'}", _WHAT
         )
     raise SubmissionError(f"{path}: expected a .py file, found none", _WHAT)
+
+
+def _executables(folder: Path) -> list[Executable]:
+    projects, _ = read_projects(folder)
+    return executables(folder, projects)
 
 
 #: The most executables that a message lists.

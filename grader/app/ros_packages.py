@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable, Iterable
-from functools import cache
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 
 from grader.core.dataclass import dataclass
@@ -13,6 +12,16 @@ from grader.core.shipped import PACKAGE
 
 #: The packages, each a folder; they import rclpy, so only nodes do.
 LENT = PACKAGE / "ros_packages"
+#: Their names.
+LENDABLE = (
+    "cv_bridge",
+    "message_filters",
+    "sensor_msgs_py",
+    "tf2_geometry_msgs",
+    "tf2_py",
+    "tf2_ros",
+    "tf_transformations",
+)
 _IMPORT = re.compile(rb"^ *(?:from|import) (\w+)", re.MULTILINE)
 
 
@@ -24,19 +33,19 @@ class Lent:
     text: bytes = b""  # all of their code, which names the interface packages that they need
 
 
-def lent_to(programs: bytes, is_installed: Callable[[str], bool]) -> Lent:
-    """Return the packages that are not installed and that programs, or the packages that these need, name.
+def lent_to(named: Collection[str], is_installed: Callable[[str], bool]) -> Lent:
+    """Return the packages that are not installed and that programs name, or that those need.
 
     Args:
-        programs: The text of all programs.
+        named: What the programs name, of `LENDABLE`.
         is_installed: Whether ROS or Python has a package of this name.
     """
-    lacking = {name: text for name, text in _packages().items() if not is_installed(name)}
+    lacking = {name for name in LENDABLE if not is_installed(name)}
     found: dict[str, bytes] = {}
-    named = {name for name in lacking if name.encode() in programs}
-    while more := {name: lacking[name] for name in named if name not in found}:
+    wanted = lacking.intersection(named)
+    while more := {name: _code(name) for name in wanted if name not in found}:
         found |= more
-        named = {m[1].decode() for text in more.values() for m in _IMPORT.finditer(text)} & lacking.keys()
+        wanted = lacking & {m[1].decode() for text in more.values() for m in _IMPORT.finditer(text)}
     return Lent(tuple(sorted(found)), b"".join(found.values()))
 
 
@@ -49,8 +58,5 @@ def copied(names: Iterable[str], into: Path) -> Path:
     return folder
 
 
-@cache
-def _packages() -> dict[str, bytes]:
-    """Return name and code of each package."""
-    folders = sorted(folder for folder in LENT.iterdir() if (folder / "__init__.py").is_file())
-    return {folder.name: b"".join(path.read_bytes() for path in sorted(folder.rglob("*.py"))) for folder in folders}
+def _code(name: str) -> bytes:
+    return b"".join(path.read_bytes() for path in sorted((LENT / name).rglob("*.py")))

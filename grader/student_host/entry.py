@@ -62,7 +62,8 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     """Run one file of a submission to its end; raises whatever the file raises.
 
     Args:
-        request: The submission's folder as `root`; the file, relative to it; and what it is started with.
+        request: The submission's folder as `root`; the file, relative to it; the console scripts of its package; and
+            what it is started with.
         notify: Called with the way the file is started, before any of its code runs, and with notes for the report.
         install_ros: Called when the program imports rclpy, if a module of the submission hides another one.
     """
@@ -70,7 +71,7 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     path = os.path.join(root, file)
     tree = parse(path)  # raises a syntax error before any code has run
     layout = layout_of(root, file)
-    start = start_of(root, file, layout, tree, request.get("executable", ""))
+    start = start_of(root, file, layout, tree, request.get("executable", ""), request.get("scripts", ()))
     shadows = shadows_of(root, file)
     how = {"way": start.way, "module": start.module, "function": start.function}
     notify({"code": "started", **how, "hidden": shadows.files})

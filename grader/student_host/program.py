@@ -21,7 +21,6 @@ from . import entry, launch_files, originals
 from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_processes
-from .packages import packages_of
 from .quick_imports import import_without_needless
 from .virtual import VirtualTime
 from .watch import Watch
@@ -113,7 +112,8 @@ def evaluate(request: dict[str, Any]) -> None:
     """Evaluate the launch file that a request names, and report what it describes; never returns.
 
     Args:
-        request: As for `run`, with `launch`: its `arguments`, and the `provided` files of the rubric.
+        request: As for `run`, with `launch`: its `arguments`, the `provided` files of the rubric, and name and
+            folder of the submission's `packages`, outermost first.
     """
     link, describer = Link(), Describer()
     link.open(request["fd"])
@@ -131,7 +131,8 @@ def evaluate(request: dict[str, Any]) -> None:
     try:
         path = os.path.join(here, request["file"])
         sys.argv = [path]
-        nodes, left_out = launch_files.describe((root, own), path, packages_of(root), dict(told["arguments"]))
+        packages = {name: os.path.join(root, folder).rstrip("/") for name, folder in reversed(told["packages"])}
+        nodes, left_out = launch_files.describe((root, own), path, packages, dict(told["arguments"]))
         found = {"nodes": nodes, "left_out": left_out}
     except BaseException as error:  # whatever the launch file raises becomes a fault
         found = {"fault": describer.exception(error)}

@@ -15,6 +15,7 @@ from grader.core.errors import SubmissionError
 from grader.core.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
 from grader.execution.executables import Executable, executables
 from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, shown
+from grader.submissions.projects import read_projects
 from grader.submissions.staging import collect_folder, read_start, write_files
 
 #: Names at least this similar are shown as a possible misspelling.
@@ -50,7 +51,7 @@ def stage_submission(
     Raises:
         SubmissionError: There is no such path, it is not a folder, archive or .py file, it holds no .py file, a limit
             is exceeded, or an archive cannot be used.
-        HarnessError: The copy cannot be written.
+        HarnessError: The copy cannot be written, or no process can be started that reads project files.
     """
     return stage_collected(collect_submission(path, wanted, into), path, wanted, into, meant)
 
@@ -69,7 +70,8 @@ def stage_collected(
 ) -> Submission:
     """Write files that were read, here or on another machine, and find the wanted ones; raises HarnessError."""
     digest = write_files(collected, into)
-    programs = executables(into) if any("/" in name for name in wanted) or _lacks(wanted, collected) else []
+    projects, problems = read_projects(into) if wanted else ((), ())  # without, it is staged for its digest alone
+    programs = executables(into, projects)
     files = {
         name: _look_for_executable(name, programs, collected.files, wanted)
         if "/" in name
@@ -83,7 +85,8 @@ def stage_collected(
         root=into,
         digest=digest,
         files=files,
-        notes=(*several, *collected.notes),
+        notes=(*several, *collected.notes, *problems),
+        projects=projects,
     )
 
 
@@ -183,12 +186,6 @@ def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> Submi
 def _name(source: Path) -> str:
     """Return the name that reports show: the last part of the path, also for `.` and `..`."""
     return source.name if source.name not in ("", "..") else source.resolve().name or "/"
-
-
-def _lacks(wanted: Sequence[str], collected: Collected) -> bool:
-    """Return whether a program is missing that an entry point may stand for."""
-    names = {PurePosixPath(name).name for name, _ in collected.files}
-    return any(name.endswith(".py") and name not in names for name in wanted)
 
 
 def _look_for_executable(

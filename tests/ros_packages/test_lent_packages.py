@@ -24,7 +24,7 @@ from sensor_msgs.msg import Image, PointField
 from std_msgs.msg import Header
 
 from grader.app.observe import ObserveRequest, observe
-from grader.app.ros_packages import LENT, lent_to
+from grader.app.ros_packages import LENDABLE, LENT, lent_to
 from grader.core.quantities import NS_PER_S
 
 
@@ -41,11 +41,12 @@ def lent() -> Iterator[None]:
 
 def test_only_what_a_program_names_is_lent_with_what_that_needs() -> None:
     """And nothing that is installed."""
-    assert lent_to(b"import rclpy\n", lambda name: False).names == ()
-    assert lent_to(b"from tf2_ros import Buffer\n", lambda name: False).names == ("tf2_py", "tf2_ros")
-    assert b"tf2_msgs" in lent_to(b"import tf2_ros", lambda name: False).text
-    assert lent_to(b"import tf2_geometry_msgs", lambda name: name == "tf2_py").names == ("tf2_geometry_msgs", "tf2_ros")
-    assert lent_to(b"import cv_bridge", lambda name: True).names == ()
+    assert {folder.name for folder in LENT.iterdir() if (folder / "__init__.py").is_file()} == set(LENDABLE)
+    assert lent_to((), lambda name: False).names == ()
+    assert lent_to(["tf2_ros"], lambda name: False).names == ("tf2_py", "tf2_ros")
+    assert b"tf2_msgs" in lent_to(["tf2_ros"], lambda name: False).text
+    assert lent_to(["tf2_geometry_msgs"], lambda name: name == "tf2_py").names == ("tf2_geometry_msgs", "tf2_ros")
+    assert lent_to(["cv_bridge"], lambda name: True).names == ()
 
 
 # --- tf2_py ---
