@@ -2,6 +2,7 @@
 
 import errno
 import re
+import socket
 import struct
 from pathlib import Path
 
@@ -115,6 +116,39 @@ def test_only_own_limits_can_be_set(machine: str) -> None:
     prlimit = number_of(machine, "prlimit64")
     assert judged(machine, prlimit, 0) == seccomp.ALLOW
     assert judged(machine, prlimit, 1) == refused(errno.EPERM)
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize(
+    ("family", "allowed"), [(socket.AF_UNIX, set(range(300))), (2, {0, 6, 17}), (10, {0, 6, 17}), (16, {0})]
+)
+def test_each_family_of_sockets_has_its_usual_protocols(machine: str, family: int, allowed: set[int]) -> None:
+    """TCP and UDP, and the interfaces; not SCTP, MPTCP, or the configuration of encryption and packet filters."""
+    number = number_of(machine, "socket")
+    found = {protocol for protocol in range(300) if judged(machine, number, family, 1, protocol) == seccomp.ALLOW}
+    assert found == allowed
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_a_socket_keeps_the_size_of_its_buffers(machine: str) -> None:
+    """The call does nothing, and reports success; other options and levels are not touched."""
+    number = number_of(machine, "setsockopt")
+    refusals = {
+        (level, option)
+        for level in (0, 1, 6, 41)
+        for option in range(80)
+        if judged(machine, number, 9, level, option) != seccomp.ALLOW
+    }
+    assert refusals == {(1, 7), (1, 8), (1, 32), (1, 33)}
+    assert judged(machine, number, 9, 1, 7) == refused(seccomp.NO_ERROR)
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("bit", range(32))
+def test_no_memory_comes_from_the_machines_huge_pages(machine: str, bit: int) -> None:
+    """The call fails as it does where there are none; every other flag is allowed."""
+    verdict = judged(machine, number_of(machine, "mmap"), 0, 4096, 3, 1 << bit)
+    assert verdict == (refused(errno.ENOMEM) if bit == 18 else seccomp.ALLOW)
 
 
 @pytest.mark.parametrize("machine", MACHINES)
