@@ -124,7 +124,7 @@ class Worker:
         with ExitStack() as stack:
             stack.callback(stop, students)
             students.append(self._execute(plan, name, file, domain, told))
-            stack.enter_context(ResourceMonitor(students, plan.limits))
+            stack.enter_context(ResourceMonitor(students, plan.limits, shares_network=self._isolation.shares_network))
             _await_ready(students[0])
             return evaluated(students[0], plan)
 
@@ -142,7 +142,9 @@ class Worker:
             for name, file in plan.processes:
                 start = self._start_bare if plan.bare else self._start
                 students.append(start(plan, name, file, domain))
-            monitor = stack.enter_context(ResourceMonitor(students, plan.limits, budget))
+            monitor = stack.enter_context(
+                ResourceMonitor(students, plan.limits, budget, shares_network=self._isolation.shares_network)
+            )
             stack.callback(self._account, monitor)
             runner = _import_runners()["bare" if plan.bare else plan.clock]
             if not plan.bare:

@@ -44,6 +44,10 @@ BUFFER_SIZES = (7, 8, 32, 33)
 MAP_HUGETLB = 0x40000
 #: The protocol of netlink that tells interfaces and addresses; others configure encryption or packet filters.
 NETLINK_ROUTE = 0
+# The two flags that a socket type may include: close on exec, and non-blocking.
+KIND_FLAGS = (0, 0x800, 0x80000, 0x80800)
+#: Kinds of sockets that send only to the one that they are connected to.
+CONNECTED_KINDS = tuple(kind | flags for kind in (socket.SOCK_STREAM, socket.SOCK_SEQPACKET) for flags in KIND_FLAGS)
 #: A call refused with this number does nothing but reports success.
 NO_ERROR = 0
 
@@ -77,6 +81,11 @@ ARGUMENT_RULES = (
     ArgumentRule(
         "socket", 0, only=(socket.AF_UNIX, socket.AF_INET, socket.AF_INET6, socket.AF_NETLINK), error=errno.EAFNOSUPPORT
     ),
+    # A datagram of AF_UNIX lies in a queue that nothing counts after its sender is gone; a stream has one sender.
+    *(
+        ArgumentRule(call, 1, only=CONNECTED_KINDS, error=errno.EPROTONOSUPPORT, when=(0, socket.AF_UNIX))
+        for call in ("socket", "socketpair")
+    ),
     # Rare protocols would load modules into the kernel; ROS, Python and the name resolver use none of them.
     *(
         ArgumentRule("socket", 2, only=only, error=errno.EPROTONOSUPPORT, when=(0, family))
@@ -105,6 +114,7 @@ ARGUMENT_RULES = (
 # library uses clone instead.
 NUMBERS = {
     "socket": Numbers(41, 198),
+    "socketpair": Numbers(53, 199),
     "clone": Numbers(56, 220),
     "unshare": Numbers(272, 97),
     "ioctl": Numbers(16, 29),
@@ -273,8 +283,7 @@ OWN_GROUP = -OWN_PROCESS & 0xFFFFFFFF
 SET_OWNER, SET_SIGNAL, SET_OWNER_EXTENDED = 8, 10, 15  # fcntl
 FIOSETOWN, SIOCSPGRP = 0x8901, 0x8902
 IOPRIO_WHO_PROCESS = 1
-# The two flags that a socket type may include: close on exec, and non-blocking.
-PAIRS = tuple(socket.SOCK_STREAM | flags for flags in (0, 0x800, 0x80000, 0x80800))
+PAIRS = tuple(socket.SOCK_STREAM | flags for flags in KIND_FLAGS)
 
 FLAT_NUMBERS = {
     **NUMBERS,
@@ -313,8 +322,6 @@ FLAT_NUMBERS = {
     "sched_setattr": Numbers(314, 274),
     "setpriority": Numbers(141, 140),
     "ioprio_set": Numbers(251, 30),
-    # sockets with a path
-    "socketpair": Numbers(53, 199),
 }
 FLAT_RULES = (
     *(rule for rule in ARGUMENT_RULES if (rule.call, rule.argument) != ("socket", 0) and rule.call != "ioctl"),
