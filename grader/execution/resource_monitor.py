@@ -20,7 +20,7 @@ from grader.core.quantities import MIB, size
 from grader.core.trace import ClockKind, Trace
 from grader.execution.socket_memory import MANY_DESCRIPTORS, Held, SocketMemory, descriptors
 from grader.execution.student_process import NodeProcess
-from grader.execution.usage import Usage, families, scratch_names, threads_starved_ns, usage
+from grader.execution.usage import FULL_BYTES, FULL_CODE, Usage, families, scratch_names, threads_starved_ns, usage
 
 #: The polling interval, and the number of polls between two searches for new child processes.
 LOOK_S = 0.025
@@ -36,8 +36,9 @@ MOST_NAMES = 10_000
 MOST_SOCKETS, MOST_PIPES, IN_SOCKETS_BYTES = 500, 250, 128 * MIB
 #: The number of polls between two looks at connections of TCP, if there are any.
 TCP_EVERY = 4
-#: How much memory the worker may use beyond its size at the start: received messages that were not yet taken.
-UNREAD_BYTES = 512 * MIB
+#: How much memory the worker may use beyond its size at the start: what it has recorded, which takes 160 MiB at most,
+#: and received messages that were not yet taken.
+UNREAD_BYTES = 224 * MIB
 #: If real time runs out after the nodes spent more than STARVED_SHARE of it waiting for a processor, the machine was
 #: too busy; but not if the nodes themselves used more than OWN_SHARE of all processor time.
 STARVED_SHARE, OWN_SHARE = 0.25, 0.5
@@ -159,7 +160,10 @@ class ResourceMonitor:
 
     def _look_at_itself(self) -> None:
         """Stop all processes at a limit of the worker itself, which only the nodes' messages can cause."""
-        filled_bytes = usage([os.getpid()]).memory_bytes - self._own_bytes
+        own_bytes = usage([os.getpid()]).memory_bytes
+        if own_bytes > FULL_BYTES:
+            os._exit(FULL_CODE)  # the middleware may go on filling it when the nodes have ended
+        filled_bytes = own_bytes - self._own_bytes
         if filled_bytes > UNREAD_BYTES:
             self._hold_all(f"stopped at {size(UNREAD_BYTES)} of messages that were under way at once")
         if time.process_time_ns() - self._own_ns > self._limits.processor_ns:
