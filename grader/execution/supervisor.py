@@ -30,7 +30,7 @@ from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.limits import Limits
-from grader.core.quantities import MIB, NS_PER_S, size
+from grader.core.quantities import NS_PER_S, size
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
 from grader.execution.codec import to_json
 from grader.execution.real_time_budget import RealTimeBudget
@@ -39,7 +39,7 @@ from grader.execution.sandbox.environment import worker_environment
 from grader.execution.sandbox.exposure import worker_view
 from grader.execution.sandbox.protocol import Isolation
 from grader.execution.sandbox.starter import starter_command
-from grader.execution.usage import families, usage
+from grader.execution.usage import FULL_BYTES, FULL_CODE, families, usage
 
 if TYPE_CHECKING:
     from grader.execution.plan import Plan
@@ -49,9 +49,9 @@ if TYPE_CHECKING:
 MARGIN_S = 60.0
 #: How long to wait for the exit code of a worker that has ended.
 END_S = 5.0
-#: A worker that uses more memory is killed, and the interval of the check. Its resource monitor should prevent this,
-#: but cannot run while the middleware deserializes a message.
-FULL_BYTES, LOOK_S = 768 * MIB, 0.1
+#: The interval at which the memory of a worker is looked at. Its resource monitor ends it at the same limit, but cannot
+#: run while the middleware deserializes a message.
+LOOK_S = 0.05
 #: The largest valid answer: this size, or this multiple of the size of the messages that may be in it.
 ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
 TRIES = 2
@@ -131,7 +131,8 @@ class Worker(ABC):
             raise WorkerLostError(f"{expected} (it had filled {what})", limit=what) from error
         except EOFError as error:
             end = self._end()
-            limit = plan.limits.processor_words() if end == "SIGXCPU" else ""
+            limits = {"SIGXCPU": plan.limits.processor_words(), f"code {FULL_CODE}": f"{size(FULL_BYTES)} of memory"}
+            limit = limits.get(end, "")
             raise WorkerLostError(f"{expected} (ended by {end})", limit=limit) from error
         except (OSError, ValueError, RecursionError) as error:
             raise HarnessError(f"{expected} ({error})") from error

@@ -13,7 +13,7 @@ import socket
 import sys
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -27,7 +27,7 @@ from grader.core.trace import ClockKind, FaultKind, Mark, Trace
 from grader.execution import late_numpy
 from grader.execution.bare_start import BareProcess, bare_arguments
 from grader.execution.beside import files_beside
-from grader.execution.codec import from_json, trace_to_json
+from grader.execution.codec import from_json, observation_to_json, trace_to_json
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.execution.launching import Launched, evaluated, expanded, renamed, unstarted
 from grader.execution.notes import Places
@@ -80,7 +80,7 @@ class Worker:
             self._starters[clock] = Starter(clock, runtime, isolation.host_seen_at, executed)
 
     def run(self, plan: Plan, domain: int, left_ns: int, budget_words: str) -> dict[str, Any]:
-        """Run one plan and return the answer.
+        """Run one plan and return the answer, with the trace as a value.
 
         Args:
             plan: The scenario.
@@ -99,11 +99,8 @@ class Worker:
             trace = self._record(plan, domain, Budget(left_ns - spent_ns, budget_words))
             if not trace.harness_problem or time.monotonic_ns() - started_ns > min(plan.limits.wall_ns, left_ns):
                 break
-        # not in trace_to_json, because the format of evidence does not include it
-        beside = {"reached": list(trace.reached), "incomplete": trace.incomplete}
         cost = {"real_ns": self._real_ns, "starved_ns": self._starved_ns}
-        worn = is_worn(trace) or self._remembers_connections()
-        return {"trace": {**trace_to_json(trace), **beside}, **cost, "worn": worn}
+        return {"trace": trace, **cost, "worn": is_worn(trace) or self._remembers_connections()}
 
     def _remembers_connections(self) -> bool:
         """Return whether nodes have left TCP connections in the worker's own network; the grader uses none."""
@@ -134,7 +131,9 @@ class Worker:
         with ExitStack() as stack:
             stack.callback(stop, students)
             students.append(self._execute(plan, name, file, domain, told))
-            monitor = stack.enter_context(ResourceMonitor(students, plan.limits, budget))
+            monitor = stack.enter_context(
+                ResourceMonitor(students, plan.limits, budget, shares_network=self._isolation.shares_network)
+            )
             stack.callback(self._account, monitor)
             _await_ready(students[0])
             made = evaluated(students[0], plan)
@@ -157,7 +156,9 @@ class Worker:
             for name, file in plan.processes:
                 start = self._start_bare if plan.bare else self._start
                 students.append(start(plan, name, file, domain))
-            monitor = stack.enter_context(ResourceMonitor(students, plan.limits, budget))
+            monitor = stack.enter_context(
+                ResourceMonitor(students, plan.limits, budget, shares_network=self._isolation.shares_network)
+            )
             stack.callback(self._account, monitor)
             runner = _import_runners()["bare" if plan.bare else plan.clock]
             if not plan.bare:
@@ -370,8 +371,25 @@ def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
             answer = {"problem": error.message}
         except Exception:
             answer = {"problem": traceback.format_exc()[-4000:]}
-        answers.write(json.dumps(answer) + "\n")
+        answers.writelines(written(answer))
         answers.flush()
+
+
+def written(answer: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the parts of the JSON line of an answer; a large trace would take several times its memory as a whole."""
+    trace = answer.get("trace")
+    if trace is None:
+        yield json.dumps(answer) + "\n"
+        return
+    # not in trace_to_json, because the format of evidence does not include it
+    beside = {"reached": list(trace.reached), "incomplete": trace.incomplete}
+    head = {**trace_to_json(replace(trace, observations=())), **beside}
+    del head["observations"]
+    yield json.dumps({name: value for name, value in answer.items() if name != "trace"})[:-1]
+    yield f', "trace": {json.dumps(head)[:-1]}, "observations": ['
+    for number, observation in enumerate(trace.observations):
+        yield (", " if number else "") + json.dumps(observation_to_json(observation))
+    yield "]}}\n"
 
 
 def _own_line(lines: Sequence[int]) -> socket.socket:
