@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -81,6 +82,7 @@ def build_confined(  # noqa: PLR0913  where it runs, what it reads, where it wri
         done = subprocess.run(
             command.argv,
             env=dict(command.environment),
+            pass_fds=command.pass_fds,
             input=json.dumps(request).encode(),
             capture_output=True,
             check=True,
@@ -94,6 +96,9 @@ def build_confined(  # noqa: PLR0913  where it runs, what it reads, where it wri
         raise HarnessError(f"interfaces: expected them to be built, found that it ended: {said[-1][-400:]}") from error
     except (OSError, subprocess.SubprocessError, ValueError, RecursionError) as error:
         raise HarnessError(f"interfaces: expected them to be built, found {type(error).__name__}") from error
+    finally:
+        for descriptor in command.opened_fds:
+            os.close(descriptor)
     _check(into)
     if not isinstance(told, dict):
         raise HarnessError("interfaces: expected an object, found something else")
