@@ -40,10 +40,11 @@ from grader.execution.sandbox.protocol import Isolation, StudentProcess
 from grader.execution.sandbox.start import die_with
 from grader.execution.sandbox.starter import HASH_SEED, Starter
 from grader.execution.sandbox.starter_process import StarterProcess
-from grader.execution.sandbox.tiers import isolation_from_name
+from grader.execution.sandbox.tiers import IN_PLACE, isolation_from_name
 from grader.execution.student_process import LOG_FORMAT, NodeProcess
 from grader.execution.usage import usage
 from grader.simulation.loading import SimulationError
+from grader.student_host import machine
 from grader.student_host.starter import CONNECTED
 
 if TYPE_CHECKING:
@@ -56,6 +57,8 @@ WALL_TRIES = 3
 ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 30
 #: A worker that uses more memory after a scenario is replaced; ordinary scenarios leave 30 to 50 MiB.
 WORN_BYTES = 128 * MIB
+#: What a bare process sees of the grader: the module that makes the machine look the same.
+MACHINE = Path(machine.__file__).resolve().parent
 #: In sockstat: the TCP sockets in use, and those that only wait for their port to be free again (`tw`).
 _CONNECTIONS = re.compile(r"\bTCP6?: inuse (\d+)|\btw (\d+)")
 
@@ -217,9 +220,11 @@ class Worker:
         try:
             if told or not self._isolation.can_fork:  # a fork of the starter has imported rclpy, which takes no part
                 command = self._isolation.student_command(process, plan.limits)
+                environment = command.environment
                 student = NodeProcess.start(name, root, command, ours, plan.limits)
             else:
                 sandbox = self._isolation.prepared_sandbox(process, plan.limits)
+                environment = sandbox.environment
                 executed = (str(self._runtime.executable), *arguments[:-1], json.dumps({**request, "fd": CONNECTED}))
                 started = self._starter(plan.clock).start(sandbox, request, executed, theirs)
                 student = NodeProcess.started(name, root, started, ours, plan.limits)
@@ -229,6 +234,7 @@ class Worker:
         finally:
             theirs.close()
         student.file, student.places, student.arguments = file, Places(Path(plan.root)), start.words
+        student.own_folder = _own_folder(environment)
         student.launched_by, student.prefix = start.launched_by, next(iter(plan.prefixes), "")
         return student
 
@@ -241,14 +247,16 @@ class Worker:
         """Start a file without the grader's code in its process."""
         root = self._isolation.submission_seen_at or plan.root
         runtime = _with_packages(self._runtime, plan)
+        own = MACHINE if self._isolation.submission_seen_at == IN_PLACE else Path(self._isolation.host_seen_at)
+        # nothing in its process could add to sys.path, so these folders come before the installed packages
+        searched = (*runtime.python_paths, *plan.interfaces, own)
         command = self._isolation.student_command(
             StudentProcess(
-                # nothing in its process could add to sys.path, so these folders come before the installed packages
-                runtime=replace(runtime, python_paths=(*runtime.python_paths, *map(Path, plan.interfaces))),
-                host_folder=None,
+                runtime=runtime,
+                host_folder=MACHINE,  # nothing else of the grader
                 submission=Path(plan.root),
                 arguments=bare_arguments(Path(plan.root), root, file, plan.start_of(name), plan.scripts_of(file)),
-                environment={"ROS_DOMAIN_ID": str(domain)},
+                environment={"ROS_DOMAIN_ID": str(domain), "PYTHONPATH": os.pathsep.join(map(str, searched))},
                 pass_fds=(),
                 beside=Path(plan.root, file).parent,
                 copied=files_beside(Path(plan.root), file),
@@ -256,9 +264,15 @@ class Worker:
             plan.limits,
         )
         student = BareProcess.begin(name, root, command, plan.limits)
+        student.own_folder = _own_folder(command.environment)
         student.file, student.places = file, Places(Path(plan.root))
         student.prefix = next(iter(plan.prefixes), "")
         return student
+
+
+def _own_folder(environment: Mapping[str, str]) -> str:
+    """Return the folder that an environment names for temporary files; empty if it names none."""
+    return environment.get("TMPDIR", "")
 
 
 def _with_packages(runtime: PythonRuntime, plan: Plan) -> PythonRuntime:

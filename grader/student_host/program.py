@@ -17,7 +17,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from . import entry, launch_files, originals
+from . import entry, launch_files, machine, originals
 from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_processes
@@ -66,6 +66,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
             hide one that it has imported.
     """
     prepared = host is not None
+    machine.install()
     sys.path += request["interfaces"]  # installed packages come first
     host = host or Host(request["clock"])
     link, describer, time = host.link, host.describer, host.time
@@ -115,6 +116,7 @@ def evaluate(request: dict[str, Any]) -> None:
         request: As for `run`, with `launch`: its `arguments`, the `provided` files of the rubric, and name and
             folder of the submission's `packages`, outermost first.
     """
+    machine.install()
     link, describer = Link(), Describer()
     link.open(request["fd"])
     describer.set_root(request["root"])
@@ -295,6 +297,7 @@ def _named(path: str) -> list[str]:
 def warm_up() -> None:
     """Import what all forks of this process need: interface packages, type supports, numpy's randomness."""
     importlib.import_module("numpy.random")  # seeded in each fork
+    importlib.import_module("uuid")
     for name in (*INTERFACES, *OF_EVERY_NODE):
         for interface in list(vars(importlib.import_module(name)).values()):
             if hasattr(interface, "__import_type_support__"):
