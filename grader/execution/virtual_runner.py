@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Observation, Offer
 from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, readers_of
 from grader.execution.ending import ending
@@ -26,12 +27,13 @@ from grader.execution.workload import Workload
 
 #: Start of the hosts' virtual time: 2026-01-01 00:00:00 UTC, the same as in `grader/student_host/clock.py`.
 EPOCH_NS = 1_767_225_600_000_000_000
-#: The most steps of one scenario; more end it.
-STEPS = 400_000
+#: The most steps at once, and how many more may come with each second of virtual time; more end the scenario. Nodes that
+#: rest need far fewer: ten with timers of 100 Hz that hear each other take some thousand a second.
+STEPS, STEPS_HZ = 400_000, 10_000
 #: The host never sends more reports before it waits or ends, and never reports more endpoints and parameters.
 MOST_REPORTS, CLAIMS = 10_000, 1_000
-#: Nodes may take messages so often without resting in between. After HOPS, each time also takes as long as a message
-#: needs between two processes; after MOST_HOPS they answer each other without end, and the run is over.
+#: Nodes may take messages so often while none of them lets time pass. After HOPS, each time also takes as long as a
+#: message needs between two processes; after MOST_HOPS they answer each other without end, and the run is over.
 HOPS, HOP_NS, MOST_HOPS = 200, 250_000, 4_000
 #: Reasons for recording on the wall clock.
 THREADS = "the node's threads wait for each other without blocking"
@@ -146,8 +148,9 @@ class VirtualRunner(Runner):
         # A flood is wrong on every clock. It runs until its limit, which is the same on every machine.
         if self._plan.stop_when_unfit and hopeless([student]) and self._unfit() and not self._floods():
             self._end_ns = self._now_ns
-        if self._steps >= STEPS:
-            self._recorder.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
+        most = STEPS + STEPS_HZ * self._now_ns // NS_PER_S
+        if self._steps >= most:
+            self._recorder.stop(self._now_ns, f"more than {most:,} wake-ups")
         self._end_if_full(self._now_ns)
 
     def _floods(self) -> bool:
@@ -174,8 +177,9 @@ class VirtualRunner(Runner):
     def _catch_up(self, report: Mapping[str, Any]) -> None:
         """Adopt the time that a process has reached on its own."""
         now_ns = report.get("now_ns")
-        if isinstance(now_ns, int):
-            self._now_ns = max(self._now_ns, min(now_ns - EPOCH_NS, self._free_until_ns))
+        if isinstance(now_ns, int) and min(now_ns - EPOCH_NS, self._free_until_ns) > self._now_ns:
+            self._now_ns = min(now_ns - EPOCH_NS, self._free_until_ns)
+            self._hops = 0  # it has rested
 
     def _hear(self, student: NodeProcess, workload: Workload) -> None:
         """Handle reports until a process has nothing left to do at this instant, or has ended."""
