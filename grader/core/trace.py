@@ -269,6 +269,8 @@ class Trace:
     left_out: tuple[str, ...] = ()
     # Whether a wait for the middleware timed out, so that something may be missing: a reason to record again
     incomplete: bool = False
+    # In virtual time, whether the work of a node before its pauses may slow it down: a reason to record again
+    may_drift: bool = False
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

@@ -99,7 +99,7 @@ class Worker:
             if not trace.harness_problem or time.monotonic_ns() - started_ns > min(plan.limits.wall_ns, left_ns):
                 break
         # not in trace_to_json, because the format of evidence does not include it
-        beside = {"reached": list(trace.reached), "incomplete": trace.incomplete}
+        beside = {"reached": list(trace.reached), "incomplete": trace.incomplete, "may_drift": trace.may_drift}
         cost = {"real_ns": self._real_ns, "starved_ns": self._starved_ns}
         worn = is_worn(trace) or self._remembers_connections()
         return {"trace": {**trace_to_json(trace), **beside}, **cost, "worn": worn}
@@ -174,6 +174,7 @@ class Worker:
             "parameter_files": start.parameter_files,
             "seed": plan.host_seed,
             "clock": plan.clock,
+            "charged": plan.charged,
             "log_format": LOG_FORMAT,
             "python_paths": [str(p) for p in self._runtime.python_paths],
             "interfaces": plan.interfaces,
