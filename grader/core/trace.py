@@ -290,6 +290,8 @@ class Trace:
     incomplete: bool = False
     # The mistake in a simulation of the rubric's author that prevents judging, as `harness_problem` does; None without
     author_mistake: AuthorMistake | None = None
+    # In virtual time, whether the work of a node before its pauses may slow it down: a reason to record again
+    may_drift: bool = False
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

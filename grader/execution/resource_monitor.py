@@ -188,7 +188,7 @@ class ResourceMonitor:
     def _look_for_waiting(self) -> None:
         pids = [pid for family in self._families.values() for pid in family]
         self._used_ns = max(self._used_ns, usage(pids).processor_ns)
-        waited_ns = threads_starved_ns(pids)
+        waited_ns = threads_starved_ns(pids).values()
         self._waited_ns = max(self._waited_ns, sum(waited_ns))
         self._most_starved_ns = max(self._most_starved_ns, max(waited_ns, default=0))
 

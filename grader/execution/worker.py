@@ -194,6 +194,7 @@ class Worker:
             "scripts": plan.scripts_of(file),
             "seed": plan.host_seed,
             "clock": plan.clock,
+            "charged": plan.charged,
             "log_format": LOG_FORMAT,
             "python_paths": [str(p) for p in self._runtime.python_paths],
             "interfaces": plan.interfaces,
@@ -396,7 +397,7 @@ def written(answer: Mapping[str, Any]) -> Iterator[str]:
         yield json.dumps(answer) + "\n"
         return
     # not in trace_to_json, because the format of evidence does not include it
-    beside = {"reached": list(trace.reached), "incomplete": trace.incomplete}
+    beside = {"reached": list(trace.reached), "incomplete": trace.incomplete, "may_drift": trace.may_drift}
     head = {**trace_to_json(replace(trace, observations=())), **beside}
     del head["observations"]
     yield json.dumps({name: value for name, value in answer.items() if name != "trace"})[:-1]
