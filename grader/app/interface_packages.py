@@ -10,7 +10,7 @@ import sys
 import sysconfig
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -18,6 +18,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from grader.app.ros_packages import LENDABLE, Lent, copied, lent_to
 from grader.compiled import compiled, state_of, state_of_package
 from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault, RubricError
@@ -65,12 +66,13 @@ class Provided:
     offered: str = ""  # digest of all packages of rubrics and class, used or not; empty if there are none
     notes: tuple[str, ...] = ()  # sentences for whoever runs the grader
     problems: tuple[str, ...] = ()  # sentences for the student, about packages of the submission
+    lent: tuple[Path, ...] = ()  # the folder of the other Python packages of ROS that the run gets, if it gets any
     spent_s: float = 0.0  # real time that the build of the submission's packages took
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """Where their modules are, the first one first."""
-        return tuple(BuiltInterfaces(prefix, ()).python for prefix in self.builds)
+        """Where all modules are, the first one first."""
+        return (*(BuiltInterfaces(prefix, ()).python for prefix in self.builds), *self.lent)
 
 
 def is_installed(name: str, ros: RosInstallation) -> bool:
@@ -199,8 +201,11 @@ def provide(
     taken = {offer.package.name for offer in given}
     ready = [p for p in _shipped() if p.name not in taken and not is_installed(p.name, ros)]
     texts = chain([repr(exercises).encode("utf-8", "replace")], _programs(root))
-    lacking = {package.name.encode(): package for package in ready}
-    named = _named_in(texts, lacking)
+    names = {*(package.name for package in ready), *LENDABLE}
+    mentioned = _named_in(texts, names)
+    lent = lent_to(mentioned, lambda name: is_installed(name, ros))
+    mentioned |= _named_in([lent.text], names)
+    named = [package for package in ready if package.name in mentioned]
     used = needed([*(offer.package for offer in given), *named], ready)
     given += [Offer(package, GRADER) for package in used if package.name not in taken]
     brought = [BroughtPackage(offer.package.name, offer.origin, _digest([offer.package])) for offer in given]
@@ -216,7 +221,9 @@ def provide(
         builds += [_copied(folder, root.parent) for folder in own.builds]
     packages = tuple(sorted([*brought, *own.packages], key=lambda package: package.name))
     offered = offered_digest(course, exercises)
-    return Provided(packages, tuple(builds), offered, tuple(_notes(packages)), own.problems, own.spent_s)
+    lent_at = (copied(lent.names, session.folder),) if lent.names else ()
+    notes = tuple(_notes(packages, lent))
+    return Provided(packages, tuple(builds), offered, notes, own.problems, lent_at, own.spent_s)
 
 
 def definitions(traces: Iterable[Trace], provided: Provided) -> dict[str, Definition]:
@@ -296,10 +303,9 @@ def _own_from(told: Build, place: Path) -> _Own:
     return _Own(found, (place / told.folder,) if found else (), told.problems)
 
 
-def _named_in(texts: Iterable[bytes], packages: Mapping[bytes, InterfacePackage]) -> list[InterfacePackage]:
-    """Return the packages whose name is in any of the texts."""
-    named = {name for text in texts for name in packages if name in text}
-    return [package for name, package in packages.items() if name in named]
+def _named_in(texts: Iterable[bytes], names: Iterable[str]) -> set[str]:
+    """Return the names that are in any of the texts."""
+    return {name for text in texts for name in names if name.encode() in text}
 
 
 def _programs(root: Path) -> Iterator[bytes]:
@@ -316,11 +322,13 @@ def _copied(folder: Path, into: Path) -> Path:
     return copy
 
 
-def _notes(packages: Iterable[BroughtPackage]) -> Iterator[str]:
-    """Yield the note on the packages of a run, in words."""
+def _notes(packages: Iterable[BroughtPackage], lent: Lent) -> Iterator[str]:
+    """Yield the notes on the packages of a run, in words."""
     by_origin: dict[str, list[str]] = {}
     for package in packages:
         by_origin.setdefault(package.origin, []).append(package.name)
     parts = [f"{listed(names, 'and')} of {_WORDS[origin]}" for origin, names in sorted(by_origin.items())]
     if parts:
         yield f"interface packages that are not installed: {'; '.join(parts)}"
+    if lent.names:
+        yield f"{listed(lent.names, 'and')}: not installed, the grader's own version was used"

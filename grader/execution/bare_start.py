@@ -77,9 +77,10 @@ def _help(tree: ast.Module, module: str) -> str:
         return ""
     if any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in tree.body):
         return f"importlib.import_module({module!r}).main()"
-    nodes = [node.name for node in tree.body if isinstance(node, ast.ClassDef) and _is_node(node)]
-    spin = f"import rclpy; rclpy.init(); rclpy.spin(importlib.import_module({module!r}).{''.join(nodes)}())"
-    return spin if len(nodes) == 1 else ""
+    nodes = [node for node in tree.body if isinstance(node, ast.ClassDef) and _is_node(node)]
+    if len(nodes) != 1 or _needs_arguments(nodes[0]):
+        return ""
+    return f"import rclpy; rclpy.init(); rclpy.spin(importlib.import_module({module!r}).{nodes[0].name}())"
 
 
 def _with_parameter_files(given: PlannedStart) -> str:
@@ -131,6 +132,16 @@ def _root(node: ast.expr) -> str:
 
 def _is_node(node: ast.ClassDef) -> bool:
     return any(getattr(base, "id", getattr(base, "attr", "")) in _NODES for base in node.bases)
+
+
+def _needs_arguments(node: ast.ClassDef) -> bool:
+    """Return whether the constructor has a parameter without a default, apart from `self`."""
+    made = next((f for f in node.body if isinstance(f, ast.FunctionDef) and f.name == "__init__"), None)
+    if made is None:
+        return False
+    given = made.args
+    free = len(given.posonlyargs) + len(given.args) - len(given.defaults)
+    return free > 1 or None in given.kw_defaults
 
 
 #: Name of the sandbox process, which starts the student's.

@@ -139,6 +139,7 @@ class Plan:
         recordings: Recordings to play.
         clock: `virtual` or `wall`.
         limits: How much the processes may use, and how much is recorded.
+        charged: Whether time passes on the virtual clock while a program works.
         stop_when_unfit: Whether a run on the virtual clock may end as soon as virtual time is known to be unsuitable.
         messages: Message streams.
         servers: Service servers.
@@ -187,6 +188,7 @@ class Plan:
     prefixes: tuple[str, ...] = ()
     starts: tuple[PlannedStart, ...] = ()
     projects: tuple[Project, ...] = ()
+    charged: bool = False
 
     def start_of(self, process: str) -> PlannedStart:
         """Return what a process is started with."""

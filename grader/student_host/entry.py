@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib
 import importlib.util
+import inspect
 import os
 import sys
 import tempfile
@@ -80,6 +81,7 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     if layout.module:
         _find_neighbours(tree, path, notify)
     sys.argv = [path, *command_line(request)]
+    sys.orig_argv = [sys.executable, *sys.argv]
     if start.way in (SCRIPT, MODULE):
         run_what_nothing_called(_run_as_main(path, start.module, layout), tree, notify)
         return
@@ -168,7 +170,8 @@ def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, notify:
     nodes = _node_classes(namespace)
     if "main" not in namespace and len(nodes) == 1:
         notify({"code": "class_not_started", "class": nodes[0].__name__})
-        spin(nodes[0])
+        if _needs_nothing(nodes[0]):
+            spin(nodes[0])
 
 
 def _calls_at_top_level(statements: Sequence[ast.stmt], name: str) -> bool:
@@ -186,6 +189,15 @@ def _node_classes(namespace: dict[str, Any]) -> list[Any]:
         and issubclass(value, node)
         and value.__module__ == namespace["__name__"]
     ]
+
+
+def _needs_nothing(node_class: Any) -> bool:
+    """Return whether a class can be called without arguments; one that cannot is for other modules to use."""
+    try:
+        inspect.signature(node_class).bind()
+    except TypeError:
+        return False
+    return True
 
 
 def spin(node_class: Any) -> None:
