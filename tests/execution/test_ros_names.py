@@ -19,12 +19,11 @@ from test_trusted_side import LINE
 
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import Trace
-from grader.execution import interfaces
 from grader.execution.discovery import is_claim
 from grader.execution.interfaces import interface_class, message_class
 from grader.execution.observer import PARTICIPANTS
 from grader.execution.recording_session import RecordingSession
-from grader.execution.ros_names import LONGEST, asked, is_name, is_node_name, listed
+from grader.execution.ros_names import LONGEST, LONGEST_NODE, asked, is_name, is_node_name, listed
 
 REFUSED = [
     "",
@@ -41,7 +40,7 @@ REFUSED = [
     "/\u00e4",
     "/a\n",
     "/a\0",
-    "/" + "a" * LONGEST,
+    "/" + "a" * LONGEST_NODE,
 ]
 ACCEPTED = ["/a", "/a/b", "/_a", "/a__b", "/a/_action/feedback", "/A9", "/" + "a" * (LONGEST - 1)]
 
@@ -85,7 +84,7 @@ def test_a_question_that_is_refused_has_no_answer() -> None:
 @pytest.mark.parametrize("name", ["antigravity/msg/Foo", "this/msg/Foo", "json/msg/Foo", "grader/msg/Foo", "a/msg/Foo"])
 def test_a_type_in_the_graph_imports_no_module(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only packages that the index of ROS knows are imported."""
-    monkeypatch.setattr(interfaces.importlib, "import_module", None)
+    monkeypatch.setattr("importlib.import_module", None)
     assert message_class(name) is None
 
 
