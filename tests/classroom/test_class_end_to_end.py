@@ -102,10 +102,7 @@ def test_a_download_is_graded_where_a_student_hides_modules(class_: Path, tmp_pa
 BOMBS = {
     "list": ("setup.py", "x = [" + "0," * 3_000_000 + "]\n"),
     "loops": ("setup.py", f"for a in {list(range(1000))}:\n  for b in {list(range(1000))}:\n    pass;pass;pass\n"),
-    "name": (
-        "setup.py",
-        "setup(name='x' * 9, data_files=[('share/\\0', ['\\udcff']), ('share/' + 'x' * 300, ['a'])])\n",
-    ),
+    "name": ("setup.py", f"setup(data_files=[('share/\\0', ['\\udcff']), ('share/{'x' * 300}', ['a'])])\n"),
     "toml": ("pyproject.toml", "a" + ".a" * 18_000 + " = 1\n"),
     "width": ("setup.py", "setup(name='{:>1500000000}'.format('x'))\n"),
     "xml": ("package.xml", "<package>" + "<name>x</name>" * 500_000),
