@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Check, Criterion, Exercise, Finding, Location, Problem, reads_sources
+from grader.core.exercise import Check, Criterion, Exercise, Finding, Location, Problem, of_beginning, reads_sources
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import Submission
 from grader.core.trace import Fault, FaultKind, Request, Response, Trace
@@ -87,6 +87,15 @@ def run_check(
     if not reads_sources(criterion.check):
         return _for_what_is_lacking(answer, scenario, trace, sources or {})
     return answer if answer.finding is None else replace(answer, finding=_placed(answer.finding, submission))
+
+
+def for_beginning(criterion: Criterion) -> Criterion | None:
+    """Return a criterion that judges the beginning of a recording; None if its check says that none can."""
+    try:
+        check = of_beginning(criterion.check)
+    except Exception:  # a check of a rubric's own that fails here is not compared, and costs no points
+        return None
+    return None if check is None else replace(criterion, check=check, check_name=check_name(criterion))
 
 
 def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
