@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from typing import ClassVar
 
 from grader.core.quantities import NS_PER_MS
 from grader.core.trace import ClockKind, Mark
@@ -38,6 +39,9 @@ class WallRunner(Runner):
 
     clock = ClockKind.WALL
     clock_reason = "it was asked for"
+    #: See `PAUSE_S` and `LONGEST_PAUSE_NS`.
+    pause_s: ClassVar[float] = PAUSE_S
+    longest_pause_ns: ClassVar[int] = LONGEST_PAUSE_NS
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
@@ -72,9 +76,9 @@ class WallRunner(Runner):
 
     def _pause(self) -> None:
         """Wait until something has arrived or is due, but not for long: many things are only noticed by looking."""
-        time.sleep(PAUSE_S)
+        time.sleep(self.pause_s)
         moments = [self._end_ns, *self._starts_ns.values(), *(event.t_ns for event in self._due[:1])]
-        left_ns = min(LONGEST_PAUSE_NS, min(moments) - self._time_ns())
+        left_ns = min(self.longest_pause_ns, min(moments) - self._time_ns())
         if left_ns > 0:
             self._observer.await_arrival(left_ns)
 
