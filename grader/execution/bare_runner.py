@@ -28,6 +28,8 @@ FIRST_LOOK_NS = 10_000_000
 #: program sends, logs and prints at one moment is taken together, at most 2 ms late, a twentieth of the jitter allowed
 #: on this clock. Arrivals, output and the end of a process end the longest pause; only the graph is found by looking.
 PAUSE_OF_BARE_S, LONGEST_PAUSE_OF_BARE_NS = 0.002, 50_000_000
+#: How rarely to look at a graph that does not change: each look costs a millisecond of a processor, half of the loop.
+RAREST_GRAPH_NS = 200_000_000
 
 
 class BareRunner(WallRunner):
@@ -35,6 +37,7 @@ class BareRunner(WallRunner):
 
     pause_s = PAUSE_OF_BARE_S
     longest_pause_ns = LONGEST_PAUSE_OF_BARE_NS
+    rarest_graph_ns = RAREST_GRAPH_NS
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)

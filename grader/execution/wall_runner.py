@@ -42,6 +42,8 @@ class WallRunner(Runner):
     #: See `PAUSE_S` and `LONGEST_PAUSE_NS`.
     pause_s: ClassVar[float] = PAUSE_S
     longest_pause_ns: ClassVar[int] = LONGEST_PAUSE_NS
+    #: How long after a look at the graph the next one is at the latest.
+    rarest_graph_ns: ClassVar[int] = GRAPH_EVERY_NS
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
@@ -49,6 +51,7 @@ class WallRunner(Runner):
         self._due = sorted(early, key=lambda e: e.t_ns)
         self._topics: WallTopicPeers = WallTopicPeers(observer, self._recorder)
         self._next_graph_ns = 0
+        self._graph_every_ns = GRAPH_EVERY_NS
         self._started = 0
         self.held_up_ns = 0
 
@@ -117,8 +120,9 @@ class WallRunner(Runner):
             self._record(now_ns, taken)
             self._end_if_full(now_ns)
         if now_ns >= self._next_graph_ns:
-            self._look_at_graph(now_ns)
-            self._next_graph_ns = now_ns + GRAPH_EVERY_NS
+            changed = self._look_at_graph(now_ns)
+            self._graph_every_ns = GRAPH_EVERY_NS if changed else min(2 * self._graph_every_ns, self.rarest_graph_ns)
+            self._next_graph_ns = now_ns + self._graph_every_ns
 
     def _hear(self, student: NodeProcess, now_ns: int) -> None:
         reports = [] if student.ended else student.reports()
@@ -138,13 +142,14 @@ class WallRunner(Runner):
                 student.ended = True
         self._recorder.add(*student.output(now_ns))
 
-    def _look_at_graph(self, now_ns: int) -> None:
+    def _look_at_graph(self, now_ns: int) -> bool:
+        """Record the graph, subscribe to what is new, and return whether it has changed."""
         changed = self._recorder.look(self._observer.graph(now_ns, services=True), self._observer.participants())
         self._end_if_full(now_ns)
-        if not changed:
-            return
-        self._observer.watch(self._recorder.graph.endpoints)
-        self._topics.follow_types()
+        if changed:
+            self._observer.watch(self._recorder.graph.endpoints)
+            self._topics.follow_types()
+        return changed
 
     def _announce_exchange(self, kind: str, service: str, count: int) -> None:
         """Do nothing: on the real clock, processes receive messages by themselves."""
