@@ -139,6 +139,9 @@ class Worker:
 
             observer = Observer(domain, plan.limits)  # while the starter is still busy with imports
             stack.callback(observer.close)
+            if plan.bare:  # before the program starts: what it sends before anybody subscribes is lost
+                observer.subscribe_to_logs()
+                observer.watch(plan.publishers)
             for name, file in plan.processes:
                 start = self._start_bare if plan.bare else self._start
                 students.append(start(plan, name, file, domain))
