@@ -53,7 +53,7 @@ RELATIVE = {
     "adds_nothing": "publish()\n time.sleep(0.05 + 0 * time.monotonic())",
     "logging": "publish()\n logging.info('x')\n time.sleep(0.05)",
     "event": "publish()\n time.perf_counter()\n threading.Event().wait(0.05)",
-    "condition": "publish()\n with threading.Condition() as one:\n  time.time()\n  one.wait(timeout=0.05)",
+    "condition": "publish()\n one = threading.Condition()\n with one:\n  time.time()\n  one.wait(timeout=0.05)",
     "queue": "publish()\n try:\n  queue.Queue().get(timeout=0.05)\n except queue.Empty:\n  pass",
     "select": "publish()\n time.time()\n select.select([], [], [], 0.05)",
     "selector": "publish()\n time.time()\n one = selectors.SelectSelector()\n one.select(0.05)",
