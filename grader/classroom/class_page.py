@@ -216,7 +216,7 @@ def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator
     yield Listing(
         "undecided",
         "Undecided",
-        "Not decided through no fault of the student. The same command with --rerun undecided tries again.",
+        "Not decided. The reasons say what is known of the cause. The same command with --rerun undecided tries again.",
         tuple(entry for k, row in undecided for entry in _undecided(k, row, run)),
     )
     yield Listing(
