@@ -24,8 +24,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.limits import Limits
@@ -135,6 +136,9 @@ class Worker(ABC):
             raise WorkerLostError(f"{expected} (ended by {end})", limit=limit) from error
         except (OSError, ValueError, RecursionError) as error:
             raise HarnessError(f"{expected} ({error})") from error
+        if isinstance(answer, dict) and "author_mistake" in answer:
+            self.worn = True  # the recording ended in its middle
+            return _without_recording(plan, answer["author_mistake"])
         if not isinstance(answer, dict) or "trace" not in answer:
             problem = str(answer.get("problem", "")) if isinstance(answer, dict) else ""
             lines = problem.strip().splitlines()
@@ -193,6 +197,17 @@ class Worker(ABC):
     @abstractmethod
     def close(self) -> None:
         """Kill the worker and everything that it started."""
+
+
+def _without_recording(plan: Plan, mistake: Any) -> Trace:
+    """Return an empty trace with the mistake of the rubric's author; raises HarnessError if it is none."""
+    import msgspec  # noqa: PLC0415 - takes as long as the import of what reads traces
+
+    try:
+        found = msgspec.convert(mistake, AuthorMistake)
+    except msgspec.ValidationError as error:
+        raise HarnessError(f"worker: expected a mistake with file, line and text, found {error}") from error
+    return Trace(plan.scenario, ClockKind(plan.clock), stop_ns=0, observations=(), author_mistake=found)
 
 
 class ExecutedWorker(Worker):

@@ -96,9 +96,9 @@ def innermost(root: int) -> int:
     return next((pid for pid in pids if pid not in pids.values()), root)
 
 
-def threads_starved_ns(pids: Iterable[int]) -> list[int]:
+def threads_starved_ns(pids: Iterable[int]) -> dict[str, int]:
     """Return how long each thread of processes was ready to run but waited for a processor, in nanoseconds."""
-    return [thread_starved_ns(pid, thread) for pid in pids for thread in _names(f"/proc/{pid}/task")]
+    return {thread: thread_starved_ns(pid, thread) for pid in pids for thread in _names(f"/proc/{pid}/task")}
 
 
 def thread_starved_ns(pid: int, thread: int | str) -> int:

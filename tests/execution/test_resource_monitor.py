@@ -109,7 +109,7 @@ def test_a_machine_that_gave_no_time_decides_nothing(
     """Out of time because others had the processors: a problem of the machine's, never a mark."""
     student = Watched()
     machine[student.process.pid] = Usage(processor_ns=used_ns)
-    monkeypatch.setattr(module, "threads_starved_ns", lambda pids: [waited_ns])
+    monkeypatch.setattr(module, "threads_starved_ns", lambda pids: {"1": waited_ns})
     guard = watch(student, wall_ns=NS_PER_S // 20)
     assert student.stopped == "stopped after 0.05 s of real time"
     assert bool(guard.reviewed(TRACE).harness_problem) is undecided
