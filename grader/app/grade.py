@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 import grader
 from grader.app.interface_packages import definitions, known_interfaces, provide
@@ -33,6 +34,9 @@ from grader.rubrics.builtin import builtin_exercises, builtin_odometry, exercise
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import read_reaches, read_sources
 from grader.submissions.submission import stage_collected, stage_submission
+
+if TYPE_CHECKING:
+    from grader.judging.beginnings import BeginningJudge
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
@@ -146,7 +150,8 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
-            traces = check(checks, jobs, traces, record, take or (lambda *_: None))
+            judge_of = partial(_judge_of, exercises, submission, run.sources)
+            traces = check(checks, jobs, traces, record, take or (lambda *_: None), judge_of)
         run = replace(run, traces={**kept, **traces}, duration_s=time.perf_counter() - started)
         run = replace(run, definitions=definitions(run.traces.values(), provided))
         if on_recorded is not None:
@@ -159,6 +164,16 @@ def _judge() -> Callable[..., Report]:
     from grader.judging.judge_run import judge_run  # noqa: PLC0415
 
     return judge_run
+
+
+def _judge_of(
+    exercises: Sequence[Exercise], submission: Submission, sources: Mapping[str, str], key: Key
+) -> BeginningJudge:
+    """Return what judges the beginnings of the recordings of a scenario."""
+    from grader.judging.beginnings import BeginningJudge  # noqa: PLC0415 - as `judge_run`
+
+    exercise = next(exercise for exercise in exercises if exercise.id == key[0])
+    return BeginningJudge(exercise, key[1], submission, sources)
 
 
 def _kept(  # noqa: PLR0913  all that a recording depends on

@@ -254,6 +254,26 @@ def reads_sources(check: object) -> TypeGuard[SourceCheck]:
     return callable(getattr(check, "judge_sources", None))
 
 
+class BeginningCheck(Protocol):
+    """A check that judges the beginning of a recording in another way than a whole one.
+
+    Spot checks judge the first seconds of a scenario, recorded again on the wall clock. Any other check judges them as
+    it judges a whole recording, and counts only if the same seconds in virtual time suffice for it.
+    """
+
+    def of_beginning(self) -> Check | None:
+        """Return the check that judges a beginning; None if only a whole recording shows what this check asks."""
+
+
+def of_beginning(check: Check) -> Check | None:
+    """Return the check that judges the beginning of a recording on the wall clock; None if none can."""
+    declared = getattr(check, "of_beginning", None)
+    if not callable(declared):
+        return check
+    found: Check | None = declared()
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Criterion:
     """One row of a rubric."""
