@@ -84,6 +84,7 @@ class Runner(ABC):
             starts=tuple(s.start_told for s in self._students if s.start_told is not None),
             harness_problem=self._harness_problem(),
             incomplete=self._is_incomplete(),
+            may_drift=self._may_drift(),
         )
 
     @abstractmethod
@@ -117,6 +118,10 @@ class Runner(ABC):
     def _unfit(self) -> str:
         """Return why this clock is not suitable for the nodes; empty if it is."""
         return ""
+
+    def _may_drift(self) -> bool:
+        """Return whether the work of a node may slow it down on the real clock, which this one may hide."""
+        return False
 
     def _harness_problem(self) -> str:
         """Return why the recording cannot be judged; empty if it can."""
