@@ -15,18 +15,19 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError, SubmissionError
 from grader.core.quantities import NS_PER_S
 from grader.core.report import Summary
-from grader.core.scenario import OdometryStream, Scenario, Span, is_launch_file
+from grader.core.scenario import OdometryStream, Scenario, Span
 from grader.core.submission import Submission
 from grader.core.trace import Trace
 from grader.execution.bag import read_odometry
-from grader.execution.executables import executables
+from grader.execution.executables import Executable, executables
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import open_session, planned_clock
 from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
-from grader.judging.judge_run import summarise
+from grader.judging.summary import summarise
 from grader.judging.values import student_endpoints
 from grader.submissions.collected import listed
+from grader.submissions.projects import read_projects
 from grader.submissions.submission import stage_submission
 
 #: When a given recording starts playing; before that the nodes receive no odometry.
@@ -89,8 +90,9 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         submission = _stage(targets, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
-        provided = provide(session, (), request.interfaces, submission.root)
-        prefixes = install_shares(submission.root, session.folder / "installed", session.ros)
+        provided = provide(session, (), request.interfaces, submission)
+        installed = session.folder / "installed"
+        prefixes, _ = install_shares(submission.root, submission.projects, installed, session.ros)
         plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)
         trace = session.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
     if trace.harness_problem:
@@ -131,13 +133,13 @@ def _of_path(path: Path) -> list[_Target]:
     if path.is_file() and path.suffix == ".py":
         return [_Target(path.name, path.resolve().parent, path)]
     if path.is_dir():
-        found = [one for one in executables(path.resolve()) if one.file is not None]
+        found = [one for one in _executables(path.resolve()) if one.file is not None]
         if not found:
             text = f"{path}: expected a package or workspace with entry points, found none"
             raise SubmissionError(text, "name the files of the nodes to run, or add console_scripts to setup.py")
         return [_Target(one.words, path.resolve()) for one in found]
     here = path.resolve().parent
-    known = executables(here) if not path.exists() and here.is_dir() and path.suffix == "" else []
+    known = _executables(here) if not path.exists() and here.is_dir() and path.suffix == "" else []
     named = [one for one in known if one.name == path.name and one.file is not None]
     if len(named) == 1:
         return [_Target(named[0].words, here)]
@@ -149,6 +151,11 @@ def _of_path(path: Path) -> list[_Target]:
     raise SubmissionError(f"{path}: expected a .py file, found none", _WHAT)
 
 
+def _executables(folder: Path) -> list[Executable]:
+    projects, _ = read_projects(folder)
+    return executables(folder, projects)
+
+
 #: The most executables that a message lists.
 _SHOWN = 12
 
@@ -158,21 +165,32 @@ def _stage(targets: list[_Target], into: Path) -> Submission:
     names, files = [target.name for target in targets], [target.file for target in targets]
     folder = Path(os.path.commonpath([target.folder for target in targets]))
     package = next((up for up in (folder, *folder.parents) if (up / "package.xml").is_file()), folder)
-    starts_others = any(map(is_launch_file, names)) and package.parent.name == "src"
-    for place, root in enumerate(dict.fromkeys((package.parent if starts_others else package, package, folder))):
+    for place, root in enumerate(dict.fromkeys((_workspace_of(package), package, folder))):
         staged = into / f"submission_{place}"
         staged.mkdir()
+        meant = {
+            name: file.resolve().relative_to(root).as_posix() for name, file in zip(names, files, strict=True) if file
+        }
         try:
-            submission = stage_submission(str(root), names, staged)
+            submission = stage_submission(str(root), names, staged, meant)
         except SubmissionError:
             if root == folder and (len(files) > 1 or files[0] is None):
                 raise
             continue
-        # A package may have several files of a name.
-        found = [submission.files[name].found for name in names]
-        meant = [file and file.resolve().relative_to(root).as_posix() for file in files]
-        if root == folder or all(one == other or other is None for one, other in zip(found, meant, strict=True)):
+        if all(submission.files[name].found == path for name, path in meant.items()):  # a copy leaves some folders out
             return submission
     alone = into / "alone"
     alone.mkdir()
     return stage_submission(str(files[0]), names, alone)
+
+
+def _workspace_of(package: Path) -> Path:
+    """Return the folder with the packages that one may need: the `src` above it, or the next if it holds others."""
+    source = next((up for up in package.parents[:MOST_LEVELS] if up.name == "src"), package.parent)
+    found = (manifest for level in ("*", "*/*") for manifest in source.glob(f"{level}/package.xml"))
+    beside = (manifest for manifest in found if manifest.parent != package)
+    return source if (package / "package.xml").is_file() and any(beside) else package
+
+
+#: How far above a package the folder `src` of its workspace may be: packages lie in it or in a repository in it.
+MOST_LEVELS = 3

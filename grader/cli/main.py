@@ -184,7 +184,10 @@ def _grade(*, submission: str | None, watch: bool, no_progress: bool, **as_given
     Without one, the current folder is graded if it holds exercise files. A folder with the name of a command is graded
     as ./NAME.
     """
-    started = click.get_current_context().find_object(float) or time.monotonic()
+    context = click.get_current_context()
+    started = context.find_object(float) or time.monotonic()
+    if submission is not None and (context.args or not os.path.exists(submission)):  # noqa: PTH110 - any name is valid
+        _check_submission(submission, context.args)
     from grader.app import start
 
     with ExitStack() as stack:
@@ -194,6 +197,18 @@ def _grade(*, submission: str | None, watch: bool, no_progress: bool, **as_given
                 early = start.opened_early(submission, as_given["rubrics"], as_given["isolation"], progress)
                 session = stack.enter_context(early)
         return _graded(started, session, submission=submission, watch=watch, no_progress=no_progress, **as_given)
+
+
+def _check_submission(submission: str, others: Sequence[str]) -> None:
+    """Raise an error with what was probably meant, if there are several submissions, or none and something like it."""
+    from grader.cli.near_misses import meant_by, too_many
+    from grader.submissions.submission import not_there
+
+    if others:
+        raise too_many(submission, others)
+    hint = meant_by(submission, [name for name in app.commands if name != _DEFAULT])
+    if hint:
+        raise not_there(submission, hint)
 
 
 def _graded(  # noqa: PLR0913  one parameter an option
@@ -429,7 +444,7 @@ def _explain(*, name: str | None, rubrics: tuple[Path, ...], as_json: bool) -> i
 
 #: The command `grade`; further subcommands are added to it.
 app = CommandLine(_grade, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
-_grade.context_settings = app.context_settings
+_grade.context_settings = {**app.context_settings, "allow_extra_args": True}
 app.add_command(_observe)
 app.add_command(rejudge.command)
 app.add_command(batch.command)
@@ -460,7 +475,11 @@ def _guarded(run: Callable[[], object]) -> int:
     except click.exceptions.Exit:
         raise
     except click.ClickException as error:
-        _fail(error.format_message().rstrip("."), hint="grade --help lists the options")
+        from grader.cli.near_misses import hint_for
+
+        known = hint_for(error)
+        message = error.message if known else error.format_message()
+        _fail(message.rstrip("."), hint=known or "grade --help lists the options")
         return UNUSABLE
     except GraderError as error:
         # A RubricError lists one mistake per line; in any other message a line break comes from a hostile name.

@@ -128,8 +128,12 @@ def parse_outputs(ctx: click.Context, param: click.Parameter, values: tuple[str,
 
 def _parse_output(value: str) -> Output:
     format_, equals, path = value.partition("=")
-    if not equals or not path:
-        raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}")
+    if not equals or not path or not format_:
+        from grader.cli.near_misses import output_meant
+
+        meant = output_meant(value)
+        likely = f"; did you mean {meant}" if meant else ""
+        raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}{likely}")
     if format_ not in (*FORMATS, EVIDENCE):
         raise click.BadParameter(f"{format_!r} is no format{nearest(format_, [*FORMATS, EVIDENCE])}")
     if format_ == EVIDENCE and path == "-":

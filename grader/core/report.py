@@ -210,7 +210,12 @@ class TopicSummary:
     messages: int  # how many messages the nodes published on it
     first_s: float | None  # when the first one came; None if none came
     pace: Pace | None  # None for fewer than two messages at different times
-    ranges: Mapping[str, tuple[float, float]]  # numeric field, dotted -> least and greatest value
+    # Numeric field, dotted -> least and greatest value; `name[]` stands for all elements of an array
+    ranges: Mapping[str, tuple[float, float]]
+    # Text field, dotted -> its different values in order of appearance, `MOST_TEXTS` at most, and how many there were
+    texts: Mapping[str, tuple[tuple[str, ...], int]] = field(default_factory=dict)
+    # Array, dotted -> least and greatest number of elements
+    lengths: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
+from grader.core.quantities import seconds
 
 
 class ClockKind(str, Enum):
@@ -165,6 +166,23 @@ class Endpoint:
     depth: int = 0  # history depth, 0 if unknown
     deadline_ns: int = 0  # offered or requested deadline, 0 for none
     liveliness: str = "automatic"  # `automatic` or `manual_by_topic`
+
+
+def unmet_policy(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:
+    """Return the first QoS policy that keeps messages from passing, as offered and as requested; None if none does.
+
+    The rules are those of ROS 2 for "request versus offered" policies, as in the documentation of its QoS settings.
+    """
+    if (publisher.reliability, subscription.reliability) == ("best_effort", "reliable"):
+        return "best_effort reliability", "reliable"
+    if (publisher.durability, subscription.durability) == ("volatile", "transient_local"):
+        return "volatile durability", "transient_local"
+    if subscription.deadline_ns and not 0 < publisher.deadline_ns <= subscription.deadline_ns:
+        offered = f"a deadline of {seconds(publisher.deadline_ns):g} s" if publisher.deadline_ns else "no deadline"
+        return offered, f"{seconds(subscription.deadline_ns):g} s"
+    if (publisher.liveliness, subscription.liveliness) == ("automatic", "manual_by_topic"):
+        return "automatic liveliness", "manual_by_topic"
+    return None
 
 
 @dataclass(frozen=True, slots=True)

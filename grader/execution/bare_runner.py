@@ -25,13 +25,14 @@ FIRST_LOOK_NS = 10_000_000
 
 
 class BareRunner(WallRunner):
-    """Runs one plan on the real clock, with bare processes; see `WallRunner`."""
+    """Runs one plan on the real clock, with bare processes; see `WallRunner`.
+
+    The observer subscribes to the log and to the plan's publishers before the processes start.
+    """
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
         self._logs: list[Logged] = []
-        observer.subscribe_to_logs()
-        observer.watch(plan.publishers)  # a message that is sent before anybody subscribes is lost
 
     def _begin(self) -> None:
         """Wait for the first node or message, and start the clock."""

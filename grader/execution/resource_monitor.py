@@ -47,6 +47,10 @@ class Budget:
     left_ns: int
     words: str
 
+    def after(self, started_ns: int) -> Budget:
+        """Return what is left of it if it has been in use since a reading of `time.monotonic_ns`."""
+        return replace(self, left_ns=self.left_ns - (time.monotonic_ns() - started_ns))
+
 
 class ResourceMonitor:
     """A context manager with a thread that polls the usage of processes, next to the runner's thread.
@@ -84,10 +88,13 @@ class ResourceMonitor:
         if trace.clock is ClockKind.WALL:
             self._look_for_waiting()
             trace = replace(trace, most_starved_ns=self._most_starved_ns if self.starved_ns else 0)
-        if not self._starved or trace.harness_problem:
-            return trace
-        problem = "the machine was too busy: the nodes waited for a processor until their time was over"
-        return replace(trace, harness_problem=problem)
+        return replace(trace, harness_problem=trace.harness_problem or self.problem)
+
+    @property
+    def problem(self) -> str:
+        """Why the end of the time is not the nodes' fault; empty if it is, or if there is time left."""
+        busy = "the machine was too busy: the nodes waited for a processor until their time was over"
+        return busy if self._starved else ""
 
     @property
     def real_ns(self) -> int:

@@ -140,6 +140,9 @@ class WallRunner(Runner):
         if not changed:
             return
         self._observer.watch(self._recorder.graph.endpoints)
+        if self._observer.crowded:
+            self._recorder.stop(now_ns, self._observer.crowded)
+            self._end_if_full(now_ns)
         self._topics.follow_types()
 
     def _announce_exchange(self, kind: str, service: str, count: int) -> None:

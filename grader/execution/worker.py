@@ -110,24 +110,35 @@ class Worker:
         return not self._isolation.shares_network and has_connections()
 
     def _record(self, plan: Plan, domain: int, budget: Budget) -> Trace:
-        launched = {
-            name: self._evaluate(plan, name, file, domain) for name, file in plan.processes if is_launch_file(name)
-        }
+        launched: dict[str, Launched] = {}
+        started_ns = time.monotonic_ns()
+        for name, file in plan.processes:
+            if is_launch_file(name):
+                launched[name] = self._evaluate(plan, name, file, domain, budget.after(started_ns))
+        if any(made.harness_problem for made in launched.values()):
+            problem = next(made.harness_problem for made in launched.values() if made.harness_problem)
+            return Trace(plan.scenario, ClockKind(plan.clock), stop_ns=0, observations=(), harness_problem=problem)
         if any(made.fault is not None or not made.processes for made in launched.values()):
             return unstarted(plan, launched)
-        return renamed(self._record_processes(expanded(plan, launched), domain, budget), launched)
+        recorded = self._record_processes(expanded(plan, launched), domain, budget.after(started_ns))
+        return renamed(recorded, launched)
 
-    def _evaluate(self, plan: Plan, name: str, file: str, domain: int) -> Launched:
+    def _evaluate(self, plan: Plan, name: str, file: str, domain: int, budget: Budget) -> Launched:
         """Return what a launch file describes, which a process in a sandbox of its own evaluates."""
         start = plan.start_of(name)
-        told = {"launch": {"arguments": start.launch_arguments, "provided": start.provided}}
+        packages = [(project.name, project.folder) for project in plan.projects]
+        told = {
+            "launch": {"arguments": start.launch_arguments, "provided": start.provided, "packages": packages},
+        }
         students: list[NodeProcess] = []
         with ExitStack() as stack:
             stack.callback(stop, students)
             students.append(self._execute(plan, name, file, domain, told))
-            stack.enter_context(ResourceMonitor(students, plan.limits))
+            monitor = stack.enter_context(ResourceMonitor(students, plan.limits, budget))
+            stack.callback(self._account, monitor)
             _await_ready(students[0])
-            return evaluated(students[0], plan)
+            made = evaluated(students[0], plan)
+            return made if made.fault is None else replace(made, harness_problem=monitor.problem)
 
     def _record_processes(self, plan: Plan, domain: int, budget: Budget) -> Trace:
         students: list[NodeProcess] = []
@@ -140,6 +151,9 @@ class Worker:
 
             observer = Observer(domain, plan.limits)  # while the starter is still busy with imports
             stack.callback(observer.close)
+            if plan.bare:  # before the program starts: what it sends before anybody subscribes is lost
+                observer.subscribe_to_logs()
+                observer.watch(plan.publishers)
             for name, file in plan.processes:
                 start = self._start_bare if plan.bare else self._start
                 students.append(start(plan, name, file, domain))
@@ -173,6 +187,7 @@ class Worker:
             "arguments": start.arguments,
             "ros_arguments": start.ros_arguments,
             "parameter_files": start.parameter_files,
+            "scripts": plan.scripts_of(file),
             "seed": plan.host_seed,
             "clock": plan.clock,
             "log_format": LOG_FORMAT,
@@ -231,7 +246,7 @@ class Worker:
                 runtime=replace(runtime, python_paths=(*runtime.python_paths, *map(Path, plan.interfaces))),
                 host_folder=None,
                 submission=Path(plan.root),
-                arguments=bare_arguments(Path(plan.root), root, file, plan.start_of(name)),
+                arguments=bare_arguments(Path(plan.root), root, file, plan.start_of(name), plan.scripts_of(file)),
                 environment={"ROS_DOMAIN_ID": str(domain)},
                 pass_fds=(),
                 beside=Path(plan.root, file).parent,

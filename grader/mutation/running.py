@@ -164,7 +164,7 @@ def _bench(  # noqa: PLR0913  each comes from a different stage
         reference=reference,
         sources=_sources(reference, exercise),
         progress=progress,
-        interfaces=provide(session, [exercise], (), reference.root).folders,
+        interfaces=provide(session, [exercise], (), reference).folders,
         workers=options.jobs or 1,
     )
 
