@@ -24,8 +24,6 @@ from grader.execution.topic_peers import VirtualTopicPeers
 from grader.execution.trace_recorder import NAME_CHARACTERS, OFFERS
 from grader.execution.workload import Workload
 
-#: Start of the hosts' virtual time: 2026-01-01 00:00:00 UTC, the same as in `grader/student_host/clock.py`.
-EPOCH_NS = 1_767_225_600_000_000_000
 #: The most steps of one scenario; more end it.
 STEPS = 400_000
 #: The host never sends more reports before it waits or ends, and never reports more endpoints and parameters.
@@ -60,7 +58,7 @@ class VirtualRunner(Runner):
         return self._now_ns
 
     def _clock_ns(self, now_ns: int) -> int:
-        return EPOCH_NS + now_ns
+        return self._plan.epoch_ns + now_ns
 
     def _begin(self) -> None:
         self._play(phase="before")
@@ -134,8 +132,8 @@ class VirtualRunner(Runner):
         if self._starts_ns.pop(student.name, 0):
             self._recorder.add(Mark(self._now_ns, "process_starts", student.name))
         self._free_until_ns = self._quiet_until(student)
-        free_ns = EPOCH_NS + self._free_until_ns
-        answer = {"now_ns": EPOCH_NS + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals}
+        free_ns = self._plan.epoch_ns + self._free_until_ns
+        answer = {"now_ns": self._plan.epoch_ns + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals}
         workload = student.measured(self._now_ns)
         workload.begin(self._now_ns)
         student.tell({**answer, "interrupt": True} if student.stop_signalled and not student.stopping else answer)
@@ -175,7 +173,7 @@ class VirtualRunner(Runner):
         """Adopt the time that a process has reached on its own."""
         now_ns = report.get("now_ns")
         if isinstance(now_ns, int):
-            self._now_ns = max(self._now_ns, min(now_ns - EPOCH_NS, self._free_until_ns))
+            self._now_ns = max(self._now_ns, min(now_ns - self._plan.epoch_ns, self._free_until_ns))
 
     def _hear(self, student: NodeProcess, workload: Workload) -> None:
         """Handle reports until a process has nothing left to do at this instant, or has ended."""
@@ -208,7 +206,7 @@ class VirtualRunner(Runner):
             if report.get("leaving"):
                 self._hand_over()
             wake_ns = report.get("wake_ns")
-            student.wake_ns = wake_ns - EPOCH_NS if isinstance(wake_ns, int) else None
+            student.wake_ns = wake_ns - self._plan.epoch_ns if isinstance(wake_ns, int) else None
             return
         self._mark_dead(student)
 

@@ -57,7 +57,8 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
 
     Args:
         request: `fd` of the socket, `root` and `file` of the submission, `clock`, `seed` (hex), `log_format`, `limits`,
-            and `interfaces`, the folders of interface packages that are not installed.
+            `steady_ns` of `VirtualTime.start`, and `interfaces`, the folders of interface packages that are not
+            installed.
         host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
             hide one that it has imported.
     """
@@ -84,7 +85,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     os.register_at_fork(after_in_child=link.cut if request["clock"] == "wall" else lambda: originals.exit_now(70))
     start = link.ask(ready)
     ready.clear()
-    time.start(start["now_ns"])
+    time.start(start["now_ns"], request["steady_ns"])
     watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
     if isinstance(time, VirtualTime) and watchdog is not None:
         watchdog.start()

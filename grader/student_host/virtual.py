@@ -92,8 +92,14 @@ class VirtualTime:
             stream.write = noticing(stream.write)  # type: ignore[method-assign]
         ros.replace_log(noticing)
 
-    def start(self, now_ns: int) -> None:
-        """Start virtual time in this thread, which may be of a fork of the process that made this object."""
+    def start(self, now_ns: int, steady_ns: int) -> None:
+        """Start virtual time in this thread, which may be of a fork of the process that made this object.
+
+        Args:
+            now_ns: Nanoseconds since 1970.
+            steady_ns: When its monotonic clocks were at zero, in nanoseconds since 1970.
+        """
+        self.clock.steady_ns = steady_ns
         self.scheduler.current.native = originals.get_native_id()
         self._domain = int(os.environ.get("ROS_DOMAIN_ID", "0"))
         self._move_to(now_ns)
