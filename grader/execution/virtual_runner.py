@@ -75,7 +75,9 @@ class VirtualRunner(Runner):
         return self._now_ns
 
     def _unfit(self) -> str:
-        return unfit(self._students, self._recorder.observations, full=bool(self._recorder.full))
+        return self._graders_fault() or unfit(
+            self._students, self._recorder.observations, full=bool(self._recorder.full)
+        )
 
     def _is_incomplete(self) -> bool:
         return self._discovery.patience.has_lost or self._has_lost
