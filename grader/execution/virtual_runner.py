@@ -75,7 +75,9 @@ class VirtualRunner(Runner):
         return self._now_ns
 
     def _unfit(self) -> str:
-        return unfit(self._students, self._recorder.observations, full=bool(self._recorder.full))
+        return self._graders_fault() or unfit(
+            self._students, self._recorder.observations, full=bool(self._recorder.full)
+        )
 
     def _may_drift(self) -> bool:
         drifting = any(s.workload is not None and s.workload.delay.may_drift for s in self._students)

@@ -102,14 +102,17 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
         time.give_up_outside = watchdog.give_up_outside
         Watch(link, request["root"]).install()
     ending = play(request, describer, link, install_ros)
-    time.finish()
-    with contextlib.suppress(BaseException):
-        forget_modules(request["root"])
-    if watchdog is not None:
-        watchdog.stop()
-    left = time.end()
+    try:
+        time.finish()
+        with contextlib.suppress(BaseException):
+            forget_modules(request["root"])
+        if watchdog is not None:
+            watchdog.stop()
+        ending = {"left": time.end(), **ending, **time.summary()}
+    except Exception as error:  # no code of the student runs here that could raise
+        ending = {"fault": describer.exception(error), **ending, "code": 1, "left": False}
     flush()
-    link.send({"kind": "exited", "left": left, **ending, **time.summary()})
+    link.send({"kind": "exited", **ending})
     originals.exit_now(0)
 
 

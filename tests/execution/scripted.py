@@ -138,7 +138,7 @@ class ScriptedStudent:
         self.unmatched: frozenset[str] = frozenset()
         self.sees_graph = False
         self.workload: ScriptedWorkload | None = None
-        self.unsettled = ""
+        self.unsettled = self.grader_failed = ""
         self.notes: list[str] = []
         self.places = Places(HERE)
         self.start_told = None
