@@ -20,7 +20,16 @@ from grader.core.quantities import MIB, size
 from grader.core.trace import ClockKind, Trace
 from grader.execution.socket_memory import MANY_DESCRIPTORS, Held, SocketMemory, descriptors
 from grader.execution.student_process import NodeProcess
-from grader.execution.usage import FULL_BYTES, FULL_CODE, Usage, families, scratch_names, threads_starved_ns, usage
+from grader.execution.usage import (
+    FULL_BYTES,
+    FULL_CODE,
+    Usage,
+    families,
+    last_pid,
+    scratch_names,
+    threads_starved_ns,
+    usage,
+)
 
 #: The polling interval, and the number of polls between two searches for new child processes.
 LOOK_S = 0.025
@@ -85,6 +94,7 @@ class ResourceMonitor:
         self._families: dict[int, set[int]] = {}
         self._sockets = SocketMemory(shared=shares_network)
         self._held: dict[int, Held] = {}
+        self._last_pid = ""
         self._started_ns = time.monotonic_ns()
         self._own_bytes = usage([os.getpid()]).memory_bytes
         self._own_ns = time.process_time_ns()
@@ -131,10 +141,7 @@ class ResourceMonitor:
         looks = 0
         while not self._over.wait(LOOK_S):
             if looks % SEARCH_EVERY == 0:
-                found = families([root for s in self._students for root in s.roots])
-                self._families = {
-                    s.process.pid: set().union(*(found[root] for root in s.roots)) for s in self._students
-                }
+                self._look_for_children()
                 self._look_for_names()
                 self._look_for_waiting()
             self._look_at_sockets(looks)
@@ -151,6 +158,14 @@ class ResourceMonitor:
             self._held = dict(zip(self._families, found, strict=True))
         elif not connections:
             self._held = {}
+
+    def _look_for_children(self) -> None:
+        """Find the families of processes; they are as before if nothing has been started since."""
+        last = last_pid()  # before the search, which may miss what is started meanwhile
+        if not last or last != self._last_pid:
+            found = families([root for s in self._students for root in s.roots])
+            self._families = {s.process.pid: set().union(*(found[root] for root in s.roots)) for s in self._students}
+            self._last_pid = last
 
     def _look(self) -> None:
         for student in self._students:

@@ -90,6 +90,14 @@ def families(roots: Collection[int]) -> dict[int, set[int]]:
     return found
 
 
+def last_pid() -> str:
+    """Return the pid that the kernel gave last, to a process or a thread; empty if it does not say.
+
+    As long as it stays the same, no process has been started that this process could see: proc_loadavg(5).
+    """
+    return _read("/proc/loadavg").rpartition(b" ")[2].strip().decode("ascii")
+
+
 def innermost(root: int) -> int:
     """Return the last process in a chain of wrapper processes, each of which has one child."""
     pids = {pid: int(fields[PARENT]) for pid in families([root])[root] if (fields := _stat(pid))}

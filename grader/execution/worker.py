@@ -202,6 +202,7 @@ class Worker:
             "seed": plan.host_seed,
             "clock": plan.clock,
             "charged": plan.charged,
+            "steady_ns": plan.epoch_ns - plan.uptime_ns,
             "log_format": LOG_FORMAT,
             "python_paths": [str(p) for p in self._runtime.python_paths],
             "interfaces": plan.interfaces,
@@ -219,14 +220,15 @@ class Worker:
                 "ROS_DOMAIN_ID": str(domain),
                 "RCUTILS_COLORIZED_OUTPUT": "0",
                 **quick_discovery(self._isolation.host_seen_at, self._runtime),
-                "PYTHONHASHSEED": HASH_SEED,
+                "PYTHONHASHSEED": str(plan.hash_seed),
             },
             pass_fds=(theirs.fileno(),),
             beside=Path(plan.root, file).parent,
             copied=files_beside(Path(plan.root), file),
         )
         try:
-            if told or not self._isolation.can_fork:  # a fork of the starter has imported rclpy, which takes no part
+            # a fork of the starter has imported rclpy, which takes no part, and has the hashes of the starter
+            if told or not self._isolation.can_fork or str(plan.hash_seed) != HASH_SEED:
                 command = self._isolation.student_command(process, plan.limits)
                 environment = command.environment
                 student = NodeProcess.start(name, root, command, ours, plan.limits)

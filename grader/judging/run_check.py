@@ -8,7 +8,7 @@ from dataclasses import replace
 from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Check, Criterion, Exercise, Finding, reads_sources
+from grader.core.exercise import Check, Criterion, Exercise, Finding, of_beginning, reads_sources
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import Submission
 from grader.core.trace import Fault, FaultKind, Request, Response, Trace
@@ -98,6 +98,15 @@ def _unrecorded(scenario: Scenario, trace: Trace | None) -> Answer:
     if trace.author_mistake is not None:
         return _author_mistake(trace.author_mistake)
     return Answer(problem=trace.harness_problem, suspected=trace.suspected)
+
+
+def for_beginning(criterion: Criterion) -> Criterion | None:
+    """Return a criterion that judges the beginning of a recording; None if its check says that none can."""
+    try:
+        check = of_beginning(criterion.check)
+    except Exception:  # a check of a rubric's own that fails here is not compared, and costs no points
+        return None
+    return None if check is None else replace(criterion, check=check, check_name=check_name(criterion))
 
 
 def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
