@@ -30,6 +30,7 @@ class Timeouts:
 
     def deadline_ns(self, seconds: float | None) -> int | None:
         """Return the deadline of a timeout; None, if the timeout is None or negative, means to wait forever."""
+        self._clock.charge()
         if seconds is None or seconds < 0:
             return None
         return self._clock.end_of(round(seconds * NS_PER_S))

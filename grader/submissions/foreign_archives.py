@@ -5,18 +5,16 @@ from __future__ import annotations
 import ctypes.util
 import importlib.util
 import json
-import os
 import struct
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from functools import partial
-from pathlib import Path
 from typing import BinaryIO
 
 from grader.core import extras
 from grader.core.errors import HarnessError
+from grader.submissions.contained import run_contained
 from grader.submissions.members import FEWER, FILE, FOLDER, LINK, Member, UnusableArchiveError
 
 #: Kind of archive -> names of the format in libarchive, and the first bytes that tell them apart.
@@ -24,9 +22,9 @@ _FORMATS = {"7z": ("7zip", b""), "rar": ("rar5", b"Rar!\x1a\x07\x01"), "old rar"
 #: The kinds, as `archive_kind` names them.
 KINDS = ("7z", "rar")
 
-#: Limits of the process that unpacks: memory in bytes, processor time and real time in seconds.
+#: Limits of the process that unpacks: memory in bytes, processor time in seconds.
 MEMORY_BYTES = 768 << 20
-PROCESSOR_S, REAL_S = 60, 300
+PROCESSOR_S = 60
 _KINDS = {"file": FILE, "folder": FOLDER, "link": LINK, "other": "a device, pipe or other special file"}
 # The exit codes of grader.submissions.unpacker, which is not imported, because only its process needs the sandbox.
 _ENCRYPTED, _TOO_MANY, _TOO_MUCH, _NO_LIBRARY = 11, 12, 13, 14
@@ -168,21 +166,8 @@ def _vint(data: bytes, at: int) -> tuple[int, int]:
 
 
 def _run(limits: dict[str, object], archive: BinaryIO, out: BinaryIO) -> int:
-    root = Path(__file__).parents[2]
-    path = os.pathsep.join([str(root), *filter(os.path.isabs, os.environ.get("PYTHONPATH", "").split(os.pathsep))])
-    environment = {"PYTHONPATH": path, "PATH": os.defpath, "LC_ALL": "C.UTF-8", "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-s", "-m", "grader.submissions.unpacker", json.dumps(limits)]
     try:
-        return subprocess.run(
-            command,
-            stdin=archive,
-            stdout=out,
-            stderr=subprocess.DEVNULL,
-            env=environment,
-            cwd="/",
-            timeout=REAL_S,
-            check=False,
-        ).returncode
+        return run_contained("grader.submissions.unpacker", limits, archive, out)
     except subprocess.TimeoutExpired:
         return -1
     except OSError as error:

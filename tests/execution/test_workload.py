@@ -125,7 +125,7 @@ def test_work_and_waiting_are_told_apart(child: subprocess.Popen[str], kind: str
     workload.begin(0)
     child.stdin.write(f"{kind} 300\n")
     child.stdout.readline()
-    workload.end()
+    workload.end({})
     assert (workload.used_ns >= 290 * MS) is (kind == "work")
     assert (workload.waited_ns >= 100 * MS) is (kind == "sleep")
 
@@ -137,15 +137,15 @@ def test_waiting_for_messages_is_not_the_processs_own(child: subprocess.Popen[st
     assert child.stdout is not None
     child.stdout.readline()
     workload = Workload(child.pid, 0)
-    workload.begin(0)
+    workload.begin(0, arrivals=True)
     time.sleep(0.015)
     workload.arrived()
-    workload.end()
+    workload.end({})
     assert workload.waited_ns < 15 * MS
-    workload.begin(0)
+    workload.begin(0, arrivals=True)
     time.sleep(0.3)
     workload.arrived()
-    workload.end()
+    workload.end({})
     assert workload.waited_ns > 200 * MS
 
 
@@ -154,5 +154,5 @@ def test_a_process_that_has_ended_uses_nothing() -> None:
     with subprocess.Popen([sys.executable, "-c", ""]) as process:
         workload = Workload(process.pid, 0)
     workload.begin(0)
-    workload.end()
+    workload.end({})
     assert workload.used_ns == 0

@@ -28,7 +28,7 @@ from hypothesis.strategies._internal.core import DataObject
 
 from grader.core.errors import SubmissionError
 from grader.core.submission import Submission
-from grader.submissions import archives, foreign_archives
+from grader.submissions import archives, contained, foreign_archives
 from grader.submissions.foreign_archives import is_installed
 from grader.submissions.submission import stage_submission
 
@@ -490,17 +490,17 @@ def test_the_limits_of_the_process_that_unpacks_refuse_the_archive(
     monkeypatch.setattr(foreign_archives, "MEMORY_BYTES", 16 << 20)
     assert "found a damaged, incomplete or unusual one" in refusal(tmp_path / "1", large)[0]
     monkeypatch.undo()
-    monkeypatch.setattr(foreign_archives, "REAL_S", 0.001)
+    monkeypatch.setattr(contained, "REAL_S", 0.001)
     assert "found a damaged, incomplete or unusual one" in refusal(tmp_path / "2", rarred(FILES))[0]
 
 
 @pytest.mark.sandbox
-def test_the_process_that_unpacks_can_do_nothing_else() -> None:
-    """No file, socket, process, signal or memory beyond its limit, though the C library were taken over."""
+def test_a_process_that_reads_what_students_made_can_do_nothing_else() -> None:
+    """No file, socket, process, signal or memory beyond its limit, though a library were taken over."""
     code = """
 import os, resource, socket
-from grader.submissions import unpacker
-unpacker._confine({"memory": 768 << 20, "processor": 60, "output": 1 << 20})
+from grader.submissions.confinement import confine
+confine({"memory": 768 << 20, "processor": 60, "output": 1 << 20})
 tries = {
     "read": lambda: open("/etc/hostname"), "write": lambda: open("/tmp/x", "w"), "net": socket.socket,
     "fork": os.fork, "signal": lambda: os.kill(os.getppid(), 0), "memory": lambda: bytearray(1 << 30),

@@ -194,10 +194,10 @@ class Bubblewrap:
         options_fd = _memory_file("options", b"".join(os.fsencode(option) + b"\0" for option in options))
         opened = (filter_fd, options_fd, status_write, *copied_fds, *account_fds)
         argv = (str(self.bwrap), "--args", str(options_fd), "--", str(PLACEHOLDER))
-        own: dict[str, object] = {"RLIMIT_NPROC": limits.processes, "RLIMIT_RTPRIO": 0}
+        own = {"RLIMIT_NPROC": limits.processes, "RLIMIT_CPU": [limits.processor_s, 1]}
         restrictions = start_request(
             str(WORK),
-            limits={**by_resource(limits), **own, "RLIMIT_CPU": [limits.processor_s, 1]},
+            limits={**by_resource(limits), **own},
             user=list(user) if self.as_root else None,
             filter=seccomp.student_filter().hex(),
         )
@@ -223,11 +223,9 @@ class Bubblewrap:
         them.
         """
         seconds = limits.processor_s
-        entry = [
-            *(str(self.prlimit), f"--as={limits.address_space_bytes}", f"--nproc={limits.processes}"),
-            *(f"--nofile={limits.open_files}", f"--fsize={limits.file_bytes}", "--core=0", "--rtprio=0"),
-            f"--cpu={seconds}:{seconds + 1}",
-        ]
+        values = {**by_resource(limits), "RLIMIT_NPROC": limits.processes, "RLIMIT_CPU": f"{seconds}:{seconds + 1}"}
+        entry = [str(self.prlimit)]
+        entry += [f"--{name.removeprefix('RLIMIT_').lower()}={value}" for name, value in values.items()]
         if not self.as_root:
             return entry
         privileges = ["--clear-groups", "--bounding-set=-all", "--inh-caps=-all", "--no-new-privs"]
@@ -242,7 +240,9 @@ class Bubblewrap:
         # Process 1 is bubblewrap, without the seccomp filter, or the placeholder: its memory must not be accessible.
         first = "/proc/1"
         options = ["--proc", "/proc", "--size", "4096", "--perms", "0555", "--tmpfs", first, "--remount-ro", first]
-        options += ["--dev", "/dev"]
+        # The terminals of all students would be counted with those of the machine.
+        options += ["--dev", "/dev", "--size", "4096", "--perms", "0555", "--tmpfs", "/dev/pts"]
+        options += ["--remount-ro", "/dev/pts"]
         # Scratch folders first: a mount on /tmp would hide anything that was bound below it before.
         for scratch in ("/dev/shm", "/tmp"):  # noqa: S108
             options += ["--perms", "1777", "--size", size, "--tmpfs", scratch]

@@ -260,8 +260,7 @@ def confined(process: StudentProcess, limits: Limits, ground: Ground) -> Prepare
         made=True,
         **copies(process),
         scratch=limits.scratch_bytes,
-        # Without RLIMIT_RTPRIO a privileged parent's would hold.
-        limits={**by_resource(limits), "RLIMIT_RTPRIO": 0, "RLIMIT_MSGQUEUE": 0},
+        limits=by_resource(limits),
         processes=limits.processes,
         user=[some_user(), STUDENT_GROUP] if ground.as_root else None,
         confinement=_confinement(process, ground),
