@@ -105,7 +105,7 @@ def read_table(path: Path) -> Table:
     try:
         rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter))
     except csv.Error as error:
-        raise ClassError(f"{path}: expected CSV, found a file that is none: {error}") from None
+        raise ClassError(f"{path}: expected CSV, found another kind of file: {error}") from None
     rows = [row for row in rows if any(cell.strip() for cell in row)]
     if len(rows) < 2:
         raise ClassError(f"{path}: expected a header and rows, found {len(rows)} lines")
