@@ -200,7 +200,7 @@ def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator
     yield Listing(
         "undecided",
         "Undecided",
-        "Undecided through no fault of the student. The same command with --rerun undecided grades them again.",
+        "Not decided. The reasons say what is known. The same command with --rerun undecided grades them again.",
         tuple(entry for k, row in undecided for entry in _undecided(k, row, run)),
     )
     yield Listing(

@@ -26,7 +26,7 @@ from grader.classroom.store import Kept, ResultStatus, State
 from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Outcome
-from grader.core.report import AUTHOR_MISTAKE
+from grader.core.report import AUTHOR_MISTAKE, SUBMISSION_SUSPECTED
 from grader.reporting.escape import csv_cell, shown
 from grader.reporting.json_report import CriterionData, ExerciseData, ReportData
 
@@ -365,7 +365,9 @@ def remarks(row: Row) -> list[str]:
     if row.adjusted.ignored:
         found.append("does not count")
     if row.status.value == "undecided":
-        found.append("not final: a criterion was not decided, through no fault of the student")
+        theirs = any(map(may_be_theirs, (c for e in exercises_of(row.report) for c in e["criteria"])))
+        why = "perhaps because of what the submission does" if theirs else "through no fault of the student"
+        found.append(f"not final: a criterion was not decided, {why}")
     return found
 
 
@@ -458,6 +460,12 @@ def _points(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, st
 def exercises_of(report: ReportData | None) -> Sequence[ExerciseData]:
     """Return the exercises of a report, none without one."""
     return () if report is None else report["exercises"]
+
+
+def may_be_theirs(criterion: CriterionData) -> bool:
+    """Return whether a criterion is undecided for a reason that the submission itself may have caused."""
+    open_ = criterion["outcome"] == Outcome.UNDECIDED.value
+    return open_ and criterion.get("evidence", {}).get(SUBMISSION_SUSPECTED) is True
 
 
 def author_mistake(criterion: CriterionData) -> str:

@@ -303,6 +303,13 @@ def _partial(report: Report) -> str:
 
 def _not_final(undecided: Sequence[Verdict]) -> str:
     criteria, open_points = _open(undecided)
+    suspected = [verdict for verdict in undecided if verdict.suspected]
+    if suspected:
+        some = "" if len(suspected) == len(undecided) else "some of them "
+        return (
+            f"This score is not final: {criteria} undecided, {some}perhaps because of what the submission does; "
+            f"{open_points} points are still open. The reasons say more."
+        )
     return (
         f"This score is not final: {criteria} undecided through no fault of the student, "
         f"{open_points} points are still open. Grade again."
