@@ -104,18 +104,25 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         request = replace(request, exercises=exercise_ids(request.exercises, exercises))
         root = Path(folder)
         root.chmod(0o755)  # as the folder of the session
-        submission = _staged(request, exercises, root)
+        if names_a_program(request):
+            exercises, submission = _of_one_file(request, exercises, root)
+            request = replace(request, exercises=tuple(exercise.id for exercise in exercises))
+        else:
+            submission = _staged(request, exercises, root)
         if request.every:
             exercises, submission = begun(exercises, submission)
         odometry = read_recording(request, exercises)
         seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
         environment = _environment(session)
-        provided = provide(session, exercises, request.interfaces, submission.root)
+        provided = provide(session, exercises, request.interfaces, submission, request.time_budget_s)
         submission = replace(submission, notes=(*submission.notes, *provided.problems))
         kept = _kept(request, exercises, submission, odometry, seed, environment, provided.offered)
         done = {exercise for exercise, _ in kept}
         unrecorded = [exercise for exercise in exercises if exercise.id not in done]
-        prefixes = install_shares(submission.root, Path(prefix), session.ros) if unrecorded else ()
+        prefixes: tuple[str, ...] = ()
+        if unrecorded:
+            prefixes, problems = install_shares(submission.root, submission.projects, Path(prefix), session.ros)
+            submission = replace(submission, notes=(*submission.notes, *problems))
         reaches = read_reaches(submission.root)
         folders, own_hashes = provided.folders, not HASHES.isdisjoint(reaches)
         jobs = plan_jobs(request, unrecorded, submission, odometry, seed, folders, prefixes, own_hashes=own_hashes)
@@ -140,8 +147,8 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
             _judge()
             under_way()
 
-        budget_s = request.time_budget_s
-        traces = session.record(jobs, request.clock, progress, first, budget_s=budget_s, under_way=meanwhile)
+        budget = RealTimeBudget(request.time_budget_s, spent_s=provided.spent_s)
+        traces = session.record(jobs, request.clock, progress, first, budget=budget, under_way=meanwhile)
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
@@ -290,6 +297,28 @@ def begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[E
         files = listed(wanted_files(exercises))
         raise SubmissionError(f"{where}: expected a file of some exercise, found none", f"the files are {files}")
     return begun, replace(submission, files={name: submission.files[name] for name in wanted_files(begun)})
+
+
+def names_a_program(request: GradeRequest) -> bool:
+    """Return whether a request names one .py file and no exercises: then those are graded that the file belongs to."""
+    chosen = bool(request.exercises) or request.every or request.collected is not None
+    return not chosen and request.submission.casefold().endswith(".py") and Path(request.submission).is_file()
+
+
+def _of_one_file(request: GradeRequest, usual: Sequence[Exercise], root: Path) -> tuple[list[Exercise], Submission]:
+    """Stage the file of a request; return it with the exercises that it belongs to, or else with the usual ones."""
+    every = read_exercises(replace(request, every=True))
+    submission = _staged(request, every, root)
+    chosen = belonging(every, submission) or list(usual)
+    return chosen, replace(submission, files={name: submission.files[name] for name in wanted_files(chosen)})
+
+
+def belonging(exercises: Sequence[Exercise], submission: Submission) -> list[Exercise]:
+    """Return the exercises that the one file of a submission belongs to, by its name or else by its likeness."""
+    looked_for = [(exercise, [submission.files[name] for name in exercise.files]) for exercise in exercises]
+    named = [exercise for exercise, files in looked_for if any(file.found for file in files)]
+    similar = [exercise for exercise, files in looked_for if any(file.similar for file in files)]
+    return named or similar or [exercise for exercise, files in looked_for if any(file.likely for file in files)]
 
 
 def wanted_files(exercises: Sequence[Exercise]) -> list[str]:

@@ -148,6 +148,9 @@ class WallRunner(Runner):
         self._end_if_full(now_ns)
         if changed:
             self._observer.watch(self._recorder.graph.endpoints)
+            if self._observer.crowded:
+                self._recorder.stop(now_ns, self._observer.crowded)
+                self._end_if_full(now_ns)
             self._topics.follow_types()
         return changed
 
