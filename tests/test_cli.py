@@ -157,7 +157,7 @@ def test_a_dash_prints_that_format_instead(run_session: Session, tmp_path: Path)
     [
         (("ada", "--watch", "--json"), "--watch prints a report after each save", "grade --help"),
         (("ada", "--watch", "-o", "evidence=x"), "--watch prints a report after each save", "grade --help"),
-        (("ada", "bert"), "unexpected extra argument (bert)", "grade --help"),
+        (("ada", "bert"), "expected one submission, found 2: ada bert", "grade --help"),
         (("ada", "--sed", "5"), "--seed", "grade --help"),
         (("ada", "--seed", "-1"), "x>=0", "grade --help"),
         (("ada", "--seed", "many"), "'many' is not a valid integer", "grade --help"),

@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 import grader
 from grader.app.interface_packages import definitions, known_interfaces, provide
@@ -33,6 +34,9 @@ from grader.rubrics.builtin import builtin_exercises, builtin_odometry, exercise
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import read_reaches, read_sources
 from grader.submissions.submission import stage_collected, stage_submission
+
+if TYPE_CHECKING:
+    from grader.judging.beginnings import BeginningJudge
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
@@ -100,18 +104,25 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         request = replace(request, exercises=exercise_ids(request.exercises, exercises))
         root = Path(folder)
         root.chmod(0o755)  # as the folder of the session
-        submission = _staged(request, exercises, root)
+        if names_a_program(request):
+            exercises, submission = _of_one_file(request, exercises, root)
+            request = replace(request, exercises=tuple(exercise.id for exercise in exercises))
+        else:
+            submission = _staged(request, exercises, root)
         if request.every:
             exercises, submission = begun(exercises, submission)
         odometry = read_recording(request, exercises)
         seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
         environment = _environment(session)
-        provided = provide(session, exercises, request.interfaces, submission.root)
+        provided = provide(session, exercises, request.interfaces, submission, request.time_budget_s)
         submission = replace(submission, notes=(*submission.notes, *provided.problems))
         kept = _kept(request, exercises, submission, odometry, seed, environment, provided.offered)
         done = {exercise for exercise, _ in kept}
         unrecorded = [exercise for exercise in exercises if exercise.id not in done]
-        prefixes = install_shares(submission.root, Path(prefix), session.ros) if unrecorded else ()
+        prefixes: tuple[str, ...] = ()
+        if unrecorded:
+            prefixes, problems = install_shares(submission.root, submission.projects, Path(prefix), session.ros)
+            submission = replace(submission, notes=(*submission.notes, *problems))
         jobs = plan_jobs(request, unrecorded, submission, odometry, seed, provided.folders, prefixes)
         run = Run(
             submission=submission,
@@ -134,12 +145,13 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
             _judge()
             under_way()
 
-        budget_s = request.time_budget_s
-        traces = session.record(jobs, request.clock, progress, first, budget_s=budget_s, under_way=meanwhile)
+        budget = RealTimeBudget(request.time_budget_s, spent_s=provided.spent_s)
+        traces = session.record(jobs, request.clock, progress, first, budget=budget, under_way=meanwhile)
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
-            traces = check(checks, jobs, traces, record, take or (lambda *_: None))
+            judge_of = partial(_judge_of, exercises, submission, run.sources)
+            traces = check(checks, jobs, traces, record, take or (lambda *_: None), judge_of)
         run = replace(run, traces={**kept, **traces}, duration_s=time.perf_counter() - started)
         run = replace(run, definitions=definitions(run.traces.values(), provided))
         if on_recorded is not None:
@@ -152,6 +164,16 @@ def _judge() -> Callable[..., Report]:
     from grader.judging.judge_run import judge_run  # noqa: PLC0415
 
     return judge_run
+
+
+def _judge_of(
+    exercises: Sequence[Exercise], submission: Submission, sources: Mapping[str, str], key: Key
+) -> BeginningJudge:
+    """Return what judges the beginnings of the recordings of a scenario."""
+    from grader.judging.beginnings import BeginningJudge  # noqa: PLC0415 - as `judge_run`
+
+    exercise = next(exercise for exercise in exercises if exercise.id == key[0])
+    return BeginningJudge(exercise, key[1], submission, sources)
 
 
 def _kept(  # noqa: PLR0913  all that a recording depends on
@@ -262,6 +284,28 @@ def begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[E
         files = listed(wanted_files(exercises))
         raise SubmissionError(f"{where}: expected a file of some exercise, found none", f"the files are {files}")
     return begun, replace(submission, files={name: submission.files[name] for name in wanted_files(begun)})
+
+
+def names_a_program(request: GradeRequest) -> bool:
+    """Return whether a request names one .py file and no exercises: then those are graded that the file belongs to."""
+    chosen = bool(request.exercises) or request.every or request.collected is not None
+    return not chosen and request.submission.casefold().endswith(".py") and Path(request.submission).is_file()
+
+
+def _of_one_file(request: GradeRequest, usual: Sequence[Exercise], root: Path) -> tuple[list[Exercise], Submission]:
+    """Stage the file of a request; return it with the exercises that it belongs to, or else with the usual ones."""
+    every = read_exercises(replace(request, every=True))
+    submission = _staged(request, every, root)
+    chosen = belonging(every, submission) or list(usual)
+    return chosen, replace(submission, files={name: submission.files[name] for name in wanted_files(chosen)})
+
+
+def belonging(exercises: Sequence[Exercise], submission: Submission) -> list[Exercise]:
+    """Return the exercises that the one file of a submission belongs to, by its name or else by its likeness."""
+    looked_for = [(exercise, [submission.files[name] for name in exercise.files]) for exercise in exercises]
+    named = [exercise for exercise, files in looked_for if any(file.found for file in files)]
+    similar = [exercise for exercise, files in looked_for if any(file.similar for file in files)]
+    return named or similar or [exercise for exercise, files in looked_for if any(file.likely for file in files)]
 
 
 def wanted_files(exercises: Sequence[Exercise]) -> list[str]:

@@ -205,6 +205,15 @@ def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator
     """Yield all lists, including empty ones."""
     undecided = [(k, row) for k, row in enumerate(rows) if row.status is Status.UNDECIDED]
     yield Listing(
+        "rubric-mistakes",
+        "Mistakes in the rubric",
+        "They leave criteria undecided. Correct the rubric and give the same command again.",
+        tuple(
+            PageEntry(f"{mistake} (submissions: {len(concerned)})", rows.index(concerned[0]))
+            for mistake, concerned in book.author_mistakes.items()
+        ),
+    )
+    yield Listing(
         "undecided",
         "Undecided",
         "Not decided through no fault of the student. The same command with --rerun undecided tries again.",

@@ -21,9 +21,12 @@ from grader.classroom.adjustments import (
 from grader.classroom.intake import HandedInEntry, Intake
 from grader.classroom.roster import Person, RosterMatch, fold_handle
 from grader.classroom.store import Kept, ResultStatus, State
+from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
+from grader.core.exercise import Outcome
+from grader.core.report import AUTHOR_MISTAKE
 from grader.reporting.escape import csv_cell, shown
-from grader.reporting.json_report import ExerciseData, ReportData
+from grader.reporting.json_report import CriterionData, ExerciseData, ReportData
 
 
 class Status(str, Enum):
@@ -95,6 +98,16 @@ class Gradebook:
     def count(self, status: Status) -> int:
         """Count the rows with a status."""
         return sum(row.status is status for row in self.rows)
+
+    @property
+    def author_mistakes(self) -> Mapping[str, tuple[Row, ...]]:
+        """Mistakes of the rubrics' authors that leave criteria undecided, each with the rows that it concerns."""
+        found: dict[str, list[Row]] = {}
+        for row in self.rows:
+            criteria = [criterion for exercise in exercises_of(row.report) for criterion in exercise["criteria"]]
+            for mistake in dict.fromkeys(filter(None, map(author_mistake, criteria))):
+                found.setdefault(mistake, []).append(row)
+        return {mistake: tuple(rows) for mistake, rows in found.items()}
 
     @property
     def refused(self) -> tuple[Row, ...]:
@@ -343,3 +356,10 @@ def _points(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, st
 def exercises_of(report: ReportData | None) -> Sequence[ExerciseData]:
     """Return the exercises of a report, none without one."""
     return () if report is None else report["exercises"]
+
+
+def author_mistake(criterion: CriterionData) -> str:
+    """Return the mistake of the rubric's author that leaves a criterion undecided, with its place; empty if none."""
+    open_ = criterion["outcome"] == Outcome.UNDECIDED.value
+    found = criterion.get("evidence", {}).get(AUTHOR_MISTAKE) if open_ else None
+    return str(AuthorMistake(**found)) if found else ""

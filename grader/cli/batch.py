@@ -20,7 +20,7 @@ from grader.cli.options import (
     time_budget_option,
 )
 from grader.core.checkup import TIERS
-from grader.core.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED
+from grader.core.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED, UNUSABLE
 
 if TYPE_CHECKING:
     from grader.classroom.local import MakeScheduler
@@ -119,7 +119,7 @@ def command(  # noqa: PLR0913  one parameter an option
     what was undecided, or all.
 
     Exit codes: 0 everybody was graded, 1 a submission cannot be used, 2 the command or something it was given cannot be
-    used, 3 something failed or was undecided through no fault of a student, 130 interrupted.
+    used, or a rubric has a mistake, 3 something failed or was undecided through no fault of a student, 130 interrupted.
     """
     if scheduler is not None:
         require("--scheduler", "distributed", "dask")
@@ -160,6 +160,10 @@ def command(  # noqa: PLR0913  one parameter an option
         click.echo("interrupted: what was graded is kept, the same command goes on where it was", err=True)
         return INTERRUPTED
     print_result(lambda: summary_json(graded), lambda _: render_summary(graded), as_json=as_json)
+    for mistake, rows in graded.book.author_mistakes.items():
+        count = "1 submission" if len(rows) == 1 else f"{len(rows)} submissions"
+        complain(f"the rubric has a mistake: {mistake} ({count})", kind="error")
+        complain("correct it, and give the same command again", kind="hint")
     return _code(graded)
 
 
@@ -175,9 +179,11 @@ def _scheduler_factory(scheduler: str | None, jobs: int | None) -> AbstractConte
 
 
 def _code(graded: Graded) -> int:
-    """Return the exit code: failures of the grader or the machine take precedence over unusable submissions."""
+    """Return the exit code: mistakes in a rubric come first, then what failed here, then unusable submissions."""
     from grader.classroom.gradebook import Status
 
+    if graded.book.author_mistakes:
+        return UNUSABLE
     if any(graded.book.count(status) for status in (Status.FAILED, Status.UNDECIDED, Status.NOT_RUN)):
         return UNDECIDED
     return NOT_ALL_MET if graded.book.count(Status.REFUSED) else ALL_MET

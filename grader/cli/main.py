@@ -26,6 +26,7 @@ from grader.cli.options import (
     complain,
     drawn_by,
     drawn_with,
+    inputs_options,
     interfaces_option,
     parse_outputs,
     parse_percent,
@@ -63,7 +64,7 @@ if TYPE_CHECKING:
 
 _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
-    "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
+    "given cannot be used, or a rubric has a mistake, 3 undecided through no fault of the student, 130 interrupted."
 )
 _TIERS = ("auto", *TIERS)
 # Environment variable that chooses the sandbox of a machine, such as a container that can have one only.
@@ -183,7 +184,10 @@ def _grade(*, submission: str | None, watch: bool, no_progress: bool, **as_given
     Without one, the current folder is graded if it holds exercise files. A folder with the name of a command is graded
     as ./NAME.
     """
-    started = click.get_current_context().find_object(float) or time.monotonic()
+    context = click.get_current_context()
+    started = context.find_object(float) or time.monotonic()
+    if submission is not None and (context.args or not os.path.exists(submission)):  # noqa: PTH110 - any name is valid
+        _check_submission(submission, context.args)
     from grader.app import start
 
     with ExitStack() as stack:
@@ -193,6 +197,18 @@ def _grade(*, submission: str | None, watch: bool, no_progress: bool, **as_given
                 early = start.opened_early(submission, as_given["rubrics"], as_given["isolation"], progress)
                 session = stack.enter_context(early)
         return _graded(started, session, submission=submission, watch=watch, no_progress=no_progress, **as_given)
+
+
+def _check_submission(submission: str, others: Sequence[str]) -> None:
+    """Raise an error with what was probably meant, if there are several submissions, or none and something like it."""
+    from grader.cli.near_misses import meant_by, too_many
+    from grader.submissions.submission import not_there
+
+    if others:
+        raise too_many(submission, others)
+    hint = meant_by(submission, [name for name in app.commands if name != _DEFAULT])
+    if hint:
+        raise not_there(submission, hint)
 
 
 def _graded(  # noqa: PLR0913  one parameter an option
@@ -347,6 +363,7 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
 @click.option("--odom-bag", type=PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
 @click.option("--isolation", type=click.Choice(_TIERS), default="auto", envvar=_ISOLATION, help="As for grading.")
+@inputs_options
 @interfaces_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
 def _observe(  # noqa: PLR0913  one parameter an option
@@ -356,6 +373,8 @@ def _observe(  # noqa: PLR0913  one parameter an option
     odom_bag: Path | None,
     clock: str,
     isolation: str,
+    sent: tuple[str, ...],
+    simulations: tuple[str, ...],
     interfaces: tuple[Path, ...],
     as_json: bool,
 ) -> int:
@@ -365,9 +384,19 @@ def _observe(  # noqa: PLR0913  one parameter an option
     Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
     """
     from grader.app import observe
+    from grader.app.inputs import read_sent, read_simulations
     from grader.reporting.observed import render_summary, summary_to_json
 
-    request = observe.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation, interfaces)
+    request = observe.ObserveRequest(
+        files,
+        round(duration * 1e9),
+        odom_bag,
+        clock,
+        isolation,
+        interfaces,
+        read_simulations(simulations),
+        read_sent(sent),
+    )
     with shown_progress(wanted=True) as progress:
         summary = observe.observe(request, progress)
     print_result(lambda: summary_to_json(summary), lambda _: render_summary(summary), as_json=as_json)
@@ -395,28 +424,27 @@ def _doctor(*, as_json: bool) -> int:
 
 
 @click.command(name="explain")
-@click.argument("name", metavar="CRITERION", shell_complete=complete_criterion)
+@click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_criterion)
 @click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Look in this rubric; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
-def _explain(*, name: str, rubrics: tuple[Path, ...], as_json: bool) -> int:
-    """Explain a CRITERION, or a check by its name.
+def _explain(*, name: str | None, rubrics: tuple[Path, ...], as_json: bool) -> int:
+    """Explain the criterion or the check NAME; without a name, list all of them.
 
     Says what is asked, in which situation and with which tolerance it is measured, and which part of the chapter asks
     for it.
     """
-    from grader.app.explain import explain
-    from grader.reporting.explained import explanations_to_json, render_explanations
+    from grader.app.explain import everything, explain
+    from grader.reporting.explained import explanations_to_json, list_all, render_explanations
 
-    found = explain(name, rubrics)
-    print_result(
-        lambda: explanations_to_json(found), lambda page: render_explanations(found, width=page.width), as_json=as_json
-    )
+    found = everything(rubrics) if name is None else explain(name, rubrics)
+    render = list_all if name is None else render_explanations
+    print_result(lambda: explanations_to_json(found), lambda page: render(found, width=page.width), as_json=as_json)
     return ALL_MET
 
 
 #: The command `grade`; further subcommands are added to it.
 app = CommandLine(_grade, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
-_grade.context_settings = app.context_settings
+_grade.context_settings = {**app.context_settings, "allow_extra_args": True}
 app.add_command(_observe)
 app.add_command(rejudge.command)
 app.add_command(batch.command)
@@ -447,7 +475,11 @@ def _guarded(run: Callable[[], object]) -> int:
     except click.exceptions.Exit:
         raise
     except click.ClickException as error:
-        _fail(error.format_message().rstrip("."), hint="grade --help lists the options")
+        from grader.cli.near_misses import hint_for
+
+        known = hint_for(error)
+        message = error.message if known else error.format_message()
+        _fail(message.rstrip("."), hint=known or "grade --help lists the options")
         return UNUSABLE
     except GraderError as error:
         # A RubricError lists one mistake per line; in any other message a line break comes from a hostile name.

@@ -128,8 +128,12 @@ def parse_outputs(ctx: click.Context, param: click.Parameter, values: tuple[str,
 
 def _parse_output(value: str) -> Output:
     format_, equals, path = value.partition("=")
-    if not equals or not path:
-        raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}")
+    if not equals or not path or not format_:
+        from grader.cli.near_misses import output_meant
+
+        meant = output_meant(value)
+        likely = f"; did you mean {meant}" if meant else ""
+        raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}{likely}")
     if format_ not in (*FORMATS, EVIDENCE):
         raise click.BadParameter(f"{format_!r} is no format{nearest(format_, [*FORMATS, EVIDENCE])}")
     if format_ == EVIDENCE and path == "-":
@@ -183,6 +187,19 @@ def print_result(to_json: Callable[[], str], render: Callable[[PageLayout], str]
     from grader.reporting.delivery import show
 
     show((lambda _: to_json()) if as_json else render, for_people=not as_json)
+
+
+_SIMULATION = "FILE.py:NAME"
+_SIMULATION_HELP = "A simulation that takes part, or the name of a built-in one; {parameters} follow a =; repeatable."
+
+
+def inputs_options(command: _Command) -> _Command:
+    """Add `--send` and `--simulation`: what programs are given that run without a rubric."""
+    sent = click.option(
+        "--send", "sent", metavar="TOPIC={FIELD: VALUE}", multiple=True, help="A message to send to them; repeatable."
+    )
+    simulation = click.option("--simulation", "simulations", metavar=_SIMULATION, multiple=True, help=_SIMULATION_HELP)
+    return sent(simulation(command))
 
 
 def complain(*lines: str, kind: str = "warning") -> None:

@@ -1,4 +1,4 @@
-"""Runs a Python file that the author of a rubric wrote, and finds the line of an error in it."""
+"""Runs a Python file that the author of a rubric wrote, and says where a mistake in it is."""
 
 from __future__ import annotations
 
@@ -6,6 +6,21 @@ import hashlib
 import sys
 import traceback
 from types import ModuleType
+
+from grader.core.dataclass import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class AuthorMistake:
+    """A mistake in a file that a rubric brings, found while a submission was graded; the rubric's author has to act."""
+
+    file: str  # name of the file, relative to the rubric
+    line: int  # the line that failed, or where the function begins that returned something wrong; 0 if unknown
+    text: str  # what is wrong, in one line
+
+    def __str__(self) -> str:
+        """Place and text, as in messages."""
+        return f"{self.file}:{self.line}: {self.text}" if self.line else f"{self.file}: {self.text}"
 
 
 def run(prefix: str, path: str, content: bytes) -> ModuleType:

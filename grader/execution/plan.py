@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import random
 from collections.abc import Iterable, Iterator, Mapping
 from shlex import quote
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
+from grader.core.projects import Project
 from grader.core.scenario import (
     ActionGoal,
     Between,
@@ -44,10 +46,14 @@ from grader.execution.exchanges import (
     plan_server,
     plan_simulation,
 )
+from grader.student_host.packages import layout_of
 
 if TYPE_CHECKING:
     from grader.core.submission import Submission
 
+#: The most characters of what a process is started with, as JSON. It is handed over as one argument of a program, for
+#: which Linux allows 128 KiB (MAX_ARG_STRLEN, execve(2)); a large parameter file of a course has 10.
+MOST_START_CHARACTERS = 64 << 10
 #: A number to publish, or the limit it lies just above (1) or just below (-1) in the student's own type.
 PlannedNumber = tuple[float, int]
 
@@ -108,6 +114,14 @@ class PlannedStart:
         ros = [*map(quote, self.ros_arguments), *files]
         return " ".join([*map(quote, self.arguments), *(["--ros-args", *ros] if ros else [])])
 
+    @property
+    def problem(self) -> str:
+        """Why no process can be started with this, as a phrase; empty if one can."""
+        given = (self.arguments, self.ros_arguments, self.parameter_files)
+        most = f"{MOST_START_CHARACTERS >> 10} KiB"
+        long = len(json.dumps(given)) > MOST_START_CHARACTERS
+        return f"stopped: its arguments and parameter files have more than {most}" if long else ""
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -144,6 +158,7 @@ class Plan:
             each is in the folder of what was built with it.
         prefixes: The AMENT_PREFIX_PATH of the nodes, first the folder of what the submission's packages share; empty if
             it has none.
+        projects: The ROS packages of the submission, outermost first.
     """
 
     scenario: str
@@ -172,11 +187,17 @@ class Plan:
     interfaces: tuple[str, ...] = ()
     prefixes: tuple[str, ...] = ()
     starts: tuple[PlannedStart, ...] = ()
+    projects: tuple[Project, ...] = ()
     charged: bool = False
 
     def start_of(self, process: str) -> PlannedStart:
         """Return what a process is started with."""
         return next((start for start in self.starts if start.process == process), PlannedStart(process))
+
+    def scripts_of(self, file: str) -> tuple[tuple[str, str, str], ...]:
+        """Return the console scripts of the package that a file is in; none if it is in none."""
+        package = layout_of(self.root, file).package
+        return next((project.scripts for project in self.projects if project.folder == package), ())
 
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage
@@ -226,6 +247,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         may_exit=scenario.may_exit,
         shutdown_ns=scenario.shutdown_ns,
         starts=tuple(start for name in scenario.processes if (start := _start(name, scenario, submission)) is not None),
+        projects=submission.projects,
     )
 
 

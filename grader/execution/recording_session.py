@@ -16,7 +16,7 @@ from grader.core.trace import Trace
 from grader.execution.byte_code import compile_own
 from grader.execution.domains import private_domains, shared_domains
 from grader.execution.pace import keeps_pace
-from grader.execution.real_time_budget import FOREVER_S, RealTimeBudget
+from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.choose import choose_isolation
 from grader.execution.sandbox.protocol import Isolation
@@ -69,7 +69,7 @@ class RecordingSession:
         progress: Callable[[str], None],
         finished: Callable[[Key, Trace], None] | None = None,
         *,
-        budget_s: float = FOREVER_S,
+        budget: RealTimeBudget | None = None,
         under_way: Callable[[], None] = lambda: None,
     ) -> dict[Key, Trace]:
         """Record jobs and return their traces, in the same order.
@@ -84,12 +84,12 @@ class RecordingSession:
             clock: `virtual`, `wall` or `auto`.
             progress: Called with the title of each job that starts.
             finished: Called with each trace once it is final, while others are still being recorded.
-            budget_s: Real time that all jobs may take together.
+            budget: Real time that all jobs may take together; None for any.
             under_way: Called once while jobs are being recorded, for work that need not wait for them.
         """
         from grader.execution.unrunnable import trace_without_run  # noqa: PLC0415 - after a worker has been started
 
-        budget = RealTimeBudget(budget_s)
+        budget = budget or RealTimeBudget()
         known = {key: trace for key, job in jobs.items() if (trace := trace_without_run(job.plan)) is not None}
         to_run = {key: job for key, job in jobs.items() if key not in known}
         first = [Job(job.title, replace(job.plan, stop_when_unfit=clock == AUTO), budget) for job in to_run.values()]

@@ -82,9 +82,18 @@ def _head(page: Page, report: Report, *, verbose: bool) -> None:
 
 
 def _first_to_fix(report: Report) -> tuple[ExerciseReport, Verdict] | None:
-    """Return the criterion that a student should look at first: one on a file that exists, or that has another name."""
-    lost = [(e, v) for e in report.exercises for v in e.verdicts if v.outcome in _LOST and not v.same_cause_as]
+    """Return the criterion that a student should look at first: one on a file that exists, or that has another name.
+
+    An exercise that nothing was handed in for comes first only if there is no other.
+    """
+    begun = [e for e in report.exercises if not all(map(_needs_absent, e.verdicts))] or report.exercises
+    lost = [(e, v) for e in begun for v in e.verdicts if v.outcome in _LOST and not v.same_cause_as]
     return next((found for found in lost if not _is_absent(found[1])), lost[0] if lost else None)
+
+
+def _needs_absent(verdict: Verdict) -> bool:
+    """Return whether a verdict says only that a file is missing."""
+    return bool(verdict.missing_file) or _is_absent(verdict)
 
 
 def _is_absent(verdict: Verdict) -> bool:

@@ -68,9 +68,19 @@ def warnings(report: Report) -> list[str]:
     lines = [_partial(report)] if report.pending else []
     judged = [verdict for e in report.exercises if e.id not in report.pending for verdict in e.verdicts]
     undecided = [verdict for verdict in judged if verdict.outcome is Outcome.UNDECIDED]
-    if undecided:
-        lines.append(_not_final(undecided))
-    return lines
+    causes = {verdict.id: _author_mistake(verdict, judged) for verdict in undecided}
+    lines += [
+        _rubric_wrong(mistake, [verdict for verdict in undecided if causes[verdict.id] == mistake])
+        for mistake in dict.fromkeys(filter(None, causes.values()))
+    ]
+    others = [verdict for verdict in undecided if not causes[verdict.id]]
+    return [*lines, *([_not_final(others)] if others else [])]
+
+
+def author_mistakes(report: Report) -> list[str]:
+    """Return the mistakes of the rubrics' authors that leave criteria undecided, each once, with its place."""
+    found = (verdict.author_mistake for exercise in report.exercises for verdict in exercise.verdicts)
+    return list(dict.fromkeys(filter(None, found)))
 
 
 def summary(report: Report) -> str:
@@ -262,13 +272,35 @@ def _partial(report: Report) -> str:
 
 
 def _not_final(undecided: Sequence[Verdict]) -> str:
-    count = len(undecided)
-    criteria = "1 criterion is" if count == 1 else f"{count} criteria are"
-    open_points = points(sum((v.max_score for v in undecided), Fraction(0)))
+    criteria, open_points = _open(undecided)
     return (
         f"This score is not final: {criteria} undecided through no fault of the student, "
         f"{open_points} points are still open. Grade again."
     )
+
+
+def _rubric_wrong(mistake: str, undecided: Sequence[Verdict]) -> str:
+    criteria, open_points = _open(undecided)
+    return (
+        f"This score is not final: the rubric has a mistake, {shown(mistake)}. Because of it, {criteria} undecided and "
+        f"{open_points} points are still open."
+    )
+
+
+def _open(undecided: Sequence[Verdict]) -> tuple[str, str]:
+    """Return how many criteria are undecided, as the beginning of a clause, and how many points they have."""
+    count = len(undecided)
+    open_points = points(sum((v.max_score for v in undecided), Fraction(0)))
+    return "1 criterion is" if count == 1 else f"{count} criteria are", open_points
+
+
+def _author_mistake(verdict: Verdict, judged: Sequence[Verdict]) -> str:
+    """Return the mistake that leaves a criterion undecided, also through one that it needs; empty if none does."""
+    seen: set[str] = set()
+    while not verdict.author_mistake and verdict.blocked_by not in {"", *seen}:
+        seen.add(verdict.blocked_by)
+        verdict = next((one for one in judged if one.id == verdict.blocked_by), verdict)
+    return verdict.author_mistake
 
 
 def whole_points(scores: Sequence[Fraction], max_scores: Sequence[Fraction]) -> list[tuple[int, int]]:

@@ -54,7 +54,10 @@ def offered(simulated: Simulated) -> Offered:
         raise HarnessError(
             f"the simulation `{simulated.name}` has a period of {one.period!r} ns, expected at least 1 ms"
         )
-    publishes, hears, serves = (dict(call(each)) for each in (one.publishes, one.hears, one.serves))
+    publishes, hears, serves = (
+        call(lambda each=each: dict(each()))  # type: ignore[misc]
+        for each in (one.publishes, one.hears, one.serves)
+    )
     outputs: list[Output] = []
     for number in range(STEPS):
         now = Moment(number * one.period, number * one.period)

@@ -17,18 +17,22 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from . import entry, launch_files, originals
+from . import entry, launch_files, machine, originals
 from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_processes
-from .packages import packages_of
 from .quick_imports import import_without_needless
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
 
 if TYPE_CHECKING:
+    from types import TracebackType
+
     from .wall import WallTime
+
+#: Files whose frames lead to the program's own: this package, and the importing of a module.
+STARTING = (os.path.join(os.path.dirname(__file__), ""), importlib.__file__, "<frozen importlib.")
 
 
 class Host:
@@ -63,6 +67,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
             hide one that it has imported.
     """
     prepared = host is not None
+    machine.install()
     sys.path += request["interfaces"]  # installed packages come first
     host = host or Host(request["clock"])
     link, describer, time = host.link, host.describer, host.time
@@ -112,8 +117,10 @@ def evaluate(request: dict[str, Any]) -> None:
     """Evaluate the launch file that a request names, and report what it describes; never returns.
 
     Args:
-        request: As for `run`, with `launch`: its `arguments`, and the `provided` files of the rubric.
+        request: As for `run`, with `launch`: its `arguments`, the `provided` files of the rubric, and name and
+            folder of the submission's `packages`, outermost first.
     """
+    machine.install()
     link, describer = Link(), Describer()
     link.open(request["fd"])
     describer.set_root(request["root"])
@@ -130,7 +137,8 @@ def evaluate(request: dict[str, Any]) -> None:
     try:
         path = os.path.join(here, request["file"])
         sys.argv = [path]
-        nodes, left_out = launch_files.describe((root, own), path, packages_of(root), dict(told["arguments"]))
+        packages = {name: os.path.join(root, folder).rstrip("/") for name, folder in reversed(told["packages"])}
+        nodes, left_out = launch_files.describe((root, own), path, packages, dict(told["arguments"]))
         found = {"nodes": nodes, "left_out": left_out}
     except BaseException as error:  # whatever the launch file raises becomes a fault
         found = {"fault": describer.exception(error)}
@@ -174,12 +182,20 @@ def play(request: dict[str, Any], describer: Describer, link: Link, install_ros:
         ending["code"] = 130
     except BaseException as error:  # whatever the student's code raises becomes a fault
         ending = {"code": 1, "fault": describer.exception(error)}
+        error.__traceback__ = of_program(error.__traceback__)
         sys.last_type, sys.last_value, sys.last_traceback = type(error), error, error.__traceback__
         sys.excepthook(type(error), error, error.__traceback__)
     with contextlib.suppress(BaseException):
         finish_threads()
         atexit._run_exitfuncs()
     return ending
+
+
+def of_program(frames: TracebackType | None) -> TracebackType | None:
+    """Return a traceback without the frames that started the program, as Python prints it for `python3 FILE`."""
+    while frames is not None and frames.tb_frame.f_code.co_filename.startswith(STARTING):
+        frames = frames.tb_next
+    return frames
 
 
 def forget_modules(root: str) -> None:
@@ -285,6 +301,7 @@ def _named(path: str) -> list[str]:
 def warm_up() -> None:
     """Import what all forks of this process need: interface packages, type supports, numpy's randomness."""
     importlib.import_module("numpy.random")  # seeded in each fork
+    importlib.import_module("uuid")
     for name in (*INTERFACES, *OF_EVERY_NODE):
         for interface in list(vars(importlib.import_module(name)).values()):
             if hasattr(interface, "__import_type_support__"):

@@ -25,8 +25,8 @@ MOST_WORK_NS = 5_000_000
 #: Where the time of work is part of the recording: so much work after each pause takes no time, as it depends on the
 #: machine; and less than this is not worth a report.
 FREE_NS, LEAST_NS = 500_000, 50_000
-#: What work takes beyond its processor time counts if it is more than this, without the time that the thread waited for a
-#: processor: on a busy machine the middleware's threads hold it up as well.
+#: What work takes beyond its processor time counts if it is more than this, without the time that the thread waited for
+#: a processor: on a busy machine the middleware's threads hold it up as well.
 UNEXPLAINED_NS = 3_000_000
 #: How far the host's own clock may advance after the stop signal.
 STOPPING_NS = 60_000_000_000

@@ -7,13 +7,15 @@ import os
 import re
 import stat
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
+from types import MappingProxyType
 
 from grader.core.errors import SubmissionError
 from grader.core.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
 from grader.execution.executables import Executable, executables
 from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, shown
+from grader.submissions.projects import read_projects
 from grader.submissions.staging import collect_folder, read_start, write_files
 
 #: Names at least this similar are shown as a possible misspelling.
@@ -34,7 +36,9 @@ _EXTENSIONS = re.compile(r"(?:\.(?:txt|bak|orig|old|save|py|ipynb))+$")
 _COPY_MARK = re.compile(r"[\s_-]*(?:\(\d+\)|copy|copia|kopie)\s*\d*$")
 
 
-def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission:
+def stage_submission(
+    path: str, wanted: Sequence[str], into: Path, meant: Mapping[str, str] = MappingProxyType({})
+) -> Submission:
     """Copy a submission and find the wanted files in it.
 
     Args:
@@ -42,13 +46,14 @@ def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission
             one archive, that archive is used: learning platforms deliver uploads this way.
         wanted: File names of all exercises being graded; a missing one has the names that look like it.
         into: Empty folder that receives the copy.
+        meant: Wanted file name -> the path inside the submission that is meant, where several files may have the name.
 
     Raises:
         SubmissionError: There is no such path, it is not a folder, archive or .py file, it holds no .py file, a limit
             is exceeded, or an archive cannot be used.
-        HarnessError: The copy cannot be written.
+        HarnessError: The copy cannot be written, or no process can be started that reads project files.
     """
-    return stage_collected(collect_submission(path, wanted, into), path, wanted, into)
+    return stage_collected(collect_submission(path, wanted, into), path, wanted, into, meant)
 
 
 def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collected:
@@ -60,14 +65,17 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
     return _collect_file(source, wanted, where)
 
 
-def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into: Path) -> Submission:
+def stage_collected(
+    collected: Collected, path: str, wanted: Sequence[str], into: Path, meant: Mapping[str, str] = MappingProxyType({})
+) -> Submission:
     """Write files that were read, here or on another machine, and find the wanted ones; raises HarnessError."""
     digest = write_files(collected, into)
-    programs = executables(into) if any("/" in name for name in wanted) or _lacks(wanted, collected) else []
+    projects, problems = read_projects(into) if wanted else ((), ())  # without, it is staged for its digest alone
+    programs = executables(into, projects)
     files = {
         name: _look_for_executable(name, programs, collected.files, wanted)
         if "/" in name
-        else _look_for(name, collected.files, wanted, programs)
+        else _look_for(name, collected.files, wanted, programs, meant.get(name, ""))
         for name in wanted
     }
     several = tuple(note for file in files.values() for note in _notes_on(file))
@@ -77,7 +85,8 @@ def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into
         root=into,
         digest=digest,
         files=files,
-        notes=(*several, *collected.notes),
+        notes=(*several, *collected.notes, *problems),
+        projects=projects,
     )
 
 
@@ -87,12 +96,17 @@ def _mode(path: str, where: str) -> int:
     try:
         return os.stat(path).st_mode  # noqa: PTH116 - a Path would change what was typed, e.g. `x.py/`
     except (FileNotFoundError, NotADirectoryError):
-        text = f"{where}: expected {_EXPECTED}, found nothing there"
-        raise SubmissionError(text, "check the path, and the folder you are in") from None
+        raise not_there(path) from None
     except OSError as error:
         raise SubmissionError(f"{where}: cannot be read: {error.strerror}") from None
     except ValueError:
         raise SubmissionError(f"{where}: expected a path, found one that no file can have") from None
+
+
+def not_there(path: str, hint: str = "") -> SubmissionError:
+    """Return the error for a path at which there is nothing."""
+    text = f"{shown(path, 500)}: expected {_EXPECTED}, found nothing there"
+    return SubmissionError(text, hint or "check the path, and the folder you are in")
 
 
 def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
@@ -114,8 +128,17 @@ def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
             raise SubmissionError(f"{where}: expected at most {MAX_FILE_BYTES >> 20} MiB, found more")
         return Collected(((source.name, content),))
     if kind is None and not source.name.casefold().endswith(ARCHIVE_SUFFIXES):
-        raise SubmissionError(f"{where}: expected {_EXPECTED}, found another kind of file")
+        raise SubmissionError(f"{where}: expected {_EXPECTED}, found another kind of file", _other_kind(source, wanted))
     return _with_python(collect_archive(content, where=where), wanted, where)
+
+
+def _other_kind(source: Path, wanted: Sequence[str]) -> str:
+    """Return a hint for a file that is neither a program nor an archive: a notebook, or a program of another name."""
+    if is_notebook(source.name):
+        return f"{shown(source.name)} is a notebook: {EXPORT_NOTEBOOK}"
+    if any(_similar(name, [source.name], wanted) for name in wanted) or ".py" in source.suffixes:
+        return f"rename {shown(source.name)} so that it ends in .py"
+    return ""
 
 
 def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Collected:
@@ -165,12 +188,6 @@ def _name(source: Path) -> str:
     return source.name if source.name not in ("", "..") else source.resolve().name or "/"
 
 
-def _lacks(wanted: Sequence[str], collected: Collected) -> bool:
-    """Return whether a program is missing that an entry point may stand for."""
-    names = {PurePosixPath(name).name for name, _ in collected.files}
-    return any(name.endswith(".py") and name not in names for name in wanted)
-
-
 def _look_for_executable(
     wanted: str, programs: Sequence[Executable], files: Sequence[tuple[str, bytes]], all_wanted: Sequence[str]
 ) -> StudentFile:
@@ -197,9 +214,15 @@ def _notes_on(file: StudentFile) -> Iterator[str]:
 
 
 def _look_for(
-    wanted: str, files: Sequence[tuple[str, bytes]], all_wanted: Sequence[str], programs: Sequence[Executable]
+    wanted: str,
+    files: Sequence[tuple[str, bytes]],
+    all_wanted: Sequence[str],
+    programs: Sequence[Executable],
+    meant: str,
 ) -> StudentFile:
     names = [name for name, _ in files]
+    if meant in names:
+        return StudentFile(wanted, meant)
     exact = sorted((name for name in names if PurePosixPath(name).name == wanted), key=_nearest_the_top)
     if exact:
         return StudentFile(wanted, exact[0], others=tuple(exact[1:]))

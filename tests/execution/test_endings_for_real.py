@@ -2,7 +2,6 @@
 
 import textwrap
 from collections.abc import Callable
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -361,14 +360,30 @@ def test_the_wall_clock_loses_nothing_either(run: Callable[..., Trace]) -> None:
 
 
 def test_a_spot_check_hears_what_a_short_lived_node_says(run: Callable[..., Trace]) -> None:
-    """The subscription is there before the publisher, which is gone before a look at the graph would have shown it."""
+    """The subscription is there before the publisher, which is gone before a look at the graph would have shown it.
+
+    The program waits until it sees the subscription, and only then creates its publisher.
+    """
     publisher = Endpoint("publisher", "/words", "std_msgs/msg/String", "/talker", 0, "reliable", "volatile")
-    program = TALKER + "time.sleep(0.04)\nburst(publisher, 10)\nraise RuntimeError('over')"
-    # What is sent before discovery has finished is lost, as in reality: with the subscription one time in four,
-    # or two in three on a busy machine; without it, eleven in twelve.
-    heard = (numbers(run(program, clock="wall", bare=True, publishers=(publisher,))) for _ in range(24))
-    whole = islice((one for one in heard if one == list(range(10))), 4)
-    assert len(list(whole)) == 4
+    program = """
+        rclpy.init()
+        node = Node('talker')
+        for _ in range(500):
+            if node.count_subscribers('/words'):
+                break
+            time.sleep(0.05)
+        else:
+            raise RuntimeError('nobody subscribes')
+        publisher = node.create_publisher(String, '/words', 10)
+        while not publisher.get_subscription_count():
+            time.sleep(0.001)
+        burst(publisher, 10)
+        publisher.wait_for_all_acked()
+        raise RuntimeError('over')
+        """
+    trace = run(program, clock="wall", bare=True, publishers=(publisher,), duration_ns=60 * NS_PER_S)
+    assert numbers(trace) == list(range(10))
+    assert [fault.text for fault in trace.faults()] == ["RuntimeError: over"]
 
 
 @pytest.mark.parametrize("options", ["", "signal_handler_options=rclpy.signals.SignalHandlerOptions.NO"])

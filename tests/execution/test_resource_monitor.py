@@ -95,7 +95,7 @@ def test_messages_that_fill_the_worker_end_the_nodes(machine: dict[int, Usage]) 
         machine[os.getpid()] = Usage(memory_bytes=module.UNREAD_BYTES + MIB)
         for student in students:
             student.held.wait(30)
-    assert {s.stopped for s in students} == {"stopped at 512 MiB of messages that were under way at once"}
+    assert {s.stopped for s in students} == {"stopped at 224 MiB of messages that were under way at once"}
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,7 @@ from rich.cells import cell_len
 
 from grader.core.chart import Excerpt
 from grader.core.exercise import Audience, Location, Outcome
+from grader.core.quantities import NS_PER_S
 from grader.core.report import ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.core.trace import GraphSnapshot, ServiceEnd
 from grader.reporting.escape import shown
@@ -196,6 +197,15 @@ def test_a_file_that_is_not_there_comes_after_one_that_is() -> None:
     assert render(report(renamed, located())).splitlines()[1] == "Fix first: b.py: not in the submission"
 
 
+def test_an_exercise_that_was_not_begun_is_never_the_first_to_fix() -> None:
+    """A folder with the files of one exercise, all of it right, has nothing to fix first."""
+    absent = exercise("f", "2", "F", *missing("b.py"))
+    right = exercise("g", "1", "G", criterion("r", "R", 5, Outcome.MET, reason="fine"))
+    assert "Fix first" not in render(report(right, absent))
+    partner = exercise("h", "3", "H", *missing("c.py"), criterion("r", "R", 5, Outcome.MET, reason="fine"))
+    assert "Fix first: c.py: not in the submission" in render(report(absent, partner))
+
+
 def missing(file: str, **evidence: str) -> tuple[Verdict, Verdict]:
     known = {"missing": file, "similar": [], **evidence}
     first = criterion("f", "F", 5, Outcome.NOT_MET, reason=f"{file}: not in the submission", evidence=known)
@@ -332,20 +342,24 @@ def test_a_narrow_graph_breaks_at_the_node() -> None:
 
 
 def test_services_are_drawn_from_client_to_server() -> None:
-    """One line each; what nobody calls or serves is told, and parts of actions are left out."""
+    """One line each; what nobody calls or serves is told, and an action is one line although it has five services."""
     kind = "std_srvs/srv/Trigger"
     ends = (
         ServiceEnd("client", "/battery", kind, "/a"),
         ServiceEnd("client", "/lost", kind, "/a"),
         ServiceEnd("client", "/mixed", "std_srvs/srv/Empty", "/a"),
         ServiceEnd("service", "/battery", kind, "/b"),
-        ServiceEnd("service", "/count/_action/send_goal", kind, "/b"),
+        *(ServiceEnd("service", f"/count/_action/{part}", kind, "/b") for part in ("cancel_goal", "send_goal")),
+        ServiceEnd("client", "/count/_action/send_goal", kind, "/a"),
+        ServiceEnd("client", "/follow/_action/send_goal", kind, "/a"),
         ServiceEnd("service", "/mixed", kind, "/b"),
     )
     assert draw_graph(GraphSnapshot(0, ("/a", "/b", "/idle"), (), ends), width=80) == [
         "/a ┄┄/battery┄┄▶ /b",
+        "/a ══/count══▶ /b",
         "/a ┄┄/lost┄┄▶ (nobody)",
         "/a ┄┄/mixed┄┄▶ (nobody)",
+        "/a ══/follow══▶ (nobody)",
         "(nobody) ┄┄/mixed┄┄▶ /b",
         "/idle (no topics)",
     ]
@@ -370,6 +384,28 @@ def test_loose_ends_and_quarrels_are_drawn() -> None:
         "(nobody) ──/mute──▶ /b",
         "/idle (no topics)",
     ]
+
+
+@pytest.mark.parametrize(
+    ("offered", "requested", "said"),
+    [
+        ({"reliability": "best_effort"}, {}, "best_effort reliability offered, reliable requested"),
+        ({}, {"durability": "transient_local"}, "volatile durability offered, transient_local requested"),
+        ({}, {"deadline_ns": NS_PER_S}, "no deadline offered, 1 s requested"),
+        ({"deadline_ns": 2 * NS_PER_S}, {"deadline_ns": NS_PER_S}, "a deadline of 2 s offered, 1 s requested"),
+        ({}, {"liveliness": "manual_by_topic"}, "automatic liveliness offered, manual_by_topic requested"),
+        ({"deadline_ns": NS_PER_S, "durability": "transient_local"}, {"deadline_ns": NS_PER_S}, ""),
+        ({"liveliness": "manual_by_topic"}, {"reliability": "best_effort"}, ""),
+    ],
+)
+def test_incompatible_qos_is_drawn(offered: dict[str, Any], requested: dict[str, Any], said: str) -> None:
+    """No message passes, although topic and type agree."""
+    ends = (
+        replace(endpoint("publisher", "/t", "/a"), **offered),
+        replace(endpoint("subscription", "/t", "/b"), **requested),
+    )
+    lines = draw_graph(GraphSnapshot(0, ("/a", "/b"), ends), width=80)
+    assert lines == ["/a ──/t──▶ /b", *([f"  incompatible QoS: {said}"] if said else [])]
 
 
 def test_a_flood_of_topics_is_counted() -> None:

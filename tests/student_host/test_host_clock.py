@@ -278,7 +278,7 @@ def test_looks_at_different_clocks_are_in_order() -> None:
 
 
 def test_looks_of_libraries_take_no_time() -> None:
-    """Their number is theirs: a coroutine that sleeps is woken as exactly as a thread, and may look at the loop's clock."""
+    """Their number is theirs: a coroutine is woken as exactly as a thread, and may look at the clock of its loop."""
     assert play("""
         import asyncio, logging, time
         async def main():

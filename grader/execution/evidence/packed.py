@@ -12,6 +12,7 @@ from typing import Any, TypeAlias, Union, get_type_hints
 
 import msgspec
 
+from grader.core.author_files import AuthorMistake
 from grader.core.errors import EvidenceError, HarnessError
 from grader.core.trace import (
     ClockKind,
@@ -140,6 +141,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("may_drift", bool, False),
         ("most_starved_ns", int, 0),
         ("left_out", tuple[str, ...], ()),
+        ("author_mistake", AuthorMistake | None, None),
     ]
     return msgspec.defstruct("Trace", written)
 
@@ -160,6 +162,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         may_drift=row.may_drift,
         most_starved_ns=row.most_starved_ns,
         left_out=row.left_out,
+        author_mistake=row.author_mistake,
     )
 
 
