@@ -279,6 +279,8 @@ class Trace:
     # Sentences that readers must know (entry without a guard, a limit reached, lost messages)
     notes: tuple[str, ...] = ()
     harness_problem: str = ""  # a failure of the grader or the machine that prevents judging; empty if there was none
+    # Whether what the submission does may be why there is a harness problem
+    suspected: bool = False
     starts: tuple[Start, ...] = ()  # how each process was started; empty in traces of earlier versions
     # Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence
     reached: tuple[str, ...] = ()

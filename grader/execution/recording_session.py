@@ -138,8 +138,13 @@ def workers_for(processors: int, more: int = MORE_ALONE) -> int:
 
 
 def _unfit(trace: Trace, clock: str) -> bool:
-    """Return whether a first recording has to be repeated on the wall clock."""
-    return clock == AUTO and bool(trace.clock_reason) and not trace.harness_problem
+    """Return whether a first recording has to be repeated on the wall clock.
+
+    A failure of the grader's own code that makes virtual time unsuitable is not one of the wall clock, where little of
+    that code runs.
+    """
+    failed = trace.harness_problem not in ("", trace.clock_reason)
+    return clock == AUTO and bool(trace.clock_reason) and not failed
 
 
 def _doubtful(trace: Trace, clock: str) -> bool:

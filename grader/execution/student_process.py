@@ -19,7 +19,7 @@ from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.quantities import size
 from grader.core.trace import Fault, FaultKind, LogRecord, OutputLine, Start
-from grader.execution.ending import ended_by, exited, limit_behind
+from grader.execution.ending import ended_by, exited, graders_fault, limit_behind
 from grader.execution.notes import Places, hidden_notes, note_of, start_of
 from grader.execution.sandbox.protocol import Command
 from grader.execution.sandbox.starter import StartedProcess
@@ -90,6 +90,7 @@ class NodeProcess:
         prefix: The folder below which its packages are installed; empty if it has none.
         own_folder: The folder of its home and its temporary files; empty if it has none.
         start_told: How its file is started, as it reported before it ran any of the student's code.
+        grader_failed: What failed in the grader's own code in the process, as it reports; empty if nothing did.
         reached: Names of audit events that its program raised, as it reports.
     """
 
@@ -125,6 +126,7 @@ class NodeProcess:
     prefix: str = ""
     own_folder: str = ""
     start_told: Start | None = None
+    grader_failed: str = ""
     reached: list[str] = field(default_factory=list)
     _pending: bytes = b""
     _streams: dict[str, bytearray] = field(default_factory=lambda: {"stdout": bytearray(), "stderr": bytearray()})
@@ -249,7 +251,10 @@ class NodeProcess:
             data = json.loads(line.decode())
         except (ValueError, RecursionError):
             return None
-        return data if isinstance(data, dict) else None
+        if not isinstance(data, dict):
+            return None
+        self.grader_failed = self.grader_failed or graders_fault(self.name, data.get("fault"))
+        return data
 
     def reports(self) -> list[dict[str, Any] | None]:
         """Return the reports that have arrived, without waiting; the last one is None if the process has ended."""

@@ -60,6 +60,19 @@ MODULE = b"grader.execution.worker_main"
 _CREDENTIALS = struct.Struct("3i")
 
 
+class WorkerFailedError(HarnessError):
+    """A worker reported a failure of its own.
+
+    Args:
+        message: Description of the failure.
+        has_started: Whether any of the submission's code had started by then.
+    """
+
+    def __init__(self, message: str, *, has_started: bool) -> None:
+        super().__init__(message)
+        self.has_started = has_started
+
+
 class WorkerLostError(HarnessError):
     """A worker ended, or did not answer.
 
@@ -142,7 +155,8 @@ class Worker(ABC):
         if not isinstance(answer, dict) or "trace" not in answer:
             problem = str(answer.get("problem", "")) if isinstance(answer, dict) else ""
             lines = problem.strip().splitlines()
-            raise HarnessError(f"worker: {lines[-1] if lines else 'expected a trace, found none'}"[:600])
+            what = f"worker: {lines[-1] if lines else 'expected a trace, found none'}"[:600]
+            raise WorkerFailedError(what, has_started=isinstance(answer, dict) and answer.get("has_started") is True)
         self.worn = answer.get("worn") is True
         real_ns, starved_ns = (answer.get(name) for name in ("real_ns", "starved_ns"))
         if isinstance(real_ns, int) and isinstance(starved_ns, int):
@@ -454,6 +468,7 @@ class Recorder:
     def _recorded(self, job: Job) -> Trace:
         problem = ""
         limits: list[str] = []
+        with_submission = 0  # failures after its code had started, as far as that is known
         tries = 0
         while tries < TRIES:
             if not job.budget.left_ns:
@@ -478,6 +493,8 @@ class Recorder:
                 self._discard(worker)
                 limit, late = (error.limit, error.late) if isinstance(error, WorkerLostError) else ("", False)
                 limits += [limit] if limit else []
+                started = isinstance(error, WorkerFailedError) and error.has_started
+                with_submission += started or (isinstance(error, WorkerLostError) and not late)
                 tries += worker is None or not worker.shares or bool(limit)  # a replacement does not share its sandbox
                 if late or self._closed:
                     break
@@ -496,7 +513,10 @@ class Recorder:
                 for name, _ in job.plan.processes
             )
             return Trace(job.plan.scenario, clock, stop_ns=job.plan.duration_ns, observations=faults)
-        return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
+        suspected = with_submission >= TRIES
+        if suspected:
+            problem += f" ({with_submission} times, each time in another worker, while this submission was recorded)"
+        return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem, suspected=suspected)
 
     def _drops_place(self) -> bool:
         """Return whether a worker is not replaced until none is busy: the others go on, and a start takes long."""

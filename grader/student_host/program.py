@@ -61,8 +61,8 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
 
     Args:
         request: `fd` of the socket, `root` and `file` of the submission, `clock` and whether work is `charged` to it,
-            `seed` (hex), `log_format`, `limits`,
-            and `interfaces`, the folders of interface packages that are not installed.
+            `seed` (hex), `log_format`, `limits`, `steady_ns` of `VirtualTime.start`, and `interfaces`, the folders of
+            interface packages that are not installed.
         host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
             hide one that it has imported.
     """
@@ -91,9 +91,9 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     start = link.ask(ready)
     ready.clear()
     if isinstance(time, VirtualTime):
-        time.start(start["now_ns"], charged=request["charged"])
+        time.start(start["now_ns"], request["steady_ns"], charged=request["charged"])
     else:
-        time.start(start["now_ns"])
+        time.start(start["now_ns"], request["steady_ns"])
     watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
     if isinstance(time, VirtualTime) and watchdog is not None:
         watchdog.start()
@@ -102,14 +102,17 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
         time.give_up_outside = watchdog.give_up_outside
         Watch(link, request["root"]).install()
     ending = play(request, describer, link, install_ros)
-    time.finish()
-    with contextlib.suppress(BaseException):
-        forget_modules(request["root"])
-    if watchdog is not None:
-        watchdog.stop()
-    left = time.end()
+    try:
+        time.finish()
+        with contextlib.suppress(BaseException):
+            forget_modules(request["root"])
+        if watchdog is not None:
+            watchdog.stop()
+        ending = {"left": time.end(), **ending, **time.summary()}
+    except Exception as error:  # no code of the student runs here that could raise
+        ending = {"fault": describer.exception(error), **ending, "code": 1, "left": False}
     flush()
-    link.send({"kind": "exited", "left": left, **ending, **time.summary()})
+    link.send({"kind": "exited", **ending})
     originals.exit_now(0)
 
 

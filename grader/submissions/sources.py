@@ -11,7 +11,7 @@ from pathlib import Path
 
 from grader.core.submission import Submission
 from grader.judging.source import LONGEST_SOURCE, Source, chain, read
-from grader.submissions.revealing import orders, read_attributes, shown_functions
+from grader.submissions.revealing import ORDER, orders, read_attributes, shown_functions
 
 
 def _words(text: str) -> frozenset[str]:
@@ -58,6 +58,8 @@ _ATTRIBUTES = _words(
     "tm_yday year month day toordinal fromordinal "
     "__traceback__ tb_next relativeCreated"
 )
+#: The names of what depends on the hashes of a process.
+HASHES = frozenset((ORDER, "hash"))
 #: Built-in functions that run code or look up names at run time.
 _BUILTINS = _words("exec eval compile __import__ globals locals vars dir memoryview breakpoint id hash")
 #: Functions that classify an object; applied to a module's function, they reveal that it was replaced.
