@@ -37,7 +37,7 @@ class WallRunner(Runner):
     """Runs one plan on the real clock; see `Runner`."""
 
     clock = ClockKind.WALL
-    clock_reason = "it was asked for"
+    clock_reason = "it was requested"
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)

@@ -141,7 +141,7 @@ def test_a_pointer_over_answers_is_told_what_was_expected(visit: Open) -> None:
     page, _, _ = visit(render_html(graded.perfect()))
     unfold(page)
     figure = page.locator(
-        "figure", has=page.get_by_role("heading", name="What came on /temperature and what was published on /fan_speed")
+        "figure", has=page.get_by_role("heading", name="Messages received on /temperature and messages published on /fan_speed")
     )
     figure.locator(".drawing").focus()
     page.keyboard.press("ArrowRight")
