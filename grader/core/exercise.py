@@ -254,6 +254,26 @@ def reads_sources(check: object) -> TypeGuard[SourceCheck]:
     return callable(getattr(check, "judge_sources", None))
 
 
+class BeginningCheck(Protocol):
+    """A check that judges the beginning of a recording in another way than a whole one.
+
+    Spot checks judge the first seconds of a scenario, recorded again on the wall clock. Any other check judges them as
+    it judges a whole recording, and counts only if the same seconds in virtual time suffice for it.
+    """
+
+    def of_beginning(self) -> Check | None:
+        """Return the check that judges a beginning; None if only a whole recording shows what this check asks."""
+
+
+def of_beginning(check: Check) -> Check | None:
+    """Return the check that judges the beginning of a recording on the wall clock; None if none can."""
+    declared = getattr(check, "of_beginning", None)
+    if not callable(declared):
+        return check
+    found: Check | None = declared()
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Criterion:
     """One row of a rubric."""
@@ -286,6 +306,7 @@ class Exercise:
     by_request: bool = False  # whether it is graded only on request
     variant: Variant | None = None  # the values for this student; None if nothing varies
     interfaces: tuple[str, ...] = ()  # paths of the folders with interface packages that the rubric brings
+    bonus: Fraction = Fraction(0)  # points above the maximum that an instructor may give
 
     @property
     def plays_odometry(self) -> bool:

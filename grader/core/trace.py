@@ -279,6 +279,8 @@ class Trace:
     # Sentences that readers must know (entry without a guard, a limit reached, lost messages)
     notes: tuple[str, ...] = ()
     harness_problem: str = ""  # a failure of the grader or the machine that prevents judging; empty if there was none
+    # Whether what the submission does may be why there is a harness problem
+    suspected: bool = False
     starts: tuple[Start, ...] = ()  # how each process was started; empty in traces of earlier versions
     # Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence
     reached: tuple[str, ...] = ()
@@ -290,6 +292,8 @@ class Trace:
     incomplete: bool = False
     # The mistake in a simulation of the rubric's author that prevents judging, as `harness_problem` does; None without
     author_mistake: AuthorMistake | None = None
+    # In virtual time, whether the work of a node before its pauses may slow it down: a reason to record again
+    may_drift: bool = False
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -131,6 +132,7 @@ def build_confined(  # noqa: PLR0913  where it runs, what it reads, where it wri
         done = subprocess.run(
             command.argv,
             env=dict(command.environment),
+            pass_fds=command.pass_fds,
             input=json.dumps(request).encode(),
             capture_output=True,
             check=False,
@@ -145,6 +147,9 @@ def build_confined(  # noqa: PLR0913  where it runs, what it reads, where it wri
         raise HarnessError(text, "try again later") from None
     except OSError as error:
         raise HarnessError(f"interfaces: expected them to be built, found {type(error).__name__}") from error
+    finally:
+        for descriptor in command.opened_fds:
+            os.close(descriptor)
     if done.returncode in _AT_A_LIMIT or b"MemoryError" in done.stderr[-200:]:
         limits_ = f"{PROCESSOR_S} s of processor time and {size(MEMORY_BYTES)} of memory"
         return Build({}, problems=(f"{_NOT_USED}: building them takes more than {limits_}",))

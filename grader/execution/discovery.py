@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 from grader.core.trace import GraphSnapshot
@@ -310,8 +311,9 @@ class Discovery:
         if expected == student.told and not ((student.renewed or student.unmatched) and expected):
             return
         student.told, student.renewed = expected, False
-        student.tell({"match": expected, "gone": gone, "wait_s": self.patience.wait_s})
-        answer = student.report()
+        with nullcontext() if student.workload is None else student.workload.beside():
+            student.tell({"match": expected, "gone": gone, "wait_s": self.patience.wait_s})
+            answer = student.report()
         if answer is None or answer.get("kind") != "matched":
             self._mark_dead(student)
             return

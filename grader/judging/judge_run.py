@@ -8,7 +8,15 @@ from fractions import Fraction
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
-from grader.core.report import AUTHOR_MISTAKE, NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
+from grader.core.report import (
+    AUTHOR_MISTAKE,
+    NOT_JUDGED,
+    SUBMISSION_SUSPECTED,
+    ExerciseReport,
+    Report,
+    ReportedFault,
+    Verdict,
+)
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import EXPORT_NOTEBOOK, Run, Submission, is_notebook
 from grader.core.trace import ClockKind, Fault, GraphSnapshot, StartWay, Trace
@@ -170,6 +178,7 @@ class VerdictBuilder:
             evidence: dict[str, object] = {"error": answer.error} if answer.error else {}
             evidence |= {AUTHOR_MISTAKE: asdict(answer.mistake)} if answer.mistake is not None else {}
             evidence |= {FAULT_KEY: fault_evidence(answer.fault)} if answer.fault is not None else {}
+            evidence |= {SUBMISSION_SUSPECTED: True} if answer.suspected else {}
             problem, hint = answer.problem, answer.hint
             return _without_points(criterion, Outcome.UNDECIDED, problem, hint=hint, evidence=evidence)
         return self._found(criterion, answer.finding)

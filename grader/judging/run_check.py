@@ -8,7 +8,7 @@ from dataclasses import replace
 from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Check, Criterion, Exercise, Finding, reads_sources
+from grader.core.exercise import Check, Criterion, Exercise, Finding, of_beginning, reads_sources
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import Submission
 from grader.core.trace import Fault, FaultKind, Request, Response, Trace
@@ -41,6 +41,7 @@ class Answer:
         mistake: The mistake of the rubric's author; set together with `problem`.
         hint: One thing to do about the problem; empty if nothing is very likely right.
         fault: The fault that shows the problem; None if none does.
+        suspected: Whether what the submission does may be why there is a problem.
     """
 
     finding: Finding | None = None
@@ -50,6 +51,7 @@ class Answer:
     mistake: AuthorMistake | None = None
     hint: str = ""
     fault: Fault | None = None
+    suspected: bool = False
 
 
 def check_name(criterion: Criterion) -> str:
@@ -95,7 +97,16 @@ def _unrecorded(scenario: Scenario, trace: Trace | None) -> Answer:
         return Answer(problem=f"the scenario {scenario.id} was not recorded")
     if trace.author_mistake is not None:
         return _author_mistake(trace.author_mistake)
-    return Answer(problem=trace.harness_problem)
+    return Answer(problem=trace.harness_problem, suspected=trace.suspected)
+
+
+def for_beginning(criterion: Criterion) -> Criterion | None:
+    """Return a criterion that judges the beginning of a recording; None if its check says that none can."""
+    try:
+        check = of_beginning(criterion.check)
+    except Exception:  # a check of a rubric's own that fails here is not compared, and costs no points
+        return None
+    return None if check is None else replace(criterion, check=check, check_name=check_name(criterion))
 
 
 def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
@@ -105,7 +116,8 @@ def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sourc
     """
     lost = answer.finding is not None and answer.finding.credit < 1
     if lost and trace.left_out:
-        return Answer(problem=f"{trace.left_out[0]}, which can be why this is not met", hint=_LEFT_OUT_HINT)
+        problem = f"{trace.left_out[0]}, which can be why this is not met"
+        return Answer(problem=problem, hint=_LEFT_OUT_HINT, suspected=True)
     lack = lacking_package(trace, scenario.processes, sources) if lost else None
     if lack is None:
         return answer

@@ -81,6 +81,7 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     if layout.module:
         _find_neighbours(tree, path, notify)
     sys.argv = [path, *command_line(request)]
+    sys.orig_argv = [sys.executable, *sys.argv]
     if start.way in (SCRIPT, MODULE):
         run_what_nothing_called(_run_as_main(path, start.module, layout), tree, notify)
         return

@@ -127,7 +127,7 @@ def test_reads_types_values_and_comments() -> None:
         ("int32 a\nint32 a", 2, "used twice", "another"),
         ("uint8 A=256", 1, "'256' is not of type uint8", "from 0 to 255"),
         ("int32 a b", 1, "'b' is not of type int32", "whole number"),
-        ("float64 X=nan", 1, "no number", "0.5"),
+        ("float64 X=nan", 1, "not a number", "0.5"),
         ("int32[2] a [1, 2, 3]", 1, "3 elements", "says 2"),
         ("int32<=5 a", 1, "greatest length", "int32[<=5]"),
         ("int32[0] a", 1, "length of 0", "from 1"),

@@ -124,7 +124,7 @@ def test_types_that_differ_are_said_exactly() -> None:
     assert finding.credit == 0
     assert finding.reason == (
         "/temperature: temperature_sensor.py publishes std_msgs/msg/Float32, "
-        "fan_controller.py subscribes std_msgs/msg/Float64: so no message arrives"
+        "fan_controller.py subscribes std_msgs/msg/Float64, so no message arrives"
     )
 
 
@@ -134,7 +134,7 @@ def test_policies_that_differ_are_said_exactly() -> None:
     rec.endpoint("publisher", "/temperature", node="/a", participant=1, reliability="best_effort")
     rec.endpoint("subscription", "/temperature", node="/b", participant=2)
     reason = CHECK.judge(rec.trace()).reason
-    assert "/a offers best_effort reliability, /b asks for reliable: so no message arrives" in reason
+    assert "/a offers best_effort reliability, /b asks for reliable, so no message arrives" in reason
 
 
 def answered(values: list[float]) -> Recording:
@@ -167,11 +167,11 @@ def test_a_slow_random_walk_need_not_reach_the_threshold(seed: int, step: float)
     [
         (
             {"reliability": "best_effort"},
-            "/b offers best_effort reliability, /a asks for reliable: so no message arrives",
+            "/b offers best_effort reliability, /a asks for reliable, so no message arrives",
         ),
         (
             {"type_": FLOAT64},
-            "/b publishes std_msgs/msg/Float64, /a subscribes std_msgs/msg/Float32: so no message arrives",
+            "/b publishes std_msgs/msg/Float64, /a subscribes std_msgs/msg/Float32, so no message arrives",
         ),
     ],
 )
@@ -205,7 +205,7 @@ def test_silence_is_explained() -> None:
     assert "carries no number" in CHECK.judge(rec.trace()).reason
 
 
-@pytest.mark.parametrize(("behind", "said"), [(2, "2 messages before"), (7, "7 messages before")])
+@pytest.mark.parametrize(("behind", "said"), [(2, "2 messages earlier"), (7, "7 messages earlier")])
 def test_answers_to_an_earlier_value_are_recognised(behind: int, said: str) -> None:
     """A controller that compares the previously stored value gets a hint."""
     rec, sent = sensor()

@@ -339,7 +339,7 @@ class ReactsToResponses:
             return None
         reason = f"{self.process}: it warns after {number(low.number or 0.0)}, but {_nothing_of_its_own(self, words)}, "
         reason += "so nothing shows that it aborts"
-        hint = "log that the mission starts, in the branch for numbers above the limit only"
+        hint = "log that it goes on, in the branch for numbers above the limit only"
         return not_met(reason, evidence, hint=hint, blocked_by="reacts_to_responses", problem=ProblemKind.WRONG_ANSWER)
 
     def _right(self, trace: Trace, mine: Sequence[Episode], words: Words, evidence: dict[str, object]) -> Finding:
@@ -441,7 +441,7 @@ class NoGoWithoutAnswer:
             found = [o for o in going.outputs(episode) if not self._due(o, episode, episodes, going)]
             if found:
                 return self._went_on(episode, found[0], evidence)
-        reason = f"{self.process}: starts nothing after {counted(len(useless), 'useless answer')}"
+        reason = f"{self.process}: does not go on after {counted(len(useless), 'useless answer')}"
         reason += f" ({', '.join(dict.fromkeys(_SAID[e.kind] for e in useless))})"
         fault = first_fault(trace, self.process)
         if fault is not None and fault.t_ns >= useless[0].asked_ns:
@@ -460,17 +460,15 @@ class NoGoWithoutAnswer:
         return not any(text_of(o) in going.texts for o in before.sure)
 
     def _unshown(self, episode: Episode, words: Words, evidence: dict[str, object]) -> Finding:
-        reason = (
-            f"{self.process}: {_nothing_of_its_own(self, words)}, so nothing shows that it starts no mission after "
-        )
+        reason = f"{self.process}: {_nothing_of_its_own(self, words)}, so nothing shows that it does not go on after "
         reason += _SAID[episode.kind]
-        hint = "log that the mission starts, in the branch for numbers above the limit only"
+        hint = "log that it goes on, in the branch for numbers above the limit only"
         return not_met(reason, evidence, hint=hint, blocked_by="reacts_to_responses", problem=ProblemKind.WRONG_ANSWER)
 
     def _went_on(self, episode: Episode, found: Output, evidence: dict[str, object]) -> Finding:
         what = _SAID[episode.kind]
         reason = f"{moment(found.t_ns)}, {self.process}: {quote(found.text, 80)!r} after {what} "
-        reason += f"(request {episode.place}), the same text as when it starts a mission; expected that it starts none"
+        reason += f"(request {episode.place}), the same text as when it goes on; expected it not to go on"
         hint = "go on only if there is a response, response.success is true and its number could be read"
         return not_met(reason, evidence | {"first_wrong_s": seconds(found.t_ns)}, hint=hint)
 
