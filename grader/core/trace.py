@@ -76,6 +76,11 @@ def main_not_called(file: str, line: int = 0) -> str:
     return f"{problem}; add: if __name__ == '__main__': main()"
 
 
+def same_node_name(name: str) -> str:
+    """Return the note on a name that the nodes of two processes have."""
+    return f"two nodes have the name {name}, and ROS cannot tell them apart: give each a name of its own"
+
+
 @dataclass(frozen=True, slots=True)
 class Message:
     """One message that a student's node published."""

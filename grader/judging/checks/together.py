@@ -316,12 +316,19 @@ def _kept_apart(trace: Trace, topic: str) -> Finding | None:
 
 
 def _speakers(trace: Trace, here: Endpoint, there: Endpoint) -> tuple[str, str]:
-    """Return the files of two nodes if logs or names identify both, else the nodes."""
+    """Return the files of two processes if names and logs identify both, else their nodes."""
     files = _file_of(trace, here), _file_of(trace, there)
-    return (files[0], files[1]) if files[0] and files[1] else (quote(here.node), quote(there.node))
+    if files[0] and files[1] and files[0] != files[1]:
+        return files[0], files[1]
+    one, other = quote(here.node), quote(there.node)
+    return one, other if one != other else f"another node named {other}"
 
 
 def _file_of(trace: Trace, endpoint: Endpoint) -> str:
+    """Return the file whose process an endpoint belongs to; empty if its node has a name that another one has too."""
+    everything = [e for kind in ("publisher", "subscription") for e in student_endpoints(trace, kind)]
+    if len({e.participant for e in everything if e.node == endpoint.node}) > 1:
+        return ""
     bare = endpoint.node.strip("/").replace("/", ".")
     for record in trace.records():
         if record.logger == bare:

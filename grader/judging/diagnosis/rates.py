@@ -120,6 +120,24 @@ def _callback_held_up(paced: _Paced) -> Clue | None:
     return _held_up_now_and_then(paced)
 
 
+@rule(TopicRate, given=_paced)
+def _loops_in_callback(paced: _Paced) -> Clue | None:
+    """The callback of the timer publishes in a loop that never ends."""
+    for timer in paced.timers():
+        for node in runs(paced.source, timer):
+            if not isinstance(node, ast.While) or not _endless(node) or not set(paced.calls) & set(ast.walk(node)):
+                continue
+            name = paced.source.function_name(node) or "the callback"
+            hint = f"the loop '{head_of(paced.source, node)}' keeps {name} from returning: "
+            return Clue(f"{hint}take the loop away, the timer calls {name} again", paced.source.place(node))
+    return None
+
+
+def _endless(loop: ast.While) -> bool:
+    plain = isinstance(loop.test, ast.Constant) or chain(getattr(loop.test, "func", None)) == "rclpy.ok"
+    return plain and not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in ast.walk(loop))
+
+
 def _held_up_now_and_then(paced: _Paced) -> Clue | None:
     """A callback sleeps on a condition, or another one does, as long as the longest pause between messages."""
     source, longest = paced.source, paced.case.evidence("max_s")
