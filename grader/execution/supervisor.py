@@ -41,7 +41,7 @@ from grader.execution.sandbox.environment import worker_environment
 from grader.execution.sandbox.exposure import worker_view
 from grader.execution.sandbox.protocol import Isolation
 from grader.execution.sandbox.starter import starter_command
-from grader.execution.usage import FULL_BYTES, FULL_CODE, families, usage
+from grader.execution.usage import FULL_BYTES, FULL_CODE, families, processor_words, usage, worker_processor_s
 
 if TYPE_CHECKING:
     from grader.execution.plan import Plan
@@ -150,7 +150,8 @@ class Worker(ABC):
             raise WorkerLostError(f"{expected} (it had filled {what})", limit=what) from error
         except EOFError as error:
             end = self._end()
-            limits = {"SIGXCPU": plan.limits.processor_words(), f"code {FULL_CODE}": f"{size(FULL_BYTES)} of memory"}
+            own_s = worker_processor_s(plan.limits, plan.duration_ns + plan.wait_at_most_ns)
+            limits = {"SIGXCPU": processor_words(own_s), f"code {FULL_CODE}": f"{size(FULL_BYTES)} of memory"}
             limit = limits.get(end, "")
             raise WorkerLostError(f"{expected} (ended by {end})", limit=limit) from error
         except (OSError, ValueError, RecursionError) as error:

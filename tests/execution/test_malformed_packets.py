@@ -18,7 +18,7 @@ pytestmark = pytest.mark.ros
 
 WRITER = b"<of>"
 ONE = struct.pack("<iI", 0, 1)
-#: Submessages by kind with a plausible body (DDSI-RTPS 2.3, 9.4.5): the reader is everybody, the writer the sender's own.
+#: Submessages by kind with a plausible body (DDSI-RTPS 2.3, 9.4.5): for every reader, from the sender's own writer.
 BODIES = {
     0x06: bytes(4) + WRITER + ONE + struct.pack("<III", 32, 0xFFFFFFFF, 7),  # acknowledges
     0x07: bytes(4) + WRITER + ONE + struct.pack("<iII", 0, 50, 7),  # has messages 1 to 50
@@ -92,9 +92,13 @@ def test_malformed_packets_cost_only_their_sender(run: Callable[..., Any]) -> No
     assert (after.harness_problem, after.faults(), len(after.messages("/cmd_vel"))) == ("", (), 199)
 
 
-def test_a_packet_that_fills_the_worker_costs_only_its_sender(run: Callable[..., Any]) -> None:
-    """Among the same packets about a gap is one over two thousand million messages."""
-    (fault,) = run(sender(mutants({0x08: GAP}))).faults()
-    assert fault.text.startswith("stopped: what the nodes sent took the grader's own process to 300 MiB")
+@pytest.mark.nightly  # it takes the processor time that a worker may use, twice
+def test_packets_that_keep_the_worker_busy_cost_only_their_sender(run: Callable[..., Any]) -> None:
+    """Among them is a gap over two thousand million messages: each is noted, or computed without end.
+
+    The worker is ended, and nothing is judged in the sender's favour: its fault, or undecided on a busy machine.
+    """
+    trace = run(sender(mutants({0x08: GAP})))
+    assert trace.faults() or trace.harness_problem
     after = run(hostile())
     assert (after.harness_problem, after.faults(), len(after.messages("/cmd_vel"))) == ("", (), 199)

@@ -594,7 +594,7 @@ def test_a_lost_worker_with_forks_is_replaced_by_another(
     assert forks == [2, 2]
 
 
-LIMITS = {"reaches its processor time": "120 s of processor time", "grows": "100 MiB of memory"}
+LIMITS = {"reaches its processor time": "21 s of processor time", "grows": "100 MiB of memory"}
 
 
 @pytest.fixture
