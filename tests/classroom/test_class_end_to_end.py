@@ -96,3 +96,42 @@ def test_a_download_is_graded_where_a_student_hides_modules(class_: Path, tmp_pa
     assert points(tmp_path / "out")["ada"] == "30"
     report = json.loads((tmp_path / "out" / "students" / "ada" / "report.json").read_text(encoding="utf-8"))
     assert report["submission"]["path"] == "out/unpacked/hw.zip/ada"
+
+
+#: What a hostile submission adds to its package, and the line of setup.py that it replaces.
+BOMBS = {
+    "list": ("setup.py", "x = [" + "0," * 3_000_000 + "]\n"),
+    "loops": ("setup.py", f"for a in {list(range(1000))}:\n  for b in {list(range(1000))}:\n    pass;pass;pass\n"),
+    "name": ("setup.py", f"setup(data_files=[('share/\\0', ['\\udcff']), ('share/{'x' * 300}', ['a'])])\n"),
+    "toml": ("pyproject.toml", "a" + ".a" * 18_000 + " = 1\n"),
+    "width": ("setup.py", "setup(name='{:>1500000000}'.format('x'))\n"),
+    "xml": ("package.xml", "<package>" + "<name>x</name>" * 500_000),
+}
+
+
+@pytest.mark.long
+def test_project_files_that_do_harm_cost_a_class_nothing(tmp_path: Path) -> None:
+    """Each submission gets its score, with a note about the file; the process that grades them all stays small."""
+    for name, bomb in (("honest", None), *BOMBS.items()):
+        folder = tmp_path / "class" / name
+        shutil.copytree(SUBMISSIONS / "correct/velocity_package", folder)
+        if bomb is not None:
+            (folder / "src/my_robot" / bomb[0]).write_text(bomb[1])
+    code = """
+import resource, sys
+from grader.cli.main import main
+try:
+    main()
+finally:
+    print("bytes", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10, file=sys.stderr)
+"""
+    command = [sys.executable, "-c", code, "batch", str(tmp_path / "class"), "-o", str(tmp_path / "out"), *ONE]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert points(tmp_path / "out") == dict.fromkeys(("honest", *BOMBS), "30")
+    assert int(done.stderr.rpartition("bytes ")[2]) < 400 << 20
+    for name in ("honest", *BOMBS):
+        report = json.loads((tmp_path / "out" / "students" / name / "report.json").read_text(encoding="utf-8"))
+        notes = report["exercises"][0]["notes"]
+        told = [note for note in notes if "not read" in note or "left out" in note]
+        assert len(told) == (name not in ("honest", "width")), (name, notes)
