@@ -97,6 +97,11 @@ def usage(pids: Iterable[int]) -> Usage:
     return Usage(memory_kib << 10, ticks * NS_PER_TICK, threads, halted)
 
 
+def own_processor_ns(pid: int) -> int:
+    """Return the processor time of a process without its children; 0 if it has ended."""
+    return sum(int(field) for field in _stat(pid)[USER_TIME : USER_TIME + 2]) * NS_PER_TICK
+
+
 def families(roots: Collection[int]) -> dict[int, set[int]]:
     """Return each process with all of its descendants."""
     parents = {pid: int(fields[PARENT]) for pid in _pids() if (fields := _stat(pid))}
