@@ -12,7 +12,8 @@ import pytest
 
 pytestmark = pytest.mark.ros
 SUBMISSIONS = Path(__file__).resolve().parent.parent / "submissions"
-ONE = ("--exercise", "velocity_publisher", "--jobs", "1")
+#: Without spot checks, which tests of their own are about.
+ONE = ("--exercise", "velocity_publisher", "--jobs", "1", "--spot-checks", "0%")
 GRADE = (sys.executable, "-c", "from grader.cli.main import main; main()")
 CLASS = {"ada": "correct/velocity_class", "bob": "wrong/velocity_10_hz", "cleo": "broken/syntax_error"}
 
@@ -75,8 +76,9 @@ def test_results_are_whole(class_: Path, tmp_path: Path) -> None:
     for name in CLASS:
         place = results / "students" / name
         assert {p.name for p in place.iterdir()} == {
-            "report.json", "report.html", "feedback.json", "feedback.html", "gradescope.json", "evidence", "result.json"
-        }  # fmt: skip
+            *("report.json", "report.html", "feedback.json", "feedback.html", "gradescope.json"),
+            *("evidence", "result.json", "mark.json"),
+        }
         page = (place / "report.html").read_text(encoding="utf-8")
         script = page.split('src="../../')[1].split('"')[0]
         assert (results / script).is_file()
@@ -135,3 +137,29 @@ finally:
         notes = report["exercises"][0]["notes"]
         told = [note for note in notes if "not read" in note or "left out" in note]
         assert len(told) == (name not in ("honest", "width")), (name, notes)
+
+
+def test_every_submission_of_a_class_is_checked(tmp_path: Path) -> None:
+    """Without asking for it: one that is right in virtual time only is found among honest ones, and only that one."""
+    honest = (SUBMISSIONS / "correct" / "velocity_class" / "velocity_publisher.py").read_text(encoding="utf-8")
+    cheat = SUBMISSIONS.parent / "spot_checks" / "cheats" / "drawn_fraction.py"
+    for name, text in {
+        "ada": f"{honest}\n# ada\n",
+        "bob": f"{honest}\n# bob\n",
+        "cleo": cheat.read_text(encoding="utf-8"),
+    }.items():
+        (tmp_path / "class" / name).mkdir(parents=True)
+        (tmp_path / "class" / name / "velocity_publisher.py").write_text(text, encoding="utf-8")
+    results = tmp_path / "out"
+    done = run(tmp_path / "class", "-o", results, "--exercise", "velocity_publisher", "--jobs", "1")
+    assert done.returncode == 0, done.stderr
+    assert points(results) == {"ada": "30", "bob": "30", "cleo": "20"}
+    reports = {
+        name: json.loads((results / "students" / name / "report.json").read_text(encoding="utf-8"))["exercises"][0]
+        for name in ("ada", "bob", "cleo")
+    }
+    assert [reports[name]["clock"] for name in ("ada", "bob", "cleo")] == ["virtual", "virtual", "wall"]
+    assert reports["cleo"]["clock_reason"].startswith('the node behaved differently on the wall clock: "')
+    quick = tmp_path / "quick"
+    run(tmp_path / "class", "-o", quick, "--exercise", "velocity_publisher", "--jobs", "1", "--spot-checks", "0%")
+    assert points(quick)["cleo"] == "30"
