@@ -21,6 +21,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from grader.core.errors import HarnessError
+from grader.core.limits import Limits
 from grader.core.quantities import GIB, MIB, NS_PER_S
 from grader.core.scenario import is_launch_file
 from grader.core.trace import ClockKind, FaultKind, Mark, Trace
