@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
-from grader.core.quantities import MIB, size
+from grader.core.quantities import MIB, NS_PER_S, size
 from grader.core.trace import ClockKind, Trace
 from grader.execution.socket_memory import MANY_DESCRIPTORS, Held, SocketMemory, descriptors
 from grader.execution.student_process import NodeProcess
@@ -26,6 +26,7 @@ from grader.execution.usage import (
     Usage,
     families,
     last_pid,
+    processor_words,
     scratch_names,
     threads_starved_ns,
     usage,
@@ -78,6 +79,7 @@ class ResourceMonitor:
         limits: Limits of each process.
         budget: Real time that is left for the submission, if it is limited.
         shares_network: Whether other programs of the machine use the network of the processes.
+        own_s: Seconds of processor time that this process may use itself; as much as a node by default.
     """
 
     def __init__(
@@ -87,7 +89,9 @@ class ResourceMonitor:
         budget: Budget | None = None,
         *,
         shares_network: bool = False,
+        own_s: int | None = None,
     ) -> None:
+        self._own_s = limits.processor_s if own_s is None else own_s
         self._students = students
         self._limits = limits
         self._budget = budget
@@ -188,8 +192,8 @@ class ResourceMonitor:
         filled_bytes = own_bytes - self._own_bytes
         if filled_bytes > UNREAD_BYTES:
             self._hold_all(f"stopped at {size(UNREAD_BYTES)} of messages that were under way at once")
-        if time.process_time_ns() - self._own_ns > self._limits.processor_ns:
-            self._hold_all(f"stopped at {self._limits.processor_words()} to take what was sent")
+        if time.process_time_ns() - self._own_ns > self._own_s * NS_PER_S:
+            self._hold_all(f"stopped at {processor_words(self._own_s)} to take what was sent")
 
     def _look_at_time(self) -> None:
         if self._ending:

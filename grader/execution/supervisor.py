@@ -41,7 +41,15 @@ from grader.execution.sandbox.environment import worker_environment
 from grader.execution.sandbox.exposure import worker_view
 from grader.execution.sandbox.protocol import Isolation
 from grader.execution.sandbox.starter import starter_command
-from grader.execution.usage import FULL_BYTES, FULL_CODE, families, usage
+from grader.execution.usage import (
+    FULL_BYTES,
+    FULL_CODE,
+    families,
+    own_processor_ns,
+    processor_words,
+    usage,
+    worker_processor_s,
+)
 
 if TYPE_CHECKING:
     from grader.execution.plan import Plan
@@ -51,6 +59,9 @@ if TYPE_CHECKING:
 MARGIN_S = 60.0
 #: How long to wait for the exit code of a worker that has ended.
 END_S = 5.0
+#: Processor time of a worker beyond its own limit, which it and the kernel look at first: its monitor cannot run while
+#: the middleware keeps the interpreter waiting, and how a fork ended cannot be seen.
+SPARE_CPU_S = 3
 #: The interval at which the memory of a worker is looked at. Its resource monitor ends it at the same limit, but cannot
 #: run while the middleware deserializes a message.
 LOOK_S = 0.05
@@ -110,6 +121,7 @@ class Worker(ABC):
         self._interfaces: tuple[str, ...] = ()
         self._pid = 0
         self._group: MemoryGroup | None = None
+        self._most_ns = 0
         self.worn = self.shares = self.gone = False
         self.forked: list[ForkedWorker] = []
 
@@ -132,6 +144,7 @@ class Worker(ABC):
         self._interfaces = plan.interfaces
         own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
         request = json.dumps({"plan": to_json(plan), **own}) + "\n"
+        own_s = worker_processor_s(plan.limits, plan.duration_ns + plan.wait_at_most_ns)
         expected = f"worker: expected a trace of {plan.scenario}, found none"
         if self._group is not None:
             launches = any(is_launch_file(name) for name, _ in plan.processes)
@@ -142,15 +155,21 @@ class Worker(ABC):
             self._line.sendall(request.encode())
             tries = 1 + (plan.clock == ClockKind.WALL.value)
             seconds = min(tries * plan.limits.wall_ns, budget.left_ns) / NS_PER_S + MARGIN_S
+            # On the wall clock it may start three times.
+            begun_ns = own_processor_ns(self._pid) if self._pid else 0
+            self._most_ns = begun_ns + (1 + 2 * (tries - 1)) * (own_s + SPARE_CPU_S) * NS_PER_S
             answer = json.loads(self._answer(plan.limits, time.monotonic() + seconds))
         except TimeoutError as error:
             raise WorkerLostError(f"{expected} (it did not answer in time)", late=True) from error
         except MemoryError as error:
             what = f"{size(FULL_BYTES)} of memory"
             raise WorkerLostError(f"{expected} (it had filled {what})", limit=what) from error
+        except OverflowError as error:
+            what = processor_words(own_s)
+            raise WorkerLostError(f"{expected} (it had used {what})", limit=what) from error
         except EOFError as error:
             end = self._end()
-            limits = {"SIGXCPU": plan.limits.processor_words(), f"code {FULL_CODE}": f"{size(FULL_BYTES)} of memory"}
+            limits = {"SIGXCPU": processor_words(own_s), f"code {FULL_CODE}": f"{size(FULL_BYTES)} of memory"}
             limit = limits.get(end, "")
             raise WorkerLostError(f"{expected} (ended by {end})", limit=limit) from error
         except (OSError, ValueError, RecursionError) as error:
@@ -183,6 +202,7 @@ class Worker(ABC):
         Raises:
             TimeoutError: There was no answer before the deadline.
             MemoryError: The worker uses too much memory.
+            OverflowError: The worker uses too much processor time.
             EOFError: The worker has ended.
             OSError: The answer is too large, or the connection is broken.
         """
@@ -205,10 +225,12 @@ class Worker(ABC):
         return bytes(received)
 
     def _look(self) -> None:
-        """Raise MemoryError if the worker itself, without its children, uses too much memory."""
+        """Raise MemoryError or OverflowError if the worker itself uses too much memory or processor time."""
         self._pid = self._pid or self._find()
         if self._pid and usage([self._pid]).memory_bytes > FULL_BYTES:
             raise MemoryError
+        if self._pid and own_processor_ns(self._pid) > self._most_ns:
+            raise OverflowError
 
     def _find(self) -> int:
         """Return the pid of the worker; 0 before it has started."""

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Collection, Iterable
 
 from grader.core.dataclass import dataclass
-from grader.core.quantities import MIB, NS_PER_S
+from grader.core.limits import Limits
+from grader.core.quantities import MIB, NS_PER_S, duration
 
 #: A worker that uses more memory, without pages mapped from files, is ended, and the exit code that says so. The most
 #: that is recorded takes 200 MiB; a gap of millions of messages makes Fast DDS fill 400 MiB a second.
 FULL_BYTES, FULL_CODE = 300 * MIB, 77
+#: Processor time that a worker may use for a scenario, and for each second of it: ordinary ones take it 0.02 s for a
+#: second, and 5 s for the most messages that are recorded. A malformed packet can make Fast DDS compute without end.
+WORKER_CPU_S, WORKER_SHARE = 20, 0.25
 #: The writable folders of a sandbox that has its own file systems.
 FOLDERS = ("tmp", "dev/shm")
 
@@ -50,6 +55,21 @@ THREADS = b"\nThreads:"
 PARENT, USER_TIME, CHILDREN_SYSTEM_TIME = 1, 11, 14
 
 
+def worker_processor_s(limits: Limits, lasts_ns: int) -> int:
+    """Return the most processor time of a worker for one scenario, in seconds.
+
+    Args:
+        limits: Limits of a node; the worker has no more processor time than that.
+        lasts_ns: How long the scenario may last.
+    """
+    return min(limits.processor_s, WORKER_CPU_S + math.ceil(WORKER_SHARE * lasts_ns / NS_PER_S))
+
+
+def processor_words(seconds: int) -> str:
+    """Describe a limit of processor time."""
+    return f"{duration(seconds * NS_PER_S)} of processor time"
+
+
 @dataclass(frozen=True, slots=True)
 class Usage:
     """The combined usage of some processes; processor time includes that of children that have ended.
@@ -75,6 +95,11 @@ def usage(pids: Iterable[int]) -> Usage:
         halted = halted or fields[:1] == [HALTED]
         ticks += sum(int(field) for field in fields[USER_TIME : CHILDREN_SYSTEM_TIME + 1])
     return Usage(memory_kib << 10, ticks * NS_PER_TICK, threads, halted)
+
+
+def own_processor_ns(pid: int) -> int:
+    """Return the processor time of a process without its children; 0 if it has ended."""
+    return sum(int(field) for field in _stat(pid)[USER_TIME : USER_TIME + 2]) * NS_PER_TICK
 
 
 def families(roots: Collection[int]) -> dict[int, set[int]]:

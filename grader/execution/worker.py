@@ -43,7 +43,7 @@ from grader.execution.sandbox.starter import HASH_SEED, Starter
 from grader.execution.sandbox.starter_process import StarterProcess
 from grader.execution.sandbox.tiers import IN_PLACE, isolation_from_name
 from grader.execution.student_process import LOG_FORMAT, NodeProcess
-from grader.execution.usage import usage
+from grader.execution.usage import usage, worker_processor_s
 from grader.simulation.loading import SimulationError
 from grader.student_host import machine
 from grader.student_host.starter import CONNECTED
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 WALL_TRIES = 3
 #: The kernel's limits for the worker, if its resource monitor is too slow: mapped memory, and processor time beyond the
 #: monitor's limit. An ordinary worker maps 0.6 GiB.
-ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 30
+ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 5
 #: A worker that uses more memory after a scenario is replaced; ordinary scenarios leave 30 to 50 MiB.
 WORN_BYTES = 128 * MIB
 #: What a bare process sees of the grader: the module that makes the machine look the same.
@@ -101,9 +101,9 @@ class Worker:
             raise HarnessError("worker: its network remembers connections of nodes that it recorded before")
         self._real_ns = self._starved_ns = 0
         sys.path += [folder for folder in plan.interfaces if folder not in sys.path]  # installed packages come first
-        limit_processor_time(plan.limits)
         started_ns = time.monotonic_ns()
         for _ in range(WALL_TRIES if plan.clock == "wall" else 1):
+            limit_processor_time(own_processor_s(plan))
             spent_ns = time.monotonic_ns() - started_ns
             trace = self._record(plan, domain, Budget(left_ns - spent_ns, budget_words))
             if not trace.harness_problem or time.monotonic_ns() - started_ns > min(plan.limits.wall_ns, left_ns):
@@ -167,7 +167,13 @@ class Worker:
                 start = self._start_bare if plan.bare else self._start
                 students.append(start(plan, name, file, domain))
             monitor = stack.enter_context(
-                ResourceMonitor(students, plan.limits, budget, shares_network=self._isolation.shares_network)
+                ResourceMonitor(
+                    students,
+                    plan.limits,
+                    budget,
+                    shares_network=self._isolation.shares_network,
+                    own_s=own_processor_s(plan),
+                )
             )
             stack.callback(self._account, monitor)
             runner = _import_runners()["bare" if plan.bare else plan.clock]
@@ -336,10 +342,15 @@ def limit_memory() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (_lower(ADDRESS_SPACE_BYTES, most), most))
 
 
-def limit_processor_time(limits: Limits) -> None:
-    """Set the kernel's limit on the processor time of this process, counted from now."""
+def own_processor_s(plan: Plan) -> int:
+    """Return the most processor time of this process for one plan, in seconds."""
+    return worker_processor_s(plan.limits, plan.duration_ns + plan.wait_at_most_ns)
+
+
+def limit_processor_time(limit_s: int) -> None:
+    """Set the kernel's limit on the processor time of this process, counted from now, beyond its monitor's limit."""
     _, most = resource.getrlimit(resource.RLIMIT_CPU)
-    seconds = math.ceil(time.process_time_ns() / NS_PER_S) + limits.processor_s + SPARE_CPU_S
+    seconds = math.ceil(time.process_time_ns() / NS_PER_S) + limit_s + SPARE_CPU_S
     resource.setrlimit(resource.RLIMIT_CPU, (_lower(seconds, most), most))
 
 

@@ -92,9 +92,13 @@ def test_malformed_packets_cost_only_their_sender(run: Callable[..., Any]) -> No
     assert (after.harness_problem, after.faults(), len(after.messages("/cmd_vel"))) == ("", (), 199)
 
 
-def test_a_packet_that_fills_the_worker_costs_only_its_sender(run: Callable[..., Any]) -> None:
-    """Among the same packets about a gap is one over two thousand million messages."""
-    (fault,) = run(sender(mutants({0x08: GAP}))).faults()
-    assert fault.text.startswith("stopped: what the nodes sent took the grader's own process to 300 MiB")
+@pytest.mark.nightly  # it takes the processor time that a worker may use, twice
+def test_packets_that_keep_the_worker_busy_cost_only_their_sender(run: Callable[..., Any]) -> None:
+    """Among them is a gap over two thousand million messages: each is noted, or computed without end.
+
+    The worker is ended, and nothing is judged in the sender's favour: its fault, or undecided on a busy machine.
+    """
+    trace = run(sender(mutants({0x08: GAP})))
+    assert trace.faults() or trace.harness_problem
     after = run(hostile())
     assert (after.harness_problem, after.faults(), len(after.messages("/cmd_vel"))) == ("", (), 199)

@@ -90,6 +90,9 @@ for command in line.makefile("r"):
         said = json.dumps({"trace": trace(asked["plan"], asked["budget"]), **cost}).encode()
     elif behaviour == "reaches its processor time":
         os.kill(os.getpid(), signal.SIGXCPU)
+    elif behaviour == "computes":
+        while True:
+            pass
     elif behaviour == "grows":
         grown = b"x" * (200 << 20)
         signal.pause()
@@ -594,7 +597,11 @@ def test_a_lost_worker_with_forks_is_replaced_by_another(
     assert forks == [2, 2]
 
 
-LIMITS = {"reaches its processor time": "120 s of processor time", "grows": "100 MiB of memory"}
+LIMITS = {
+    "reaches its processor time": "1 s of processor time",
+    "computes": "1 s of processor time",
+    "grows": "100 MiB of memory",
+}
 
 
 @pytest.fixture
@@ -602,6 +609,8 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Workers may fill little, and are those of the stage."""
     monkeypatch.setattr(module, "MODULE", b"-c")
     monkeypatch.setattr(module, "FULL_BYTES", 100 << 20)
+    monkeypatch.setattr(module, "worker_processor_s", lambda limits, lasts_ns: 1)
+    monkeypatch.setattr(module, "SPARE_CPU_S", 0)
 
 
 @pytest.mark.parametrize("behaviour", LIMITS)
