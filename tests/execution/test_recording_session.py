@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from grader.core.trace import ClockKind, Trace
+from grader.core.trace import ClockKind, Message, Trace
 from grader.execution.plan import Plan
 from grader.execution.real_time_budget import RealTimeBudget
-from grader.execution.recording_session import AUTO, VIRTUAL, WALL, RecordingSession
+from grader.execution.recording_session import AUTO, CHARGED_NOTE, DRIFTS, VIRTUAL, WALL, RecordingSession
 from grader.execution.supervisor import Job
 
 
@@ -111,3 +111,70 @@ def test_all_recordings_of_a_submission_share_one_budget() -> None:
         "20 s of real time",
         "30 s of real time",
     ]
+
+
+class PacedRecorder:
+    """Records one node that has work before its pauses: its rate depends on what is counted, and on the machine."""
+
+    def __init__(self, *, charged_ms: int, wall_ms: int = 60, busy: str = "") -> None:
+        self.charged_ms, self.wall_ms, self.busy = charged_ms, wall_ms, busy
+        self.recorded: list[str] = []
+
+    def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
+        for job in jobs:
+            clock = ClockKind(job.plan.clock)
+            self.recorded.append("charged" if job.plan.charged else clock.value)
+            wall = clock is ClockKind.WALL
+            period_ms = self.wall_ms if wall else self.charged_ms if job.plan.charged else 50
+            messages = tuple(Message(t * 10**6, "/x", "T", {}, b"") for t in range(0, 3000, period_ms))
+            yield Trace(
+                job.plan.scenario,
+                clock,
+                3 * 10**9,
+                messages,
+                harness_problem="too busy" if wall and self.busy == "held up" else "",
+                most_starved_ns=10**9 if wall and self.busy == "starved" else 0,
+                may_drift=not wall,
+            )
+
+    def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
+        return list(self.each(jobs, progress))
+
+
+def decided(recorder: PacedRecorder, clock: str = AUTO) -> Trace:
+    """Return the trace of the node, which has to be heard of once."""
+    heard: list[str] = []
+    make: Any = RecordingSession
+    session: RecordingSession = make(*(None,) * (len(RecordingSession.__slots__) - 2), recorder, Path("nowhere"))
+    traces = session.record({"a": job("a")}, clock, lambda step: None, lambda key, _: heard.append(key))
+    assert heard == ["a"]
+    return traces["a"]
+
+
+def test_a_node_that_its_work_does_not_slow_down_stays_in_virtual_time() -> None:
+    """The first recording is kept, not the one that counts the work."""
+    recorder = PacedRecorder(charged_ms=50)
+    trace = decided(recorder)
+    assert recorder.recorded == ["virtual", "charged"]
+    assert (trace.clock, trace.clock_reason, len(trace.messages("/x"))) == (ClockKind.VIRTUAL, "", 60)
+
+
+def test_the_wall_clock_decides_where_work_slows_a_node_down() -> None:
+    recorder = PacedRecorder(charged_ms=70, wall_ms=75)
+    trace = decided(recorder)
+    assert recorder.recorded == ["virtual", "charged", "wall"]
+    assert (trace.clock, trace.clock_reason, len(trace.messages("/x"))) == (ClockKind.WALL, DRIFTS, 40)
+
+
+@pytest.mark.parametrize("busy", ["held up", "starved"])
+def test_on_a_busy_machine_the_measured_work_decides(busy: str) -> None:
+    """With a note, because this clock is not the one that decides elsewhere."""
+    trace = decided(PacedRecorder(charged_ms=60, wall_ms=150, busy=busy))
+    assert (trace.clock, len(trace.messages("/x")), trace.harness_problem) == (ClockKind.VIRTUAL, 50, "")
+    assert trace.notes == (CHARGED_NOTE,)
+
+
+def test_a_clock_that_was_asked_for_is_not_doubted() -> None:
+    recorder = PacedRecorder(charged_ms=70)
+    assert decided(recorder, VIRTUAL).clock is ClockKind.VIRTUAL
+    assert recorder.recorded == ["virtual"]
