@@ -1,11 +1,11 @@
-"""Grades ten programs near the thresholds of virtual time again and again, half of the time under load; counts outcomes.
+"""Grades ten programs near the thresholds of virtual time again and again, half of the time under load.
 
 Usage: python benchmarks/thresholds.py [RUNS] [--jobs N] [--only NAME] [--out FILE]
        RUNS (100) of each program, so many at a time (6); two busy loops per core during the second half
 
 The programs are in benchmarks/thresholds/, with what they do in their first lines, and a rubric of their own, which
-watches them for three seconds. A program may be recorded on either clock, but has to get the same outcome each time. The
-exit code is 1 if one of them does not.
+watches them for three seconds. A program may be recorded on either clock, but has to get the same outcome each time.
+Prints how often each outcome came; the exit code is 1 if a program got several.
 """
 
 from __future__ import annotations
@@ -67,8 +67,9 @@ def outcome(session: RecordingSession, submission: Path) -> tuple[str, str, str]
     return verdict.outcome.value, exercise.clock.value, why
 
 
-def rounds(folder: Path, runs: int, jobs: int, *, loaded: bool, seen: Seen, out: Path | None) -> None:
+def rounds(folder: Path, runs: int, seen: Seen, given: argparse.Namespace, *, loaded: bool) -> None:
     """Grade every program in a folder so often, several at a time."""
+    jobs, out = given.jobs, given.out
     loops = 2 * multiprocessing.cpu_count() if loaded else 0
     with open_session("auto", jobs) as session, busy(loops), ThreadPoolExecutor(jobs) as pool:
         todo = [program for _ in range(runs) for program in seen]
@@ -117,8 +118,8 @@ def main() -> int:
         folder = Path(name)
         folder.chmod(0o755)
         adapted(programs, folder)
-        rounds(folder, given.runs - given.runs // 2, given.jobs, loaded=False, seen=seen, out=given.out)
-        rounds(folder, given.runs // 2, given.jobs, loaded=True, seen=seen, out=given.out)
+        rounds(folder, given.runs - given.runs // 2, seen, given, loaded=False)
+        rounds(folder, given.runs // 2, seen, given, loaded=True)
     return table(seen)
 
 

@@ -15,16 +15,18 @@ from grading import grade_until_decided, say_nothing
 from grader.app.grade import Progress
 from grader.app.request import GradeRequest
 from grader.app.spot_checks import SpotChecks, check, is_drawn, shortened
+from grader.app.start import grade
 from grader.core.exercise import Criterion, Exercise
 from grader.core.report import Report
 from grader.core.scenario import Scenario, Span
-from grader.core.submission import StudentFile, Submission
+from grader.core.submission import Run, StudentFile, Submission
 from grader.core.trace import ClockKind, Trace
 from grader.execution.plan import Plan
 from grader.execution.supervisor import Job
 from grader.judging.beginnings import BeginningJudge
 from grader.judging.checks.fields import FieldEqual
 from grader.judging.checks.rate import TopicRate
+from grader.student_host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 from grader.testing import TraceBuilder
 
 HERE = Path(__file__).parent / "spot_checks"
@@ -320,6 +322,51 @@ def test_defining_classes_is_no_reason_for_a_check(tmp_path: Path) -> None:
 
     report = graded(tmp_path, HERE / "makes_classes.py", hear)
     assert (report.score, [step for step in steps if "wall clock" in step]) == (30, [])
+
+
+def told_of(tmp_path: Path, seed: int) -> tuple[int, int, str]:
+    """Return the date, the uptime and the order of a set that a program sees in virtual time, as it logs them."""
+    folder = tmp_path / str(seed)
+    folder.mkdir(exist_ok=True)
+    shutil.copy(HERE / "tells_the_time.py", folder / "velocity_publisher.py")
+    runs: list[Run] = []
+    request = GradeRequest(str(folder), exercises=("velocity_publisher",), clock="virtual", seed=seed)
+    grade(request, say_nothing, lambda run, _: runs.append(run), pictures=False)
+    (found,) = runs[0].traces.values()
+    date, uptime, order = found.records()[0].text.split()
+    return int(date), int(uptime), order
+
+
+@pytest.mark.ros
+def test_the_date_and_the_hashes_follow_from_the_seed(tmp_path: Path) -> None:
+    """So no program knows them, and the same file gets the same report on every day."""
+    first, again, other = (told_of(tmp_path, seed) for seed in (1, 1, 2))
+    assert first == again
+    assert all(one != another for one, another in zip(first, other, strict=True))
+    for date, uptime, order in (first, other):
+        assert 0 <= date - EPOCH_NS // S <= EPOCH_SPAN_S
+        assert 0 <= uptime - UPTIME_NS // S <= UPTIME_SPAN_S
+        assert sorted(order) == list("abcdefghijklmnop")
+
+
+@pytest.mark.ros
+def test_the_order_of_a_set_in_a_fork_helps_nobody(tmp_path: Path) -> None:
+    """A program that uses it runs with hashes of its own, also in virtual time."""
+    assert graded(tmp_path, HERE / "order_of_a_set.py", clock="virtual").score <= 20
+
+
+@pytest.mark.ros
+def test_a_module_that_nobody_read_is_a_reason_for_a_check(tmp_path: Path) -> None:
+    """One that the program writes; one of its own files is not."""
+    steps: list[str] = []
+    assert graded(tmp_path, HERE / "honest" / "writes_a_module.py", steps.append).score == 30
+    assert any("checked on the wall clock" in step for step in steps)
+    (tmp_path / "submission" / "helper.py").write_text("SPEED = 0.5\n", encoding="utf-8")
+    text = (HERE / "makes_classes.py").read_text(encoding="utf-8")
+    (tmp_path / "uses_helper.py").write_text(text.replace("import rclpy\n", "import helper\nimport rclpy\n", 1))
+    steps.clear()
+    assert graded(tmp_path, tmp_path / "uses_helper.py", steps.append).score == 30
+    assert [step for step in steps if "wall clock" in step] == []
 
 
 @pytest.mark.ros

@@ -32,7 +32,7 @@ from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
 from grader.rubrics.builtin import builtin_exercises, builtin_odometry, exercise_ids
 from grader.submissions.collected import listed, shown
-from grader.submissions.sources import read_reaches, read_sources
+from grader.submissions.sources import HASHES, read_reaches, read_sources
 from grader.submissions.submission import stage_collected, stage_submission
 
 if TYPE_CHECKING:
@@ -123,7 +123,9 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         if unrecorded:
             prefixes, problems = install_shares(submission.root, submission.projects, Path(prefix), session.ros)
             submission = replace(submission, notes=(*submission.notes, *problems))
-        jobs = plan_jobs(request, unrecorded, submission, odometry, seed, provided.folders, prefixes)
+        reaches = read_reaches(submission.root)
+        folders, own_hashes = provided.folders, not HASHES.isdisjoint(reaches)
+        jobs = plan_jobs(request, unrecorded, submission, odometry, seed, folders, prefixes, own_hashes=own_hashes)
         run = Run(
             submission=submission,
             traces=kept,
@@ -137,7 +139,7 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
             offered=provided.offered,
         )
         take = EarlyReports(exercises, jobs, run, on_partial_report).take if on_partial_report is not None else None
-        checks = SpotChecks(request.spot_checks, seed, submission.digest, read_reaches(submission.root))
+        checks = SpotChecks(request.spot_checks, seed, submission.digest, reaches)
         later = request.clock == AUTO and checks.certain
         first = None if later else take
 
@@ -255,17 +257,28 @@ def plan_jobs(  # noqa: PLR0913  each comes from a different stage
     seed: int,
     interfaces: Sequence[Path] = (),
     prefixes: tuple[str, ...] = (),
+    *,
+    own_hashes: bool = False,
 ) -> dict[tuple[str, str], Job]:
     """Plan the recordings, by exercise and scenario; scenarios with a missing file are left out.
 
     The interfaces are the folders of packages that are not installed; the prefixes are what `install_shares` returns.
+    `own_hashes` is whether the order of a set may matter to the programs.
     """
     clock = planned_clock(request.clock)
     return {
         (exercise.id, scenario.id): Job(
             f"{exercise_name(exercise.number)}: {', '.join(scenario.processes)} ({scenario.id.replace('_', ' ')})",
             replace(
-                plan_scenario(exercise.id, scenario, submission, seed=seed, odometry=odometry, clock=clock),
+                plan_scenario(
+                    exercise.id,
+                    scenario,
+                    submission,
+                    seed=seed,
+                    odometry=odometry,
+                    clock=clock,
+                    own_hashes=own_hashes,
+                ),
                 interfaces=tuple(map(str, interfaces)),
                 prefixes=prefixes,
             ),

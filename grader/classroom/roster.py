@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
+from fractions import Fraction
 from pathlib import Path
 
 from grader.classroom.intake import HandedInEntry
@@ -33,6 +35,17 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
 }
 #: Columns that identify a person uniquely.
 _EXACT = ("folder", "user", "email", "id", "canvas", "identifier")
+# Moodle's grading worksheet says `Submitted for grading - 1 day 3 hours late` in this column.
+_STATUS = "status"
+_LATE = re.compile(r"((?:\d+\s+[a-z]+\s+)+)late\b", re.IGNORECASE)
+_HOURS: Mapping[str, int | Fraction] = {
+    "year": 8760,
+    "week": 168,
+    "day": 24,
+    "hour": 1,
+    "min": Fraction(1, 60),
+    "sec": Fraction(1, 3600),
+}
 # Moodle's grading worksheet writes `Participant 657693`, its download only the number.
 _PARTICIPANT = re.compile(r"\D+ (\d+)")
 
@@ -92,7 +105,7 @@ def read_table(path: Path) -> Table:
     try:
         rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter))
     except csv.Error as error:
-        raise ClassError(f"{path}: expected CSV, found a file that is none: {error}") from None
+        raise ClassError(f"{path}: expected CSV, found another kind of file: {error}") from None
     rows = [row for row in rows if any(cell.strip() for cell in row)]
     if len(rows) < 2:
         raise ClassError(f"{path}: expected a header and rows, found {len(rows)} lines")
@@ -166,6 +179,44 @@ def person_of(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> P
         names=frozenset(spellings(name)),
         row=row,
     )
+
+
+def row_of(person: Person | None, table: Table | None) -> Mapping[str, str] | None:
+    """Find the row of a person in a table by unique ids, then by name; None unless exactly one row matches."""
+    if person is None or table is None:
+        return None
+    columns = columns_of(table.header)
+    handles = person.handles | {fold_handle(t) for t in (person.user, person.email, person.id) if t}
+    exact = [name for kind in ("email", "user", "id", "canvas", "identifier") for name in columns.get(kind, ())]
+    found = [r for r in table.rows if any(r[name].strip() and fold_handle(r[name]) in handles for name in exact)]
+    if not found:
+        found = [r for r in table.rows if person_of(r, columns).names & person.names]
+    return found[0] if len(found) == 1 else None
+
+
+def late_by(person: Person | None, worksheet: Table | None = None) -> str:
+    """Return how late somebody handed in, as a grading worksheet of Moodle in English says; empty if it does not.
+
+    The worksheet may be the roster, or a table of its own.
+    """
+    rows = [None if person is None else person.row, row_of(person, worksheet)]
+    return next((late for row in rows if row is not None and (late := _late_in(row))), "")
+
+
+def _late_in(row: Mapping[str, str]) -> str:
+    status = next((value for name, value in row.items() if name.strip().casefold() == _STATUS), "")
+    found = _LATE.search(status)
+    return " ".join(found[1].split()) if found else ""
+
+
+def late_days(text: str) -> str:
+    """Return a time such as `1 day 3 hours` as a number of days, rounded up to hundredths; empty if it is none."""
+    parts = re.findall(r"(\d+) ([a-z]+)", text.casefold())
+    hours = [Fraction(count) * _HOURS[key] for count, unit in parts for key in _HOURS if unit.startswith(key)]
+    if not hours or len(hours) < len(parts):
+        return ""
+    hundredths = math.ceil(sum(hours, Fraction(0)) * 100 / 24)
+    return f"{hundredths / 100:g}"
 
 
 def _in_reading_order(name: str) -> str:

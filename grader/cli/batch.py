@@ -19,6 +19,7 @@ from grader.cli.options import (
     require,
     time_budget_option,
 )
+from grader.cli.remembered import RepeatingCommand, is_left_out, options_to_keep
 from grader.core.checkup import TIERS
 from grader.core.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED, UNUSABLE
 
@@ -30,7 +31,7 @@ _LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "can
 _RERUNS = ("changed", "failed", "undecided", "all")
 
 
-@click.command(name="batch")
+@click.command(name="batch", cls=RepeatingCommand)
 @click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", "results", metavar="RESULTS", required=True, type=PATH, help="Folder for the results.")
 @click.option("--layout", type=click.Choice(_LAYOUTS), default="auto", help="How submissions are named.")
@@ -66,10 +67,10 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @click.option(
     "--spot-checks",
     metavar="P%",
-    default="5%",
+    default="100%",
     show_default=True,
     callback=parse_share,
-    help="Share of the class that is drawn and checked on the wall clock as well.",
+    help="Share of the class that is drawn and checked on the wall clock as well; 5% is quicker.",
 )
 @click.option("--variant-key", type=PATH, metavar="FILE", help="The course key; whose variant it is, the roster says.")
 @click.option("--standalone", is_flag=True, help="Make each HTML report a single file that can be sent away.")
@@ -116,7 +117,8 @@ def command(  # noqa: PLR0913  one parameter an option
     """Grade a class: every submission in SOURCE, a folder of submissions or a bulk download.
 
     The same command goes on where it was stopped. Only what is new or changed is graded; `--rerun` adds what failed,
-    what was undecided, or all.
+    what was undecided, or all. RESULTS keeps the options that change marks, pages or exported files, such as --adjust
+    and --roster: they apply again unless given otherwise, and --no-adjust, --no-roster and so on leave one out.
 
     Exit codes: 0 everybody was graded, 1 a submission cannot be used, 2 the command or something it was given cannot be
     used, or a rubric has a mistake, 3 something failed or was undecided through no fault of a student, 130 interrupted.
@@ -137,6 +139,7 @@ def command(  # noqa: PLR0913  one parameter an option
         raise click.BadParameter("--canvas-gradebook needs --canvas with the assignment's number")
     if templates and not similarity:
         raise click.BadParameter("--template needs --similarity")
+    ctx = click.get_current_context()
     course = ClassRequest(
         sources=sources,
         results=results,
@@ -144,6 +147,8 @@ def command(  # noqa: PLR0913  one parameter an option
         pattern=pattern,
         roster=roster,
         adjustments=adjustments,
+        no_adjustments=is_left_out(ctx, "adjustments"),
+        options=options_to_keep(ctx),
         grading=GradeRequest("", exercises=tuple(dict.fromkeys(exercises)), seed=seed, **as_given),
         jobs=jobs,
         rerun=rerun,

@@ -51,12 +51,12 @@ def run(prefix: str, path: str, content: bytes) -> ModuleType:
     return module
 
 
-def line_of(error: BaseException, path: str) -> int:
-    """Return the line of a file in which an error arose, or that led to it; 1 if it is not known."""
+def line_of(error: BaseException, path: str, default: int = 1) -> int:
+    """Return the line of a file in which an error arose, or that led to it; the default if it is not known."""
     if isinstance(error, SyntaxError) and error.filename == path:
-        return error.lineno or 1
+        return error.lineno or default
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == path]
-    return (lines[-1] if lines else None) or 1
+    return (lines[-1] if lines else None) or default
 
 
 def words_of(error: BaseException) -> str:

@@ -306,6 +306,7 @@ class Exercise:
     by_request: bool = False  # whether it is graded only on request
     variant: Variant | None = None  # the values for this student; None if nothing varies
     interfaces: tuple[str, ...] = ()  # paths of the folders with interface packages that the rubric brings
+    bonus: Fraction = Fraction(0)  # points above the maximum that an instructor may give
 
     @property
     def plays_odometry(self) -> bool:

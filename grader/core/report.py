@@ -23,6 +23,8 @@ SCHEMA = "grader/report/v1"
 NOT_JUDGED = "not judged: "
 #: Evidence key for the mistake of a rubric's author that leaves a criterion undecided: its file, line and text.
 AUTHOR_MISTAKE = "author_mistake"
+#: The key of the evidence that says that the submission itself may be why a criterion is undecided.
+SUBMISSION_SUSPECTED = "submission_suspected"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,11 @@ class Verdict:
     problem: Problem | None = None
     # The reason in a few words, for terminals; empty if the reason itself is short. Not shown in other reports.
     brief: str = ""
+
+    @property
+    def suspected(self) -> bool:
+        """Whether it is undecided for a reason that the submission itself may have caused."""
+        return self.outcome is Outcome.UNDECIDED and self.evidence.get(SUBMISSION_SUSPECTED) is True
 
     @property
     def author_mistake(self) -> str:

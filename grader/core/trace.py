@@ -76,6 +76,11 @@ def main_not_called(file: str, line: int = 0) -> str:
     return f"{problem}; add: if __name__ == '__main__': main()"
 
 
+def same_node_name(name: str) -> str:
+    """Return the note on a name that the nodes of two processes have."""
+    return f"two nodes have the name {name}, and ROS cannot tell them apart: give each a name of its own"
+
+
 @dataclass(frozen=True, slots=True)
 class Message:
     """One message that a student's node published."""
@@ -288,6 +293,8 @@ class Trace:
     # Sentences that readers must know (entry without a guard, a limit reached, lost messages)
     notes: tuple[str, ...] = ()
     harness_problem: str = ""  # a failure of the grader or the machine that prevents judging; empty if there was none
+    # Whether what the submission does may be why there is a harness problem
+    suspected: bool = False
     starts: tuple[Start, ...] = ()  # how each process was started; empty in traces of earlier versions
     # Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence
     reached: tuple[str, ...] = ()

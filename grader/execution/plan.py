@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.projects import Project
+from grader.core.quantities import NS_PER_S
 from grader.core.scenario import (
     ActionGoal,
     Between,
@@ -46,6 +47,7 @@ from grader.execution.exchanges import (
     plan_server,
     plan_simulation,
 )
+from grader.student_host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 from grader.student_host.packages import layout_of
 
 if TYPE_CHECKING:
@@ -156,6 +158,9 @@ class Plan:
         publishers: The publishers that bare processes are expected to create; the grader subscribes before they do.
         interfaces: Folders of modules of interface packages that are not installed, for the nodes and the grader alike;
             each is in the folder of what was built with it.
+        epoch_ns: When virtual time starts, in nanoseconds since 1970.
+        uptime_ns: What monotonic clocks show then.
+        hash_seed: The PYTHONHASHSEED of the processes; only with 0 they can be forks of one process.
         prefixes: The AMENT_PREFIX_PATH of the nodes, first the folder of what the submission's packages share; empty if
             it has none.
         projects: The ROS packages of the submission, outermost first.
@@ -186,6 +191,9 @@ class Plan:
     publishers: tuple[Endpoint, ...] = ()
     interfaces: tuple[str, ...] = ()
     prefixes: tuple[str, ...] = ()
+    epoch_ns: int = EPOCH_NS
+    uptime_ns: int = UPTIME_NS
+    hash_seed: int = 0
     starts: tuple[PlannedStart, ...] = ()
     projects: tuple[Project, ...] = ()
     charged: bool = False
@@ -201,7 +209,14 @@ class Plan:
 
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage
-    exercise: str, scenario: Scenario, submission: Submission, *, seed: int, odometry: Odometry | None, clock: str
+    exercise: str,
+    scenario: Scenario,
+    submission: Submission,
+    *,
+    seed: int,
+    odometry: Odometry | None,
+    clock: str,
+    own_hashes: bool = False,
 ) -> Plan:
     """Plan a scenario by drawing every random value in it.
 
@@ -212,6 +227,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         seed: Determines every drawn value, together with the exercise and the scenario.
         odometry: The recording, if the scenario plays one.
         clock: `virtual` or `wall`.
+        own_hashes: Whether the hashes of texts in the processes are drawn too, because the order of a set may matter.
     """
     purposes = ("stimuli", exercise, scenario.id)
     # each stimulus has its own source of randomness: adding one does not change the others
@@ -237,6 +253,9 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         numbers=numbers,
         recordings=recordings,
         clock=clock,
+        epoch_ns=EPOCH_NS + _drawn(EPOCH_SPAN_S, seed, "epoch") * NS_PER_S,
+        uptime_ns=UPTIME_NS + _drawn(UPTIME_SPAN_S, seed, "uptime") * NS_PER_S,
+        hash_seed=1 + _drawn(_HASH_SEEDS, seed, "hashes", exercise, scenario.id) if own_hashes else 0,
         limits=scenario.limits,
         messages=tuple(plan_messages(s, source) for s, source in drawn if isinstance(s, MessageStream)),
         servers=tuple(plan_server(s, source) for s, source in drawn if isinstance(s, ServiceServer)),
@@ -308,6 +327,14 @@ def derive(seed: int, *purpose: str) -> str:
     """Derive 64 hex digits from a seed and a purpose; neither can be recovered from them."""
     text = "/".join((str(seed), *purpose))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+#: PYTHONHASHSEED is at most this; 0 would give every process the same hashes.
+_HASH_SEEDS = 2**32 - 1
+
+
+def _drawn(below: int, seed: int, *purpose: str) -> int:
+    return int(derive(seed, *purpose)[:16], 16) % below
 
 
 def _numbers(stream: NumberStream, draw: random.Random, own: random.Random, until_ns: int) -> PlannedNumbers:

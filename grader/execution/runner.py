@@ -119,13 +119,13 @@ class Runner(ABC):
         """Return why this clock is not suitable for the nodes; empty if it is."""
         return ""
 
-    def _graders_fault(self) -> str:
-        """Return what failed in the grader's own code in the processes; empty if nothing did."""
-        return next((student.grader_failed for student in self._students if student.grader_failed), "")
-
     def _may_drift(self) -> bool:
         """Return whether the work of a node may slow it down on the real clock, which this one may hide."""
         return False
+
+    def _graders_fault(self) -> str:
+        """Return what failed in the grader's own code in the processes; empty if nothing did."""
+        return next((student.grader_failed for student in self._students if student.grader_failed), "")
 
     def _harness_problem(self) -> str:
         """Return why the recording cannot be judged; empty if it can."""

@@ -81,11 +81,11 @@ class _Running:
         self._left = most
         self.simulation = made(planned.name, planned.path, planned.content, planned.parameters)
         self.period_ns = max(SHORTEST_NS, self.simulation.period)
-        self.hears = self._call(lambda: dict(self.simulation.hears()))
-        self.serves = self._call(lambda: dict(self.simulation.serves()))
+        self.hears = self._call(lambda: dict(self.simulation.hears()), "hears")
+        self.serves = self._call(lambda: dict(self.simulation.serves()), "serves")
         self._streams = {
             topic: PlannedMessages(topic, type_, 0, 0, self.period_ns, 0, best_effort=False, latched=False, values=())
-            for topic, type_ in self._call(lambda: dict(self.simulation.publishes())).items()
+            for topic, type_ in self._call(lambda: dict(self.simulation.publishes()), "publishes").items()
         }
         with self._blamed("publishes"):
             for stream in self._streams.values():
@@ -94,7 +94,7 @@ class _Running:
             for service, type_ in self.serves.items():
                 wanted_class(type_, "srv", service)
         # reproducible, and nobody can know it who does not know the seed
-        self._call(partial(self.simulation.begin, random.Random(planned.seed)))  # noqa: S311
+        self._call(partial(self.simulation.begin, random.Random(planned.seed)), "begin")  # noqa: S311
 
     def appearances(self) -> Iterator[Event]:
         for stream in self._streams.values():
@@ -104,7 +104,7 @@ class _Running:
             yield AddServer(0, server)
 
     def publish(self, method: str, work: Callable[[Moment], Iterable[Output]], now: Moment) -> list[Event]:
-        outputs = self._call(lambda: list(islice(work(now), OUTPUTS + 1)))
+        outputs = self._call(lambda: list(islice(work(now), OUTPUTS + 1)), method)
         with self._blamed(method):
             if len(outputs) > OUTPUTS:
                 raise HarnessError(f"expected at most {OUTPUTS} messages at once, found more")
@@ -115,7 +115,7 @@ class _Running:
         return self.publish("on_message", lambda at: self.simulation.on_message(at, taken.topic, heard), now)
 
     def answer(self, service: str, request: Mapping[str, Any], now: Moment) -> Mapping[str, Any]:
-        fields = self._call(lambda: dict(self.simulation.on_request(now, service, request)))
+        fields = self._call(lambda: dict(self.simulation.on_request(now, service, request)), "on_request")
         with self._blamed("on_request"):
             built(wanted_class(self.serves[service], "srv", service).Response, fields, service)
         return fields
@@ -148,5 +148,6 @@ class _Running:
             text = f"the simulation `{name}` failed in {method}(): {error.message}"
             raise SimulationError(AuthorMistake(path, line, text)) from error
 
-    def _call(self, work: Callable[[], Result]) -> Result:
-        return guarded(self._planned.name, self._planned.path, work)
+    def _call(self, work: Callable[[], Result], method: str) -> Result:
+        path = self._planned.path
+        return guarded(self._planned.name, path, work, begin_of(self.simulation, method, path))

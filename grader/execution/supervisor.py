@@ -31,8 +31,10 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S, size
+from grader.core.scenario import is_launch_file
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
 from grader.execution.codec import to_json
+from grader.execution.memory_groups import MemoryGroup, make_group
 from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.environment import worker_environment
@@ -58,6 +60,19 @@ TRIES = 2
 MODULE = b"grader.execution.worker_main"
 #: pid, user and group of the sender of a message (`struct ucred`, unix(7)).
 _CREDENTIALS = struct.Struct("3i")
+
+
+class WorkerFailedError(HarnessError):
+    """A worker reported a failure of its own.
+
+    Args:
+        message: Description of the failure.
+        has_started: Whether any of the submission's code had started by then.
+    """
+
+    def __init__(self, message: str, *, has_started: bool) -> None:
+        super().__init__(message)
+        self.has_started = has_started
 
 
 class WorkerLostError(HarnessError):
@@ -94,6 +109,7 @@ class Worker(ABC):
         self._domains = domains
         self._interfaces: tuple[str, ...] = ()
         self._pid = 0
+        self._group: MemoryGroup | None = None
         self.worn = self.shares = self.gone = False
         self.forked: list[ForkedWorker] = []
 
@@ -117,6 +133,9 @@ class Worker(ABC):
         own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
         request = json.dumps({"plan": to_json(plan), **own}) + "\n"
         expected = f"worker: expected a trace of {plan.scenario}, found none"
+        if self._group is not None:
+            launches = any(is_launch_file(name) for name, _ in plan.processes)
+            self._group.make_room(plan.limits, plan.limits.participants if launches else len(plan.processes))
         try:
             self._line.settimeout(MARGIN_S)  # a plan with a recording is larger than the socket buffer
             self._await_start()
@@ -142,7 +161,8 @@ class Worker(ABC):
         if not isinstance(answer, dict) or "trace" not in answer:
             problem = str(answer.get("problem", "")) if isinstance(answer, dict) else ""
             lines = problem.strip().splitlines()
-            raise HarnessError(f"worker: {lines[-1] if lines else 'expected a trace, found none'}"[:600])
+            what = f"worker: {lines[-1] if lines else 'expected a trace, found none'}"[:600]
+            raise WorkerFailedError(what, has_started=isinstance(answer, dict) and answer.get("has_started") is True)
         self.worn = answer.get("worn") is True
         real_ns, starved_ns = (answer.get(name) for name in ("real_ns", "starved_ns"))
         if isinstance(real_ns, int) and isinstance(starved_ns, int):
@@ -241,8 +261,11 @@ class ExecutedWorker(Worker):
         argv = [str(runtime.executable), "-s", "-S", "-u", "-m", MODULE.decode(), json.dumps(request)]
         environment, view = _environment(runtime, scratch), worker_view(runtime, scratch)
         command = isolation.worker_command(argv, environment, numbers, view)
+        self._group = make_group(len(lines))
+        for fork in self.forked:
+            fork.join(self._group)
         self._process = subprocess.Popen(
-            command.argv,
+            command.argv if self._group is None else self._group.inside(command.argv),
             env=dict(command.environment),
             pass_fds=command.pass_fds,
             stdin=subprocess.DEVNULL,
@@ -283,6 +306,8 @@ class ExecutedWorker(Worker):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, 9)
         self._process.wait()
+        if self._group is not None:
+            self._group.remove()
         self._line.close()  # last, so that a thread waiting for an answer is woken by the end of the worker
 
 
@@ -294,6 +319,10 @@ class ForkedWorker(Worker):
         self.shares = True
         self._process: int | None = None  # a descriptor of the process, because its pid may be given to another one
         line.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
+
+    def join(self, group: MemoryGroup | None) -> None:
+        """Tell in which group of the kernel it is."""
+        self._group = group
 
     def _await_start(self) -> None:
         """Receive the first message, with which the kernel tells the sender's pid."""
@@ -454,6 +483,7 @@ class Recorder:
     def _recorded(self, job: Job) -> Trace:
         problem = ""
         limits: list[str] = []
+        with_submission = 0  # failures after its code had started, as far as that is known
         tries = 0
         while tries < TRIES:
             if not job.budget.left_ns:
@@ -478,6 +508,8 @@ class Recorder:
                 self._discard(worker)
                 limit, late = (error.limit, error.late) if isinstance(error, WorkerLostError) else ("", False)
                 limits += [limit] if limit else []
+                started = isinstance(error, WorkerFailedError) and error.has_started
+                with_submission += started or (isinstance(error, WorkerLostError) and not late)
                 tries += worker is None or not worker.shares or bool(limit)  # a replacement does not share its sandbox
                 if late or self._closed:
                     break
@@ -496,7 +528,10 @@ class Recorder:
                 for name, _ in job.plan.processes
             )
             return Trace(job.plan.scenario, clock, stop_ns=job.plan.duration_ns, observations=faults)
-        return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
+        suspected = with_submission >= TRIES
+        if suspected:
+            problem += f" ({with_submission} times, each time in another worker, while this submission was recorded)"
+        return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem, suspected=suspected)
 
     def _drops_place(self) -> bool:
         """Return whether a worker is not replaced until none is busy: the others go on, and a start takes long."""

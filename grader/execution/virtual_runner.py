@@ -25,8 +25,6 @@ from grader.execution.topic_peers import VirtualTopicPeers
 from grader.execution.trace_recorder import NAME_CHARACTERS, OFFERS
 from grader.execution.workload import Workload
 
-#: Start of the hosts' virtual time: 2026-01-01 00:00:00 UTC, the same as in `grader/student_host/clock.py`.
-EPOCH_NS = 1_767_225_600_000_000_000
 #: The most steps at once, and how many more may come with each second of virtual time; more end the scenario. Nodes
 #: that rest need far fewer: ten with timers of 100 Hz that hear each other take some thousand a second.
 STEPS, STEPS_HZ = 400_000, 10_000
@@ -62,7 +60,7 @@ class VirtualRunner(Runner):
         return self._now_ns
 
     def _clock_ns(self, now_ns: int) -> int:
-        return EPOCH_NS + now_ns
+        return self._plan.epoch_ns + now_ns
 
     def _begin(self) -> None:
         self._play(phase="before")
@@ -142,8 +140,8 @@ class VirtualRunner(Runner):
         if self._starts_ns.pop(student.name, 0):
             self._recorder.add(Mark(self._now_ns, "process_starts", student.name))
         self._free_until_ns = self._quiet_until(student)
-        free_ns = EPOCH_NS + self._free_until_ns
-        answer = {"now_ns": EPOCH_NS + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals}
+        free_ns = self._plan.epoch_ns + self._free_until_ns
+        answer = {"now_ns": self._plan.epoch_ns + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals}
         workload = student.measured(self._now_ns)
         workload.begin(self._now_ns, arrivals=bool(arrivals))
         student.tell({**answer, "interrupt": True} if student.stop_signalled and not student.stopping else answer)
@@ -183,8 +181,8 @@ class VirtualRunner(Runner):
     def _catch_up(self, report: Mapping[str, Any]) -> None:
         """Adopt the time that a process has reached on its own."""
         now_ns = report.get("now_ns")
-        if isinstance(now_ns, int) and min(now_ns - EPOCH_NS, self._free_until_ns) > self._now_ns:
-            self._now_ns = min(now_ns - EPOCH_NS, self._free_until_ns)
+        if isinstance(now_ns, int) and min(now_ns - self._plan.epoch_ns, self._free_until_ns) > self._now_ns:
+            self._now_ns = min(now_ns - self._plan.epoch_ns, self._free_until_ns)
             self._hops = 0  # it has rested
 
     def _hear(self, student: NodeProcess, workload: Workload) -> None:
@@ -219,7 +217,7 @@ class VirtualRunner(Runner):
             if report.get("leaving"):
                 self._hand_over()
             wake_ns = report.get("wake_ns")
-            student.wake_ns = wake_ns - EPOCH_NS if isinstance(wake_ns, int) else None
+            student.wake_ns = wake_ns - self._plan.epoch_ns if isinstance(wake_ns, int) else None
             return
         self._mark_dead(student)
 

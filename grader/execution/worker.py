@@ -72,12 +72,16 @@ class Worker:
         runtime: Interpreter and ROS.
         executed: The starter for virtual time, which imports rclpy while the first plan is made; None if the tier needs
             none.
+
+    Attributes:
+        has_started: Whether the submission's code has started since the last plan came.
     """
 
     def __init__(self, isolation: Isolation, runtime: PythonRuntime, executed: StarterProcess | None) -> None:
         self._isolation = isolation
         self._runtime = runtime
         self._real_ns = self._starved_ns = 0
+        self.has_started = False
         self._starters: dict[str, Starter] = {}
         if executed is not None:
             clock = ClockKind.VIRTUAL.value
@@ -92,6 +96,7 @@ class Worker:
             left_ns: Real time that is left for the submission.
             budget_words: The reason to give when that is used up.
         """
+        self.has_started = False
         if self._remembers_connections():
             raise HarnessError("worker: its network remembers connections of nodes that it recorded before")
         self._real_ns = self._starved_ns = 0
@@ -140,6 +145,7 @@ class Worker:
             )
             stack.callback(self._account, monitor)
             _await_ready(students[0])
+            self.has_started = True
             made = evaluated(students[0], plan)
             return made if made.fault is None else replace(made, harness_problem=monitor.problem)
 
@@ -168,6 +174,7 @@ class Worker:
             if not plan.bare:
                 for student in students:
                     _await_ready(student)
+            self.has_started = True
             if plan.clock == ClockKind.WALL.value:
                 stack.enter_context(OutputWatch(students, observer.wake))
             trace = monitor.reviewed(runner(plan, students, observer).run())
@@ -196,7 +203,7 @@ class Worker:
                 "ROS_DOMAIN_ID": str(domain),
                 "RCUTILS_COLORIZED_OUTPUT": "0",
                 **quick_discovery(self._isolation.host_seen_at, self._runtime),
-                "PYTHONHASHSEED": HASH_SEED,
+                "PYTHONHASHSEED": str(plan.hash_seed),
             },
             pass_fds=(theirs.fileno(),),
         )
@@ -214,6 +221,7 @@ class Worker:
             "seed": plan.host_seed,
             "clock": plan.clock,
             "charged": plan.charged,
+            "steady_ns": plan.epoch_ns - plan.uptime_ns,
             "log_format": LOG_FORMAT,
             "python_paths": [str(p) for p in self._runtime.python_paths],
             "interfaces": plan.interfaces,
@@ -224,7 +232,8 @@ class Worker:
         arguments = ("-s", "-u", "-B", "-X", "utf8", launcher, json.dumps({**request, "fd": theirs.fileno()}))
         process = replace(process, arguments=arguments)
         try:
-            if told or not self._isolation.can_fork:  # a fork of the starter has imported rclpy, which takes no part
+            # a fork of the starter has imported rclpy, which takes no part, and has the hashes of the starter
+            if told or not self._isolation.can_fork or str(plan.hash_seed) != HASH_SEED:
                 command = self._isolation.student_command(process, plan.limits)
                 environment = command.environment
                 student = NodeProcess.start(name, root, command, ours, plan.limits)
@@ -413,9 +422,9 @@ def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
         except SimulationError as error:
             answer = {"problem": error.message, "author_mistake": asdict(error.mistake)}
         except HarnessError as error:
-            answer = {"problem": error.message}
+            answer = {"problem": error.message, "has_started": worker.has_started}
         except Exception:
-            answer = {"problem": traceback.format_exc()[-4000:]}
+            answer = {"problem": traceback.format_exc()[-4000:], "has_started": worker.has_started}
         answers.writelines(written(answer))
         answers.flush()
 

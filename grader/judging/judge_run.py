@@ -8,10 +8,18 @@ from fractions import Fraction
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
-from grader.core.report import AUTHOR_MISTAKE, NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
+from grader.core.report import (
+    AUTHOR_MISTAKE,
+    NOT_JUDGED,
+    SUBMISSION_SUSPECTED,
+    ExerciseReport,
+    Report,
+    ReportedFault,
+    Verdict,
+)
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import EXPORT_NOTEBOOK, Run, Submission, is_notebook
-from grader.core.trace import ClockKind, Fault, GraphSnapshot, StartWay, Trace
+from grader.core.trace import ClockKind, Fault, GraphSnapshot, StartWay, Trace, same_node_name
 from grader.judging.diagnosis import diagnose, placed
 from grader.judging.figures import excerpts_for, illustrated
 from grader.judging.findings import FAULT_KEY, fault_evidence
@@ -92,7 +100,7 @@ def judge_exercise(
 def _notes(
     recorded: list[tuple[str, Trace]], submission: Submission, sources: Mapping[str, str] | None
 ) -> tuple[str, ...]:
-    found = (note for _, t in recorded for note in (*started(t), *t.notes))
+    found = (note for _, t in recorded for note in (*started(t), *same_names(t), *t.notes))
     notes = tuple(dict.fromkeys(found))
     return notes if sources is None else placed(notes, submission, sources)
 
@@ -101,6 +109,17 @@ def started(trace: Trace) -> tuple[str, ...]:
     """Return the files that were not started as `python3 FILE` alone, and how they were started."""
     plain = [s.way is StartWay.SCRIPT and not s.arguments and not s.launched_by for s in trace.starts]
     return tuple(f"{s.file}: run {s.words}" for s, alone in zip(trace.starts, plain, strict=True) if not alone)
+
+
+def same_names(trace: Trace) -> tuple[str, ...]:
+    """Return a note for each name that nodes of several processes have at the same time."""
+    found: dict[str, None] = {}
+    for graph in trace.graphs():
+        owners: dict[str, set[int]] = {}
+        for end in filter(on_student_topic, graph.endpoints):
+            owners.setdefault(end.node, set()).add(end.participant)
+        found.update(dict.fromkeys(name for name, processes in owners.items() if len(processes) > 1))
+    return tuple(same_node_name(quote(name)) for name in found)
 
 
 def _faults(recorded: list[tuple[str, Trace]]) -> tuple[ReportedFault, ...]:
@@ -170,6 +189,7 @@ class VerdictBuilder:
             evidence: dict[str, object] = {"error": answer.error} if answer.error else {}
             evidence |= {AUTHOR_MISTAKE: asdict(answer.mistake)} if answer.mistake is not None else {}
             evidence |= {FAULT_KEY: fault_evidence(answer.fault)} if answer.fault is not None else {}
+            evidence |= {SUBMISSION_SUSPECTED: True} if answer.suspected else {}
             problem, hint = answer.problem, answer.hint
             return _without_points(criterion, Outcome.UNDECIDED, problem, hint=hint, evidence=evidence)
         return self._found(criterion, answer.finding)

@@ -41,6 +41,7 @@ class Answer:
         mistake: The mistake of the rubric's author; set together with `problem`.
         hint: One thing to do about the problem; empty if nothing is very likely right.
         fault: The fault that shows the problem; None if none does.
+        suspected: Whether what the submission does may be why there is a problem.
     """
 
     finding: Finding | None = None
@@ -50,6 +51,7 @@ class Answer:
     mistake: AuthorMistake | None = None
     hint: str = ""
     fault: Fault | None = None
+    suspected: bool = False
 
 
 def check_name(criterion: Criterion) -> str:
@@ -95,7 +97,7 @@ def _unrecorded(scenario: Scenario, trace: Trace | None) -> Answer:
         return Answer(problem=f"the scenario {scenario.id} was not recorded")
     if trace.author_mistake is not None:
         return _author_mistake(trace.author_mistake)
-    return Answer(problem=trace.harness_problem)
+    return Answer(problem=trace.harness_problem, suspected=trace.suspected)
 
 
 def for_beginning(criterion: Criterion) -> Criterion | None:
@@ -114,7 +116,8 @@ def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sourc
     """
     lost = answer.finding is not None and answer.finding.credit < 1
     if lost and trace.left_out:
-        return Answer(problem=f"{trace.left_out[0]}, which can be why this is not met", hint=_LEFT_OUT_HINT)
+        problem = f"{trace.left_out[0]}, which can be why this is not met"
+        return Answer(problem=problem, hint=_LEFT_OUT_HINT, suspected=True)
     lack = lacking_package(trace, scenario.processes, sources) if lost else None
     if lack is None:
         return answer
@@ -122,7 +125,7 @@ def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sourc
     hint = f"grade again where {lack.name} is installed, or leave the import out if the program does not need it"
     if lack.name.endswith(INTERFACES):
         hint = f"grade again with --interfaces and the folder of {lack.name}, which has its definitions"
-    return Answer(problem=f"{text}, which is no fault of the program", hint=hint, fault=lack.fault)
+    return Answer(problem=f"{text}, which is not the program's fault", hint=hint, fault=lack.fault)
 
 
 def _without_waiting(trace: Trace) -> Iterator[Trace]:

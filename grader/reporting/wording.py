@@ -30,11 +30,12 @@ OUTCOME_WORDS = {
     Outcome.BLOCKED: "blocked",
     Outcome.UNDECIDED: "undecided",
 }
+_LOST = (Outcome.NOT_MET, Outcome.PARTLY)
 _WHAT_HAPPENED = {
     "syntax_error": "could not be compiled",
     "exception": "raised an exception",
     "exited": "ended by itself",
-    "hung": "did not come back",
+    "hung": "did not return",
     "killed": "was ended",
 }
 # The first frames show where the failure began, the last where it ended; deep recursion repeats in between.
@@ -85,11 +86,40 @@ def author_mistakes(report: Report) -> list[str]:
 
 def summary(report: Report) -> str:
     """Return how many criteria have each outcome."""
-    verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
-    counts = Counter(verdict.outcome for verdict in verdicts)
+    return summary_of([verdict.outcome for e in report.exercises for verdict in e.verdicts], final=report.final)
+
+
+def summary_of(outcomes: Sequence[Outcome], *, final: bool) -> str:
+    """Return how many criteria have each outcome, given the outcome of each, as a sentence."""
+    return f"{'Final' if final else 'So far'}: {outcome_counts(outcomes)}."
+
+
+def outcome_counts(outcomes: Sequence[Outcome]) -> str:
+    """Return how many criteria have each outcome, as a phrase."""
+    counts = Counter(outcomes)
     parts = [f"{counts[outcome]} {word}" for outcome, word in OUTCOME_WORDS.items() if counts[outcome]]
-    judged = [f"{counts[Outcome.MET]} of {len(verdicts)} criteria met", *parts[bool(counts[Outcome.MET]) :]]
-    return f"{'Final' if report.final else 'So far'}: {', '.join(judged)}."
+    return ", ".join([f"{counts[Outcome.MET]} of {len(outcomes)} criteria met", *parts[bool(counts[Outcome.MET]) :]])
+
+
+def first_to_fix(report: Report) -> tuple[ExerciseReport, Verdict] | None:
+    """Return the criterion that a student should look at first: one on a file that exists, or that has another name.
+
+    An exercise that nothing was handed in for comes first only if there is no other.
+    """
+    begun = [e for e in report.exercises if not all(map(_needs_absent, e.verdicts))] or report.exercises
+    lost = [(e, v) for e in begun for v in e.verdicts if v.outcome in _LOST and not v.same_cause_as]
+    return next((found for found in lost if not _is_absent(found[1])), lost[0] if lost else None)
+
+
+def _needs_absent(verdict: Verdict) -> bool:
+    """Return whether a verdict says only that a file is missing."""
+    return bool(verdict.missing_file) or _is_absent(verdict)
+
+
+def _is_absent(verdict: Verdict) -> bool:
+    """Return whether a file is missing, without another that may be meant."""
+    known = verdict.evidence
+    return bool(known.get("missing")) and not (known.get("similar") or known.get("likely"))
 
 
 def reason(verdict: Verdict) -> str:
@@ -115,7 +145,7 @@ def opening(report: Report) -> list[str]:
         headline(report),
         *warnings(report),
         summary(report),
-        *(["Blocked criteria are judged once what they need is met."] if blocked else []),
+        *(["Blocked criteria are judged once the criteria that they need are met."] if blocked else []),
         *notes(report),
     ]
 
@@ -273,6 +303,13 @@ def _partial(report: Report) -> str:
 
 def _not_final(undecided: Sequence[Verdict]) -> str:
     criteria, open_points = _open(undecided)
+    suspected = [verdict for verdict in undecided if verdict.suspected]
+    if suspected:
+        some = "" if len(suspected) == len(undecided) else "some of them "
+        return (
+            f"This score is not final: {criteria} undecided, {some}perhaps because of what the submission does; "
+            f"{open_points} points are still open. The reasons say more."
+        )
     return (
         f"This score is not final: {criteria} undecided through no fault of the student, "
         f"{open_points} points are still open. Grade again."

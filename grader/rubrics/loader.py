@@ -7,6 +7,7 @@ import re
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
@@ -346,6 +347,7 @@ def _exercise(
         criteria=criteria,
         digest=digest,
         by_request=rubric.exercise.by_request,
+        bonus=rubric.exercise.bonus or Fraction(0),
         interfaces=tuple(str(path.parent / folder) for folder in rubric.interfaces),
     )
 
@@ -398,7 +400,7 @@ def _content(path: Path) -> bytes:
         if stat.S_ISDIR(mode):
             raise RubricError(f"{where}: expected a rubric file, found a folder", "name the YAML file inside it")
         if not stat.S_ISREG(mode):
-            raise RubricError(f"{where}: expected a rubric file, found something that is no plain file")
+            raise RubricError(f"{where}: expected a rubric file, found something that is not a regular file")
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except (FileNotFoundError, NotADirectoryError):

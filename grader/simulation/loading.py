@@ -58,13 +58,14 @@ def made(name: str, path: str, content: bytes, parameters: Mapping[str, Any]) ->
     return guarded(name, path, make)
 
 
-def guarded(name: str, path: str, work: Callable[[], Result]) -> Result:
+def guarded(name: str, path: str, work: Callable[[], Result], begins: int = 1) -> Result:
     """Call a simulation, and return what it returns.
 
     Args:
         name: Its name in a rubric.
         path: The author's file, empty for a built-in simulation.
         work: The call.
+        begins: The line to name if an error arises outside of the file, because a method returns something wrong.
 
     Raises:
         SimulationError: It is in an author's file, and raises an error or takes too long.
@@ -86,7 +87,7 @@ def guarded(name: str, path: str, work: Callable[[], Result]) -> Result:
         text = f"the simulation `{name}` failed: {kind}{words_of(error)[:200]}"
         if not path:
             raise HarnessError(text) from error
-        raise SimulationError(AuthorMistake(path, line_of(error, path), text)) from error
+        raise SimulationError(AuthorMistake(path, line_of(error, path, begins), text)) from error
     finally:
         if timed:
             signal.setitimer(signal.ITIMER_VIRTUAL, 0)

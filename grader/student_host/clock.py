@@ -4,8 +4,12 @@ from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable
 
-#: Virtual time starts at 2026-01-01 00:00:00 UTC.
-EPOCH_NS = 1_767_225_600_000_000_000
+#: The first moment at which virtual time may start, 2026-11-01 00:00:00 UTC, and how much later it may: a plan draws
+#: the moment from the year after the release of the grader, so that no date shows that time is virtual, and a file gets
+#: the same report on every day. Each release sets it to the first day of its month.
+EPOCH_NS, EPOCH_SPAN_S = 1_793_491_200_000_000_000, 365 * 24 * 60 * 60
+#: What monotonic clocks show when virtual time starts, at least, and how much more: a machine that has run for a while.
+UPTIME_NS, UPTIME_SPAN_S = 1_000_000_000_000, 20 * 24 * 60 * 60
 
 #: How far time advances for a program that never blocks, each time it shows that it only waits for time to pass.
 STEP_NS = 500_000
@@ -36,6 +40,8 @@ class VirtualClock:
 
     def __init__(self) -> None:
         self.now_ns = EPOCH_NS
+        #: What is subtracted for monotonic clocks, which start neither at zero nor at the epoch.
+        self.steady_ns = EPOCH_NS - UPTIME_NS
         self._looks = 0
         self._allowed = LOOKS
         self._yielding = False

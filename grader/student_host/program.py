@@ -67,8 +67,8 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
 
     Args:
         request: `fd` of the socket, `root` and `file` of the submission, `clock` and whether work is `charged` to it,
-            `seed` (hex), `log_format`, `limits`,
-            and `interfaces`, the folders of interface packages that are not installed.
+            `seed` (hex), `log_format`, `limits`, `steady_ns` of `VirtualTime.start`, and `interfaces`, the folders of
+            interface packages that are not installed.
         host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
             hide one that it has imported.
     """
@@ -99,9 +99,9 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     start = link.ask(ready)
     ready.clear()
     if isinstance(time, VirtualTime):
-        time.start(start["now_ns"], charged=request["charged"])
+        time.start(start["now_ns"], request["steady_ns"], charged=request["charged"])
     else:
-        time.start(start["now_ns"])
+        time.start(start["now_ns"], request["steady_ns"])
     watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
     if isinstance(time, VirtualTime) and watchdog is not None:
         watchdog.start()

@@ -64,7 +64,11 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
             if not blocking:
                 clock.idle_look()
                 return False
-            return self._wait(timeouts.deadline_ns(timeout))
+            deadline_ns = timeouts.deadline_ns(timeout)
+            if not self._locked:  # it was released in the time that was charged
+                self._locked = True
+                return True
+            return self._wait(deadline_ns)
 
         def _wait(self, deadline_ns: int | None) -> bool:
             green_thread = scheduler.mine()

@@ -53,15 +53,14 @@ def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
             scheduler.pause(end_ns)
 
     time.sleep = sleep
-    start_ns = clock.now_ns - 1000 * NS_PER_S  # a monotonic clock starts neither at zero nor at the epoch
-    time.monotonic_ns = lambda: look(clock) - start_ns
-    time.monotonic = lambda: (look(clock) - start_ns) / NS_PER_S
-    time.perf_counter_ns = lambda: look(clock) - start_ns
-    time.perf_counter = lambda: (look(clock) - start_ns) / NS_PER_S
+    time.monotonic_ns = lambda: look(clock) - clock.steady_ns
+    time.monotonic = lambda: (look(clock) - clock.steady_ns) / NS_PER_S
+    time.perf_counter_ns = lambda: look(clock) - clock.steady_ns
+    time.perf_counter = lambda: (look(clock) - clock.steady_ns) / NS_PER_S
 
     def look_unseen() -> float:
         """Replace the clock in libraries, whose looks do not show how the program paces itself."""
-        return (clock.look(paces=False, shown=False) - start_ns) / NS_PER_S
+        return (clock.look(paces=False, shown=False) - clock.steady_ns) / NS_PER_S
 
     threading._time = look_unseen  # type: ignore[attr-defined]
     queue.time = look_unseen  # type: ignore[attr-defined]

@@ -124,13 +124,15 @@ class VirtualTime:
             stream.write = noticing(stream.write)  # type: ignore[method-assign]
         ros.replace_log(noticing)
 
-    def start(self, now_ns: int, *, charged: bool = False) -> None:
+    def start(self, now_ns: int, steady_ns: int, *, charged: bool = False) -> None:
         """Start virtual time in this thread, which may be of a fork of the process that made this object.
 
         Args:
-            now_ns: The time.
+            now_ns: Nanoseconds since 1970.
+            steady_ns: When its monotonic clocks were at zero, in nanoseconds since 1970.
             charged: Whether time passes while the program works.
         """
+        self.clock.steady_ns = steady_ns
         if charged:
             self._work = Work()
             self.clock.charge = self._charge
@@ -151,6 +153,8 @@ class VirtualTime:
             report["moved"] = self._moved
         if self._charges:
             report["charged"] = True
+        if self.scheduler.others_ran():
+            report["threads"] = True
         self._charges = False
         self.clock.paused = self.clock.counted = False
         self._moved = 0

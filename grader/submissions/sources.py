@@ -11,7 +11,7 @@ from pathlib import Path
 
 from grader.core.submission import Submission
 from grader.judging.source import LONGEST_SOURCE, Source, chain, read
-from grader.submissions.revealing import orders, read_attributes, shown_functions
+from grader.submissions.revealing import ORDER, orders, read_attributes, shown_functions
 
 
 def _words(text: str) -> frozenset[str]:
@@ -58,6 +58,8 @@ _ATTRIBUTES = _words(
     "tm_yday year month day toordinal fromordinal "
     "__traceback__ tb_next relativeCreated"
 )
+#: The names of what depends on the hashes of a process.
+HASHES = frozenset((ORDER, "hash"))
 #: Built-in functions that run code or look up names at run time.
 _BUILTINS = _words("exec eval compile __import__ globals locals vars dir memoryview breakpoint id hash")
 #: Functions that classify an object; applied to a module's function, they reveal that it was replaced.
@@ -233,6 +235,10 @@ def _timing(source: Source) -> Iterator[str]:
             yield "a loop that counts"
 
 
+#: Operators after which a time is no date any more: a difference, or what is left over.
+_LESS = (ast.Sub, ast.Mod, ast.BitAnd)
+
+
 class Times:
     """The expressions of a file that hold a time that was read from a clock, also by the names that they are given.
 
@@ -254,7 +260,7 @@ class Times:
         self._names = _reached([(value, name) for value, name in given if self.holds(value)], given)
         differences = [(value, name) for value, name in given if self.holds(value) and not _is_scaled(value)]
         self._in_ns = _reached([(value, name) for value, name in differences if self.holds_ns(value)], differences)
-        less = [(value, name) for value, name in given if any(isinstance(n, ast.Sub) for n in ast.walk(value))]
+        less = [(value, name) for value, name in given if any(isinstance(n, _LESS) for n in ast.walk(value))]
         self._differences = _reached([(value, name) for value, name in less if self.holds(value)], given)
 
     def holds(self, node: ast.AST) -> bool:
@@ -270,12 +276,12 @@ class Times:
     def is_date(self, node: ast.AST) -> bool:
         """Return whether an expression holds a time since 1970, or since the start of a clock, and no difference."""
         return self.holds(node) and not any(
-            isinstance(n, (ast.Sub, ast.Compare)) or chain(n) in self._differences for n in ast.walk(node)
+            isinstance(n, (*_LESS, ast.Compare)) or chain(n) in self._differences for n in ast.walk(node)
         )
 
     def is_difference(self, node: ast.AST) -> bool:
         """Return whether an expression is a difference of times, or what is left over of one."""
-        inexact = isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Sub, ast.Mod, ast.BitAnd))
+        inexact = isinstance(node, ast.BinOp) and isinstance(node.op, _LESS)
         return (inexact and self.holds(node)) or (isinstance(node, ast.Name) and node.id in self._differences)
 
     def _reads(self, node: ast.AST) -> bool:

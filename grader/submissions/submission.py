@@ -14,12 +14,15 @@ from types import MappingProxyType
 from grader.core.errors import SubmissionError
 from grader.core.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
 from grader.execution.executables import Executable, executables
-from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, shown
+from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, listed, shown
 from grader.submissions.projects import read_projects
 from grader.submissions.staging import collect_folder, read_start, write_files
 
 #: Names at least this similar are shown as a possible misspelling.
 SIMILARITY = 0.8
+
+#: Files named in a hint about a submission without any.
+_MOST_WANTED = 4
 
 #: Misspelt names shown for one file.
 MAX_SIMILAR = 3
@@ -63,6 +66,25 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
     if stat.S_ISDIR(_mode(path, where)):
         return _with_python(collect_folder(source, into=into, where=where), wanted, where)
     return _collect_file(source, wanted, where)
+
+
+def every_file(path: str, into: Path) -> Collected:
+    """Read all files of a submission, also of one without a .py file; without one, those of the only archive in it.
+
+    Errors are those of `stage_submission`, but for a missing .py file.
+    """
+    where, source = shown(path, 500), Path(path)
+    folder = stat.S_ISDIR(_mode(path, where))
+    collected = collect_folder(source, into=into, where=where) if folder else _every_file_of(source, (), where)
+    if _has_python(name for name, _ in collected.files):
+        return collected
+    from grader.submissions.archives import collect_archive  # noqa: PLC0415 - as below
+
+    archives = _archives(collected)
+    if len(archives) != 1:
+        return collected
+    name, packed = archives[0]
+    return collect_archive(packed, where=f"{where}/{shown(name)}")
 
 
 def stage_collected(
@@ -110,6 +132,11 @@ def not_there(path: str, hint: str = "") -> SubmissionError:
 
 
 def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
+    return _with_python(_every_file_of(source, wanted, where), wanted, where)
+
+
+def _every_file_of(source: Path, wanted: Sequence[str], where: str) -> Collected:
+    """Return a .py file, or the files of an archive."""
     if not source.is_file():
         raise SubmissionError(f"{where}: expected {_EXPECTED}, found a device, pipe or socket")
     from grader.submissions.archives import (  # noqa: PLC0415 - most submissions are folders
@@ -129,7 +156,13 @@ def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
         return Collected(((source.name, content),))
     if kind is None and not source.name.casefold().endswith(ARCHIVE_SUFFIXES):
         raise SubmissionError(f"{where}: expected {_EXPECTED}, found another kind of file", _other_kind(source, wanted))
-    return _with_python(collect_archive(content, where=where), wanted, where)
+    return collect_archive(content, where=where)
+
+
+def _archives(collected: Collected) -> list[tuple[str, bytes]]:
+    from grader.submissions.archives import ARCHIVE_SUFFIXES  # noqa: PLC0415 - as above
+
+    return [(name, content) for name, content in collected.files if name.casefold().endswith(ARCHIVE_SUFFIXES)]
 
 
 def _other_kind(source: Path, wanted: Sequence[str]) -> str:
@@ -146,9 +179,9 @@ def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Col
     names = [name for name, _ in collected.files]
     if _has_python(names):
         return collected
-    from grader.submissions.archives import ARCHIVE_SUFFIXES, collect_archive  # noqa: PLC0415 - as above
+    from grader.submissions.archives import collect_archive  # noqa: PLC0415 - as above
 
-    archives = [(name, content) for name, content in collected.files if name.casefold().endswith(ARCHIVE_SUFFIXES)]
+    archives = _archives(collected)
     if len(archives) != 1:
         raise _no_python(collected, wanted, where)
     name, packed = archives[0]
@@ -156,7 +189,7 @@ def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Col
     inner = collect_archive(packed, where=inside)
     if not _has_python(name for name, _ in inner.files):
         raise _no_python(inner, wanted, inside)
-    return Collected(inner.files, (f"graded is what {shown(name)} holds", *collected.notes, *inner.notes))
+    return Collected(inner.files, (f"the contents of {shown(name)} were graded", *collected.notes, *inner.notes))
 
 
 def _has_python(names: Iterable[str]) -> bool:
@@ -164,10 +197,8 @@ def _has_python(names: Iterable[str]) -> bool:
 
 
 def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> SubmissionError:
-    from grader.submissions.archives import ARCHIVE_SUFFIXES  # noqa: PLC0415 - as above
-
     names = [name for name, _ in collected.files]
-    archives = [name for name in names if name.casefold().endswith(ARCHIVE_SUFFIXES)]
+    archives = [name for name, _ in _archives(collected)]
     similar = [name for want in wanted for name in _similar(want, names, wanted)]
     hint = ""
     notebooks = [name for name in names if is_notebook(name)]
@@ -176,10 +207,13 @@ def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> Submi
     elif similar:
         hint = f"rename {shown(similar[0])} so that it ends in .py"
     elif archives:
-        hint = f"unpack {shown(archives[0])} and name the folder that holds your files"
+        one = "put your .py files into one zip"
+        hint = f"{one}, not into several" if len(archives) > 1 else f"{one}: {shown(archives[0])} is inside another one"
     elif collected.notes:
         hint = collected.notes[0]
-    found = f"{len(archives)} archives" if len(archives) > 1 else "none"
+    elif wanted:
+        hint = f"hand in {listed([shown(name) for name in wanted][:_MOST_WANTED])}"
+    found = f"{len(archives)} archives" if len(archives) > 1 else first_of(names) if names else "none"
     return SubmissionError(f"{where}: expected at least one .py file, found {found}", hint)
 
 

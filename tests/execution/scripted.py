@@ -13,11 +13,11 @@ from grader.execution.notes import Places
 from grader.execution.observer import Taken
 from grader.execution.plan import Plan, PlannedNumbers
 from grader.execution.workload import Delay
+from grader.student_host.clock import EPOCH_NS
 
 #: Stands for the submission: this file is in it.
 HERE = Path(__file__).resolve().parent
 MS = 1_000_000
-EPOCH_NS = 1_767_225_600_000_000_000
 FLOAT, INT = "std_msgs/msg/Float32", "std_msgs/msg/Int32"
 
 #: Yields reports and is sent answers.
@@ -223,6 +223,7 @@ class ScriptedObserver:
         self._world = world
         self._watched: set[tuple[str, str, bool]] = set()
         self.published: list[tuple[str, Any]] = []
+        self.crowded = ""
         self.advertised: list[tuple[str, str, bool]] = []
         self.services: Any = None
 

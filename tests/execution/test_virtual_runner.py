@@ -12,7 +12,6 @@ pytest.importorskip("rclpy")
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scripted import (
-    EPOCH_NS,
     FLOAT,
     INT,
     MS,
@@ -38,6 +37,7 @@ from grader.execution.student_process import NodeProcess
 from grader.execution.virtual_runner import VirtualRunner
 from grader.execution.workload import HOPELESS_NS
 from grader.student_host import clock as host_clock
+from grader.student_host.clock import EPOCH_NS
 
 
 @pytest.fixture(autouse=True)
@@ -127,8 +127,8 @@ def listener(topic: str, interface: str = FLOAT, **qos: Any) -> Behaviour:
 
 
 def test_both_sides_agree_on_the_epoch() -> None:
-    """Virtual time starts at the same moment in the host and here."""
-    assert module.EPOCH_NS == host_clock.EPOCH_NS == EPOCH_NS
+    """A plan says when virtual time starts; without a draw this is the host's first moment."""
+    assert plan().epoch_ns == host_clock.EPOCH_NS == EPOCH_NS
 
 
 def test_time_jumps_from_wish_to_wish() -> None:

@@ -33,6 +33,8 @@ from grader.submissions.sources import source_text
 Row = Mapping[str, Any]
 CRASHES = rows("crashes.yaml")
 BEHAVIOURS = rows("behaviours.yaml")
+SLIPS = rows("slips.yaml")
+ENDED = [row for row in SLIPS if "fault" in row]
 
 
 def explained(row: Row, traces: Mapping[str, Trace]) -> ExerciseReport:
@@ -69,6 +71,13 @@ def test_a_fault_is_traced_to_its_cause(row: Row) -> None:
     """At the line that has to change, in the words of the student's own code."""
     found = lost(explained(row, crash_traces(row)))
     assert said(row, found[0]) == (row["cause"], row["at"], row["hint"])
+
+
+@pytest.mark.parametrize("row", ENDED, ids=[r["name"] for r in ENDED])
+def test_a_slip_that_ends_the_program_is_traced_to_its_cause(row: Row) -> None:
+    """From what was recorded of it, without running it again."""
+    found = next(v for v in explained(row, crash_traces(row)).verdicts if "diagnosis" in v.evidence)
+    assert said(row, found) == (row["cause"], row["at"] if "where" not in row else "", row["hint"])
 
 
 @pytest.mark.parametrize("row", BEHAVIOURS, ids=[r["name"] for r in BEHAVIOURS])
@@ -133,7 +142,7 @@ def test_every_rule_is_shown_to_work() -> None:
     """By a row of a table, or by a recorded submission, whose hints are compared too."""
     recorded = [json.loads(one.report)["exercises"] for one in read_archive().values()]
     verdicts = [verdict for exercises in recorded for exercise in exercises for verdict in exercise["criteria"]]
-    shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS)} | {v["evidence"].get(CAUSE_KEY) for v in verdicts}
+    shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS, *SLIPS)} | {v["evidence"].get(CAUSE_KEY) for v in verdicts}
     assert {rule.id for rule in RULES} - shown == set()
 
 

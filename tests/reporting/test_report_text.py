@@ -36,7 +36,7 @@ from rich.cells import cell_len
 from grader.core.chart import Excerpt
 from grader.core.exercise import Audience, Location, Outcome
 from grader.core.quantities import NS_PER_S
-from grader.core.report import ExerciseReport, Report, ReportedFault, Reproduction, Verdict
+from grader.core.report import SUBMISSION_SUSPECTED, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.core.trace import GraphSnapshot, ServiceEnd
 from grader.reporting.escape import shown
 from grader.reporting.graph import draw_graph
@@ -241,6 +241,18 @@ def test_an_undecided_report_says_so_plainly() -> None:
     assert "Final:" not in text
     one = report(exercise("e", "1", "E", criterion("c", "C", 5, Outcome.UNDECIDED)))
     assert "1 criterion is undecided through no fault of the student, 5 points" in " ".join(render(one).split())
+
+
+def test_an_undecided_report_does_not_excuse_what_the_submission_may_have_caused() -> None:
+    """A launch file with commands, or a failure that came back with the submission."""
+    theirs = replace(criterion("c", "C", 5, Outcome.UNDECIDED), evidence={SUBMISSION_SUSPECTED: True})
+    words = "perhaps because of what the submission does"
+    alone = " ".join(render(report(exercise("e", "1", "E", theirs))).split())
+    assert f"1 criterion is undecided, {words}; 5 points are still open" in alone
+    both = exercise("e", "1", "E", theirs, criterion("d", "D", 5, Outcome.UNDECIDED))
+    together = " ".join(render(report(both)).split())
+    assert f"2 criteria are undecided, some of them {words}; 10 points" in together
+    assert "no fault" not in alone + together
 
 
 def test_a_criterion_not_met_gives_reason_hint_and_place_in_this_order() -> None:

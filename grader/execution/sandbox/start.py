@@ -96,7 +96,7 @@ def prepare(request: dict[str, Any]) -> None:
     rules = ruleset(system, confinement, request["folder"]) if confinement else None
     if request["user"]:
         become(system, *request["user"], reach=bool(confinement and confinement["reach"]))
-    elif program and not confinement:
+    elif program and (not confinement or os.geteuid() == 0):  # an ordinary user has none, and may not drop any
         drop_capabilities(system)
     # Changing the user resets both, so they have to come afterwards.
     die_with(parent)

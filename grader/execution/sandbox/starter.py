@@ -22,7 +22,8 @@ from grader.execution.sandbox.starter_process import StarterProcess, execute
 #: Seconds until the starter has imported rclpy, and until a sandbox is ready or a process has been forked.
 READY_S, FORKED_S = 60.0, 20.0
 MODULE = "starter.py"
-#: Forks of one process have the same hashes of strings, and so the same order of sets.
+#: Forks of one process have the same hashes of strings, and so the same order of sets. No seed of Python's could give a
+#: fork other ones: Python reads it once, at its start. A program that may use the order of a set is executed instead.
 HASH_SEED = "0"
 KILLED = -signal.SIGKILL
 

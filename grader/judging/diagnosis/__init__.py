@@ -11,18 +11,47 @@ from grader.core.dataclass import dataclass
 from grader.core.exercise import Check, Criterion, Exercise, Outcome, ProblemKind
 from grader.core.report import Verdict
 from grader.core.submission import Submission
-from grader.core.trace import Fault, Trace, main_not_called
+from grader.core.trace import Fault, Trace, main_not_called, same_node_name
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import RandomInRange
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.together import AnswersTogether
-from grader.judging.diagnosis import callbacks, crashes, fan, loading, logs, positions, rates, services, silence, values
+from grader.judging.diagnosis import (
+    attributes,
+    callbacks,
+    crashes,
+    fan,
+    loading,
+    logs,
+    misuse,
+    positions,
+    rates,
+    scopes,
+    services,
+    silence,
+    values,
+)
 from grader.judging.diagnosis.rules import Case, Clue, Rule
+from grader.judging.diagnosis.wiring import bare_statements
 from grader.judging.findings import FAULT_KEY
-from grader.judging.source import Source, first_line, last_name, read, text_of
+from grader.judging.source import Source, argument, chain, first_line, last_name, read, text_of
 
 #: Modules of rules, in the order of evaluation; the rules of each follow the order of the text.
-_MODULES = (loading, services, callbacks, crashes, silence, rates, values, logs, positions, fan)
+_MODULES = (
+    loading,
+    scopes,
+    services,
+    callbacks,
+    crashes,
+    attributes,
+    misuse,
+    silence,
+    rates,
+    values,
+    logs,
+    positions,
+    fan,
+)
 #: All rules; the first that applies wins.
 RULES: tuple[Rule, ...] = tuple(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))
 _LOST = (Outcome.NOT_MET, Outcome.PARTLY)
@@ -132,10 +161,23 @@ def _fault_of(verdict: Verdict, trace: Trace) -> Fault | None:
 
 
 def placed(notes: tuple[str, ...], submission: Submission, sources: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the notes; a note that nothing calls main() gets the line of the guard or of main."""
+    """Return the notes; one that nothing calls main(), or that two nodes have one name, gets the lines to look at."""
     files = {submission.files[name].found or name: text for name, text in sources.items()}
     uncalled = {main_not_called(file): file for file in files}
-    return tuple(_placed(uncalled[note], files[uncalled[note]]) if note in uncalled else note for note in notes)
+    found = [_placed(uncalled[note], files[uncalled[note]]) if note in uncalled else note for note in notes]
+    return tuple(_with_names(note, files) for note in found)
+
+
+def _with_names(note: str, files: Mapping[str, str]) -> str:
+    """Return a note that two nodes have one name with the places that give it."""
+    places: list[str] = []
+    for file, text in files.items():
+        source = read(file, text)
+        for call in (*source.calls("__init__"), *source.calls("create_node"), *source.calls("Node")):
+            name = text_of(argument(call, 0, "node_name"))
+            if name is not None and note == same_node_name(f"/{name.strip('/')}"):
+                places.append(f"{file}:{first_line(call)}")
+    return f"{' and '.join(places)}: {note}" if places else note
 
 
 def _placed(file: str, text: str) -> str:
@@ -144,6 +186,10 @@ def _placed(file: str, text: str) -> str:
     if guard is not None:
         problem = f"{file}:{first_line(guard)}: 'if {source.code(guard.test, 60)}' is never true, so "
         return f"{problem}`python3 {file}` would do nothing; write: if __name__ == '__main__':"
+    named = next((n for n in bare_statements(source) if chain(n) == "main"), None)
+    if named is not None:
+        problem = f"{file}:{first_line(named)}: main is named, not called, so `python3 {file}` would do nothing"
+        return f"{problem}; write: main()"
     main = next(iter(source.functions("main")), None)
     return main_not_called(file, first_line(main) if main is not None else 0)
 

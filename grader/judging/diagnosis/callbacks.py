@@ -8,7 +8,7 @@ import re
 from grader.core.trace import Fault, FaultKind
 from grader.judging.diagnosis.names import NODE_PROPERTIES, closest
 from grader.judging.diagnosis.rules import Clue, Crash, crash_rule, lines_of
-from grader.judging.diagnosis.wiring import Made, made
+from grader.judging.diagnosis.wiring import Made, bare_statements, made
 from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, parameters, text_of
 
 _QUOTES = "\"'"
@@ -19,14 +19,16 @@ def _callback_called(crash: Crash) -> Clue | None:
     """`create_timer(0.05, self.tick())`: the function runs once, and its result is used as the callback."""
     source = crash.source
     result = crash.said(r"not callable|callable object|callback should be either")
-    for item in made(source, "timer", "subscription"):
-        called = item.callback
-        if not isinstance(called, ast.Call) or not _returns_nothing(source, called):
+    given = [(item.call, item.callback) for item in made(source, "timer", "subscription")]
+    given += [(call, argument(call, 2, "callback")) for call in source.calls("create_service")]
+    for call, called in given:
+        serves = last_name(call.func) == "create_service"
+        if not isinstance(called, ast.Call) or not (_returns_nothing(source, called) or serves):
             continue
-        if result or covers(item.call, crash.line):
+        if (result and not serves) or covers(call, crash.line):
             bare = source.code(called.func)
             hint = f"{source.code(called)} calls the function at once: pass {bare}, without the parentheses"
-            return Clue(hint, source.place(item.call))
+            return Clue(hint, source.place(call))
     return None
 
 
@@ -64,6 +66,10 @@ def _timed_with_message(crash: Crash, source: Source) -> Clue | None:
         or not any(last_name(m.callback) == found[1] for m in made(source, "timer"))
     ):
         return None
+    if found[2] == "self":
+        given = next(m.callback for m in made(source, "timer") if last_name(m.callback) == found[1])
+        code = source.code(given) if given is not None else found[1]
+        return Clue(f"{code} belongs to no object: pass self.{found[1]}", source.place(given or functions[0]))
     rest = ", ".join(p for p in parameters(functions[0]) if p != found[2])
     hint = f"a timer calls {found[1]} without arguments: def {found[1]}({rest}):"
     return Clue(hint, source.place(functions[0]))
@@ -84,6 +90,10 @@ def _subscription_signature(crash: Crash) -> Clue | None:
 def _too_few_parameters(source: Source, function: Function, callback: ast.expr | None) -> Clue | None:
     names = parameters(function)
     bound = source.is_method(function) and isinstance(callback, ast.Attribute)
+    timed = any(last_name(m.callback) == function.name for m in made(source, "timer"))
+    if timed and names == ["self"]:
+        hint = f"{function.name} is the callback of the timer: a subscription needs one of its own, with self and msg"
+        return Clue(hint, source.place(callback) if callback is not None else source.place(function))
     if bound and len(names) == 1 and names != ["self"]:
         return Clue(f"self is missing: def {function.name}(self, {names[0]}):", source.place(function))
     if names not in ([], ["self"]):
@@ -127,11 +137,29 @@ def _no_data_yet(crash: Crash) -> Clue | None:
         if not stored_by & callbacks:
             continue
         begin = f"begin {function.name} with: if {name} is None: return"
+        turned = _turned_test(source, function, name)
+        if turned is not None:
+            hint = f"'if {source.code(turned.test, 40)}' is the wrong way round: write if {name} is None"
+            return Clue(hint, source.place(turned))
         if crash.said("NoneType") and any(_starts_with_none(source, n) for n in stores):
             return Clue(f"{name} is None until the first message comes: {begin}")
         unset = crash.said(rf"object has no attribute '{re.escape(node.attr)}'")
         if unset and "__init__" not in stored_by:
             return Clue(f"{name} is not there before the first message: set {name} = None in __init__, and {begin}")
+    return None
+
+
+def _turned_test(source: Source, function: Function, name: str) -> ast.If | None:
+    """Return the test that returns if there is a value, instead of if there is none."""
+    for test in source.all(ast.If):
+        asked = test.test
+        leaves = len(test.body) == 1 and isinstance(test.body[0], ast.Return)
+        if not leaves or source.function_of(test) is not function:
+            continue
+        plain = isinstance(asked, (ast.Name, ast.Attribute)) and chain(asked) == name
+        compared = isinstance(asked, ast.Compare) and chain(asked.left) == name and isinstance(asked.ops[0], ast.IsNot)
+        if plain or compared:
+            return test
     return None
 
 
@@ -195,7 +223,19 @@ def _super_init(crash: Crash) -> Clue | None:
         return Clue(f"{misspelt[1]} is a slip: write super().__init__('node_name')")
     if crash.said(r"Node\.__init__\(\) missing 1 required positional argument: 'node_name'"):
         return _no_name(crash.fault, crash.source)
-    return _no_base(crash) or _used_before_super(crash)
+    return _no_base(crash) or _super_of_other(crash) or _used_before_super(crash)
+
+
+def _super_of_other(crash: Crash) -> Clue | None:
+    """`super(Node).__init__(...)` and `Node.__init__('name')`."""
+    for call in crash.source.on_line(crash.line, ast.Call):
+        base = call.func.value if isinstance(call.func, ast.Attribute) and call.func.attr == "__init__" else None
+        named = isinstance(base, ast.Name) and bool(call.args) and text_of(call.args[0]) is not None
+        other = isinstance(base, ast.Call) and chain(base.func) == "super" and bool(base.args)
+        if named or other:
+            given = ", ".join(crash.source.code(a, 40) for a in call.args if chain(a) != "self")
+            return Clue(f"write super().__init__({given})")
+    return None
 
 
 def _no_base(crash: Crash) -> Clue | None:
@@ -251,6 +291,9 @@ def _init_order(crash: Crash) -> Clue | None:
     if not crash.said(r"NotInitializedException|rclpy\.init\(\) has not been called"):
         return None
     used = next((number for number, name in reversed(crash.frames()) if name != "__init__"), line)
+    named = next((n for n in bare_statements(source) if chain(n) == "rclpy.init"), None)
+    if not inits and named is not None:
+        return Clue("rclpy.init is named, not called: write rclpy.init()", source.place(named))
     if not inits:
         at = next((c for c in source.on_line(used, ast.Call) if first_line(c) == used), None)
         hint = f"call rclpy.init() before line {used}: nothing of ROS works without it"
@@ -279,7 +322,9 @@ def _endpoint_arguments(crash: Crash) -> Clue | None:
     item = next((m for m in items if covers(m.call, crash.line) and m.call.args), None)
     if item is None:
         return None
-    return _timer_arguments(crash, item) if item.kind == "timer" else _topic_arguments(crash, item)
+    if item.kind == "timer":
+        return _timer_arguments(crash, item)
+    return _topic_arguments(crash, item) if _kinds_of(source, item) is None else _mixed_order(source, item)
 
 
 def _timer_arguments(crash: Crash, item: Made) -> Clue | None:
@@ -290,8 +335,54 @@ def _timer_arguments(crash: Crash, item: Made) -> Clue | None:
     return Clue(f"the period comes first, then the callback: create_timer({period}, {callback})")
 
 
-def _topic_arguments(crash: Crash, item: Made) -> Clue | None:
+_ORDER = {"subscription": ["type", "topic", "callback", "depth"], "publisher": ["type", "topic", "depth"]}
+
+
+def _kinds_of(source: Source, item: Made) -> list[str] | None:
+    """Return what the arguments are if all that are wanted are there, in another order; None otherwise."""
+    kinds, wanted = [_kind_of(source, a) for a in item.call.args], _ORDER[item.kind]
+    return kinds if kinds != wanted and sorted(kinds) == sorted(wanted) else None
+
+
+def _mixed_order(source: Source, item: Made) -> Clue | None:
+    """Return the clue for type, topic, callback and depth in another order."""
+    kinds, wanted = _kinds_of(source, item), _ORDER[item.kind]
+    if kinds is None:
+        return None
+    ordered = [source.code(item.call.args[kinds.index(kind)], 40) for kind in wanted]
+    names = "type, topic, callback, depth" if item.kind == "subscription" else "type, topic, depth"
+    return Clue(f"the order is {names}: create_{item.kind}({', '.join(ordered)})")
+
+
+def _kind_of(source: Source, node: ast.expr) -> str:
+    """Return what an argument is, as far as the text shows it."""
+    if isinstance(node, ast.Constant):
+        return {str: "topic", int: "depth"}.get(type(node.value), "")
+    if any(source.is_method(f) or f.name for f in source.functions(last_name(node))):
+        return "callback"
+    dotted = source.resolved(node)
+    if last_name(node)[:1].isupper() and ".msg." in dotted:
+        return "type"
+    return "depth" if "qos" in dotted.lower() else ""
+
+
+@crash_rule(r"has no attribute '(?:__name__|_TYPE_SUPPORT|_CREATE_ROS_MESSAGE)'")
+def _made_for_type(crash: Crash) -> Clue | None:
+    """`create_publisher(Twist(), ...)`: an object stands in the place of the message class."""
+    for item in made(crash.source, "publisher", "subscription"):
+        first = item.call.args[0] if item.call.args else None
+        if isinstance(first, ast.Call):
+            code = crash.source.code(first.func, 40)
+            hint = f"{crash.source.code(first, 40)} makes a message: pass the class, {code}, without the parentheses"
+            return Clue(hint, crash.source.place(item.call))
+    return None
+
+
+def _topic_arguments(crash: Crash, item: Made) -> Clue | None:  # noqa: PLR0911  one for each argument
     source, first = crash.source, item.call.args[0]
+    second = item.call.args[1] if len(item.call.args) > 1 else None
+    if crash.said(r"rclpy_resolve_name\(\): incompatible") and second is not None and last_name(second)[:1].isupper():
+        return Clue(f"{source.code(second, 40)} is no topic: write its name as a text, '/name'")
     text_first = isinstance(first, ast.Constant) and isinstance(first.value, str)
     if text_first and len(item.call.args) > 1 and crash.said(r"rclpy_resolve_name\(\): incompatible"):
         other = source.code(item.call.args[1])

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import ast
-import re
 
 from grader.core.trace import FaultKind
-from grader.judging.diagnosis.names import FIELDS, LOGGER, MESSAGE_FIELDS, NODE_METHODS, PUBLISHER, RCLPY, closest
+from grader.judging.diagnosis.names import MESSAGE_FIELDS, SINGLE_NUMBERS, SPINS
 from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, rule
-from grader.judging.diagnosis.wiring import head_of, made, node_made, reached, spins, target_of, variable_of
-from grader.judging.source import Loop, Source, chain, covers, first_line, last_name, parameters, subtree
+from grader.judging.diagnosis.wiring import (
+    bare_statements,
+    head_of,
+    made,
+    node_made,
+    reached,
+    received,
+    returns_nothing,
+    spins,
+    variable_of,
+)
+from grader.judging.source import Loop, Source, chain, covers, first_line, last_name, subtree, text_of
 
 _EXITS = ("exit", "quit", "_exit")
+#: Functions that draw without arguments, and are often named without being called.
+_DRAWS = ("random.random", "time.time", "time.monotonic")
 
 
 @crash_rule(r"The '(\w+)' field must be (?:of type '(\w+)'|a sub message of type '(\w+)')", in_file=False)
@@ -24,6 +35,9 @@ def _wrong_field_type(crash: Crash) -> Clue | None:
     if type_ != "float":
         other = {"int": "a whole number", "str": "text", "bool": "True or False"}.get(type_)
         written = crash.source.code(value, 40) if value is not None else "..."
+        literal = text_of(value) or ""
+        if type_ == "bool" and literal.capitalize() in ("True", "False"):
+            return Clue(f"{written} is a text: write {target}{literal.capitalize()}, without quotation marks")
         return Clue(f"the field {field} takes {other}: write {target}{type_}({written})") if other else None
     if value is None:
         return Clue(f"the field {field} takes a float: write 0.5 or 0.0, or float(...) around a variable")
@@ -35,9 +49,56 @@ def _not_a_float(source: Source, value: ast.expr, target: str) -> Clue:
         number = source.code(value.elts[0])
         return Clue(f"the comma at the end makes it a tuple: write {target}{number} without the comma", key="tuple")
     written = source.code(value, 40)
+    if isinstance(value, ast.Tuple) and len(value.elts) == 2 and all(map(_is_whole, value.elts)):
+        number = ".".join(source.code(e) for e in value.elts)
+        return Clue(f"the decimal sign is a point, and a comma makes two numbers: write {target}{number}", key="comma")
+    number = (text_of(value) or "").strip().replace(",", ".")
+    if number.lstrip("+-").replace(".", "", 1).isdigit():
+        number = number if "." in number else f"{number}.0"
+        return Clue(f"{written} is a text, the field takes a number: write {target}{number}", key="quoted_number")
+    if text_of(value) is not None:
+        return Clue(f"{written} is a text, the field takes a number: write {target}0.0, with the number that is meant")
+    if isinstance(value, ast.Call) and chain(value.func) == "str" and len(value.args) == 1:
+        return Clue(f"str(...) makes a text, the field takes a float: write {target}{source.code(value.args[0], 50)}")
+    return _no_number_yet(source, value, target, written)
+
+
+def _no_number_yet(  # noqa: PLR0911  one for each kind of value
+    source: Source, value: ast.expr, target: str, written: str
+) -> Clue:
+    """Return the clue for a value that is no number as it is written."""
+    message = received(source, source.function_of(value))
+    if message is not None and chain(value) == message.name and message.type in SINGLE_NUMBERS:
+        return Clue(f"{written} is the whole message: write {target}{written}.data")
+    if isinstance(value, ast.Constant) and (value.value is None or isinstance(value.value, bool)):
+        return Clue(f"{value.value} is no number: write {target}0.0, or the number that is meant")
+    if isinstance(value, ast.Call) and returns_nothing(source, value):
+        return Clue(f"{written} returns nothing: let it return the number, or write {target}0.0")
+    if isinstance(value, ast.Call) and last_name(value.func) in ("now", "get_clock"):
+        return Clue(f"{written} is a time of ROS, not a number: its nanoseconds are {written}.nanoseconds")
+    undeclared = _declared_without_value(source, value)
+    if undeclared is not None:
+        return undeclared
+    if isinstance(value, ast.Call) and last_name(value.func) == "get_parameter":
+        return Clue(f"{written} is the parameter, its value is one step further: write {target}{written}.value")
+    if isinstance(value, (ast.Attribute, ast.Name)) and source.resolved(value) in _DRAWS:
+        return Clue(f"{written} is the function itself: call it, {written}()")
     if _is_whole(value):
         return Clue(f"{written} is a whole number, the field takes a float: write {target}{written}.0")
     return Clue(f"the field takes a float only: write {target}float({written})")
+
+
+def _declared_without_value(source: Source, value: ast.expr) -> Clue | None:
+    """`get_parameter(name).value` of a parameter that was declared without a value."""
+    call = value.value if isinstance(value, ast.Attribute) and value.attr == "value" else None
+    if not isinstance(call, ast.Call) or last_name(call.func) != "get_parameter" or not call.args:
+        return None
+    name = text_of(call.args[0])
+    for declared in source.calls("declare_parameter"):
+        if len(declared.args) == 1 and not declared.keywords and text_of(declared.args[0]) == name:
+            hint = f"the parameter has no value: write {source.code(declared).removesuffix(')')}, 0.5)"
+            return Clue(hint, source.place(declared))
+    return None
 
 
 def _given(crash: Crash, field: str) -> tuple[ast.expr | None, str]:
@@ -73,77 +134,15 @@ def _published_wrongly(crash: Crash) -> Clue | None:
     return Clue(f"this publisher sends {expected} objects, not {got}: make one, set its fields and publish it")
 
 
+@crash_rule(r"Parameter\(s\) already declared: \['([\w./]+)'", in_file=False)
+def _declared_twice(crash: Crash) -> Clue | None:
+    return Clue(f"the parameter {crash.found[1][:60]} is declared twice: take one declare_parameter out")
+
+
 @crash_rule(r"undeclared parameter\(s\): ([\w./]+)", in_file=False)
 def _undeclared_parameter(crash: Crash) -> Clue | None:
     name = crash.found[1][:60]
     return Clue(f"declare the parameter first, in __init__: self.declare_parameter('{name}', default_value)")
-
-
-@crash_rule(r"^AttributeError: (?:module '(rclpy)'|'(\w+)' object) has no attribute '(\w+)'", in_file=False)
-def _wrong_attribute(crash: Crash) -> Clue | None:
-    module, owner, name = crash.found.groups()
-    if module:
-        return _rclpy_name(name)
-    if owner in ("function", "method") and name in LOGGER:
-        return Clue(f"get_logger is a method, call it: self.get_logger().{name}(...)")
-    if owner in ("Publisher", "RcutilsLogger"):
-        near = closest(name, PUBLISHER if owner == "Publisher" else LOGGER)
-        return Clue(f"{name} should be {near}") if near else None
-    return _message_field(owner, name) or _own_attribute(crash, owner, name)
-
-
-def _message_field(owner: str, name: str) -> Clue | None:
-    if (owner, name) in FIELDS:
-        return Clue(f"a {owner} has no {name}; in the message it is {FIELDS[owner, name]}")
-    if owner not in MESSAGE_FIELDS:
-        return None
-    near = closest(name, MESSAGE_FIELDS[owner], 0.6)
-    return Clue(f"{name} should be {near}" if near else f"a {owner} has {', '.join(MESSAGE_FIELDS[owner])}, no {name}")
-
-
-def _rclpy_name(name: str) -> Clue | None:
-    if name == "Node":
-        return Clue("Node is in rclpy.node: from rclpy.node import Node, then class ...(Node)")
-    near = closest(name, RCLPY)
-    return Clue(f"rclpy.{name} should be rclpy.{near}") if near else None
-
-
-def _own_attribute(crash: Crash, owner: str, name: str) -> Clue | None:
-    """A misspelt attribute of the student's node, or one that was made a local variable."""
-    source = crash.source
-    if not any(c.name == owner for c in source.all(ast.ClassDef)):
-        return None
-    outside = _outside_of_class(source, owner, name)
-    if outside is not None:
-        return outside
-    items = made(source, "publisher", "subscription", "timer")
-    local = next((m for m in items if target_of(source, m.call) == name), None)
-    if local is not None:
-        owned_by = source.function_name(local.call) or "the file"
-        hint = f"{name} is a variable of {owned_by} only: write self.{name} = ..."
-        return Clue(hint, source.place(local.call))
-    publishers = [t for m in items if m.kind == "publisher" and (t := target_of(source, m.call)).startswith("self.")]
-    if f"self.{name}.publish(" in source.line(crash.line) and len(publishers) == 1:
-        return Clue(f"the publisher is called {publishers[0]}: write {publishers[0]}.publish(...)")
-    stored = [dotted.removeprefix("self.") for dotted in source.stored if re.fullmatch(r"self\.\w+", dotted)]
-    methods = [f.name for f in source.functions() if source.is_method(f) and not f.name.startswith("__")]
-    near = closest(name, [*stored, *methods], 0.8) or closest(name, NODE_METHODS, 0.85)
-    return Clue(f"self.{name} should be self.{near}") if near else None
-
-
-def _outside_of_class(source: Source, owner: str, name: str) -> Clue | None:
-    """The method is there, but it is indented too little or too much."""
-    functions = source.functions(name)
-    if len(functions) != 1 or source.is_method(functions[0]):
-        return None
-    function, around = functions[0], source.function_of(functions[0])
-    if around is not None:
-        hint = f"{name} is indented into {around.name}: move its def to the left, as far as def {around.name}"
-        return Clue(hint, source.place(function)) if source.is_method(around) else None
-    if parameters(function)[:1] == ["self"]:
-        hint = f"{name} stands outside of the class {owner}: indent it as far as the other methods, inside the class"
-        return Clue(hint, source.place(function))
-    return Clue(f"{name} is a function of the file, not a method of {owner}: write {name}(...) without self")
 
 
 @crash_rule("does not support the context manager|__enter__")
@@ -212,11 +211,13 @@ def _events_executor(case: Case) -> Clue | None:
 
 @crash_rule("", FaultKind.HUNG)
 def _endless_loop(crash: Crash) -> Clue | None:
+    """The innermost call of the stack that stands in a loop of the file names the loop."""
     source, where = crash.source, crash.frames()
-    loops = [n for n in source.loops() if covers(n, crash.line)]
-    if not loops or not where:
+    inside = [(loop, name) for line, name in where for loop in source.loops() if covers(loop, line)]
+    inside = [(loop, name) for loop, name in inside if source.function_name(loop) in ("", name)] or inside
+    if not inside or not where:
         return None
-    loop, name = loops[-1], where[-1][1]
+    loop, name = inside[-1]
     head = f"'{head_of(source, loop)}'"
     if name == "__init__":
         hint = f"the loop {head} keeps the constructor from returning, so nothing else can happen"
@@ -225,6 +226,35 @@ def _endless_loop(crash: Crash) -> Clue | None:
     else:
         hint = f"the loop {head} neither waits nor spins: let a timer call the code instead"
     return Clue(hint, source.place(loop))
+
+
+@crash_rule("", FaultKind.EXITED)
+def _named_only(crash: Crash) -> Clue | None:
+    """A function that starts something is named, and not called."""
+    source = crash.source
+    for node in bare_statements(source):
+        name = last_name(node)
+        if name == "main" or name in SPINS:
+            made_here = node_made(source)
+            given = variable_of(source, made_here) if made_here is not None and name in SPINS else ""
+            code = source.code(node, 40)
+            hint = f"{code} is named, not called: write {code}({given})"
+            return Clue(hint, source.place(node), key=f"named:{first_line(node)}")
+    return None
+
+
+@crash_rule("", FaultKind.EXITED)
+def _never_awaited(crash: Crash) -> Clue | None:
+    """`async def main` called as a function only makes a coroutine, which nothing runs."""
+    source = crash.source
+    functions = {f.name: f for f in source.all(ast.AsyncFunctionDef)}
+    for statement in source.all(ast.Expr):
+        call = statement.value
+        function = functions.get(chain(call.func)) if isinstance(call, ast.Call) else None
+        if function is not None and source.function_of(statement) is None:
+            hint = f"{function.name} is async, so {source.code(call, 40)} runs nothing of it: write def {function.name}"
+            return Clue(f"{hint}, without async", source.place(function))
+    return None
 
 
 @crash_rule("", FaultKind.EXITED)

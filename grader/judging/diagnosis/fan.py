@@ -19,8 +19,10 @@ from grader.judging.diagnosis.wiring import (
     is_flag,
     made,
     made_for,
+    names_in,
     number_at,
     publish_calls,
+    received,
     runs,
     text,
     timer_code,
@@ -249,13 +251,14 @@ def _inverted(controller: _Controller) -> Clue | None:
 
 def _says_inverted(source: Source, switch: _Switch, check: ThresholdResponse | AnswersTogether) -> bool:
     """Return whether the text, too, gives each side the answer of the other."""
+    negated = isinstance(source.parents.get(switch.node), ast.UnaryOp)
     choice = next((n for n in source.around(switch.node, ast.AST) if isinstance(n, (ast.If, ast.IfExp))), None)
     if choice is None:
         return False
     body = choice.body if isinstance(choice, ast.If) else [choice.body]
     numbers = {c.value for part in body for n in subtree(part) if (c := constant(source, n)) is not None}
     right, wrong = check.above, check.otherwise
-    if isinstance(switch.op, (ast.Lt, ast.LtE)):
+    if isinstance(switch.op, (ast.Lt, ast.LtE)) != negated:
         right, wrong = wrong, right
     return wrong in numbers and right not in numbers
 
@@ -334,6 +337,53 @@ def _is_worth(source: Source, node: ast.AST, value: float) -> bool:
 
 
 @rule(ThresholdResponse, AnswersTogether, given=_controller)
+def _compared_not_set(controller: _Controller) -> Clue | None:
+    """`fan.data == 100.0` compares and sets nothing."""
+    source = controller.source
+    for statement in source.all(ast.Expr):
+        test = statement.value
+        if isinstance(test, ast.Compare) and chain(test.left).endswith(".data") and isinstance(test.ops[0], ast.Eq):
+            code = source.code(test)
+            right = f"{source.code(test.left)} = {source.code(test.comparators[0], 40)}"
+            return Clue(f"{code} sets nothing: write {right}", source.place(statement))
+    return None
+
+
+@rule(ThresholdResponse, AnswersTogether, given=_controller)
+def _sent_before_set(controller: _Controller) -> Clue | None:
+    """The message is published before its number is set."""
+    source, check = controller.source, controller.check
+    calls = publish_calls(source, made_for(source, "publisher", check.output))
+    if len(calls) != 1 or len(calls[0].args) != 1 or not chain(calls[0].args[0]):
+        return None
+    name, function = chain(calls[0].args[0]), source.function_of(calls[0])
+    sets = [a for a in source.all(ast.Assign) if chain(a.targets[0]) == f"{name}.data"]
+    here = [a for a in sets if source.function_of(a) is function]
+    made_here = any(chain(a.targets[0]) == name and source.function_of(a) is function for a in source.all(ast.Assign))
+    if not here or not made_here or any(first_line(a) < first_line(calls[0]) for a in here):
+        return None
+    hint = f"{source.code(calls[0])} comes before {source.code(here[0])}: set the number first, then publish"
+    return Clue(hint, source.place(calls[0]))
+
+
+@rule(ThresholdResponse, AnswersTogether, given=_controller)
+def _sends_what_came(controller: _Controller) -> Clue | None:
+    """The message that came is published instead of the answer."""
+    source, check = controller.source, controller.check
+    for call in publish_calls(source, made_for(source, "publisher", check.output)):
+        message = received(source, source.function_of(call))
+        if message is None or len(call.args) != 1 or chain(call.args[0]) != message.name or not message.name:
+            continue
+        if any(chain(t) == f"{message.name}.data" for a in source.all(ast.Assign) for t in a.targets):
+            continue
+        own = [s for s in source.all(ast.Assign) if isinstance(s.value, ast.Call) and chain(s.targets[0])]
+        answers = [chain(s.targets[0]) for s in own if source.function_of(s) is source.function_of(call)]
+        right = f": publish {answers[0]}" if len(answers) == 1 else ": publish the answer"
+        return Clue(f"{source.code(call)} sends back what came{right}", source.place(call))
+    return None
+
+
+@rule(ThresholdResponse, AnswersTogether, given=_controller)
 def _one_branch(controller: _Controller) -> Clue | None:
     """An answer is sent only on one side of the threshold."""
     source, check = controller.source, controller.check
@@ -370,6 +420,50 @@ def _answered_once(controller: _Controller) -> Clue | None:
                 hint = f"'if {source.code(test.test, 40)}' lets one answer through: answer each temperature"
                 return Clue(hint, source.place(test), key="answered_once")
     return None
+
+
+@rule(ThresholdResponse, AnswersTogether, given=_controller)
+def _sent_in_one_branch(controller: _Controller) -> Clue | None:
+    """`publish` stands inside `else`, or a return comes before it."""
+    source, check = controller.source, controller.check
+    given = {r.value for r in published_numbers(controller.case.trace, check.output)}
+    calls = publish_calls(source, made_for(source, "publisher", check.output))
+    if given not in ({check.above}, {check.otherwise}) or len(calls) != 1:
+        return None
+    call, code = calls[0], source.code(calls[0])
+    test = next(source.around(call, ast.If), None)
+    if test is not None and test.orelse and _tests_threshold(source, test.test, check.threshold):
+        inside = any(call in set(subtree(s)) for s in test.orelse)
+        where = "inside else" if inside else f"inside 'if {source.code(test.test, 40)}'"
+        hint = f"{code} stands {where}, so that only one of the answers is sent: move it to the left"
+        return Clue(hint, source.place(call), key="one_branch")
+    answer = chain(call.args[0]) if len(call.args) == 1 else ""
+    early = [t for t in conditions(source, call) if call not in set(subtree(t))]
+    if len(early) != 1 or not answer or not any(f"{n}.".startswith(f"{answer}.") for n in names_in(early[0].test)):
+        return None
+    hint = f"the return under 'if {source.code(early[0].test, 40)}' comes before {code}: each input needs an answer"
+    return Clue(hint, source.place(early[0]), key="one_branch")
+
+
+@rule(ThresholdResponse, given=_controller)
+def _no_other_side(controller: _Controller) -> Clue | None:
+    """The message is kept, and its number is set on one side of the threshold only."""
+    source, check = controller.source, controller.check
+    places = [a for a in given_leaf(source, "data") if isinstance(a, ast.Assign)]
+    if len(places) != 1:
+        return None
+    worth, test = constant(source, places[0].value), next(source.around(places[0], ast.If), None)
+    sent = publish_calls(source, made_for(source, "publisher", check.output))
+    if test is not None and any(test in list(source.around(c, ast.If)) for c in sent):
+        return None
+    if worth is None or test is None or test.orelse or not _tests_threshold(source, test.test, check.threshold):
+        return None
+    missing = next((v for v in (check.above, check.otherwise) if not within(v, worth.value, EXACT)), None)
+    if missing is None or not any(within(v, worth.value, EXACT) for v in (check.above, check.otherwise)):
+        return None
+    target = source.code(places[0].targets[0])
+    hint = f"{target} keeps {number(worth.value)} once it is set: add else: {target} = {float(missing)}"
+    return Clue(hint, source.place(test), key="latched")
 
 
 def _asks_none(test: ast.expr, name: str) -> bool:

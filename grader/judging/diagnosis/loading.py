@@ -11,7 +11,7 @@ from grader.core.submission import EXPORT_NOTEBOOK
 from grader.core.trace import Fault, FaultKind, StartWay
 from grader.judging.diagnosis.names import MODULES, PACKAGES, PLAIN_MODULES, ROS_1, ROS_1_CALLS, closest, import_of
 from grader.judging.diagnosis.rules import Clue, Crash, crash_rule
-from grader.judging.source import Function, Source, chain, covers, last_name, parameters
+from grader.judging.source import Source, chain, covers, last_name
 from grader.judging.wording import quote
 
 _PRINT = re.compile(r"^\s*print\s+(?P<what>[^(].*)$")
@@ -32,9 +32,64 @@ _SAYINGS: Sequence[tuple[str, str]] = (
     ),
     (r"invalid non-printable character", "an invisible character was copied along: type the line again"),
     (r"unterminated (triple-quoted )?string literal", "the quotation mark at the end of the text is missing: {code}"),
+    (r"cannot assign to (?:function call|literal|expression)", "on the left of = stands a name: {code}"),
+    (r"expected '\('", "a name has no space and no hyphen, and brackets follow it: {code}"),
     (r"Maybe you meant '==' or ':=' instead|Maybe you meant '==' instead", "to compare, write == instead of ="),
     (r"Perhaps you forgot a comma", "a comma is probably missing in: {code}"),
     (r"'return' outside function", "return stands outside a function: indent it as the function's other lines"),
+    (r"'(?:yield|await)' outside", "await and yield stand in functions only, and await only in those with async def"),
+    (
+        r"'(break|continue)' (?:outside|not properly in) loop",
+        "break and continue stand in loops only: to leave a function, write return",
+    ),
+    (
+        r"name '(\w+)' is (?:used|assigned to) (?:prior to|before) global",
+        "global comes first: make it the first line of the function",
+    ),
+    (r"positional argument follows keyword", "arguments with a name, as x=1, come last: {code}"),
+    (r"keyword argument repeated", "one name is given twice in: {code}"),
+    (
+        r"(?:non-default argument|parameter without a default) follows",
+        "parameters with a value, as x=1, come last: {code}",
+    ),
+    (r"duplicate argument", "two parameters have one name in: {code}"),
+    (
+        r"cannot assign to (?:function call|literal|expression|True|False|None)",
+        "on the left of = stands a name: {code}",
+    ),
+    (r"illegal target for annotation|only single target", "a value is given with =, not with a colon: {code}"),
+    (r"invalid decimal literal", "a name cannot begin with a digit, nor a number end with letters: {code}"),
+    (r"leading zeros", "a whole number cannot begin with 0: {code}"),
+    (r"unexpected character after line continuation", "a backslash may stand at the end of a line only: {code}"),
+    (r"expected 'except' or 'finally' block", "try needs an except or finally after it, indented as the try"),
+    (
+        r"f-string: (?:expecting '}'|single '}'|empty expression|valid expression)",
+        "the braces of the f-string do not fit: {code}",
+    ),
+    (r"unicodeescape", "a backslash in a text begins a special character: write r'...' before it, or / in paths"),
+    (r"'elif' block follows|invalid syntax.*'else'", "elif comes before else"),
+    (
+        r"unexpected EOF|was never closed|EOF while scanning",
+        "something that is opened is not closed before the end of the file",
+    ),
+    (r"no binding for nonlocal|nonlocal declaration", "write global instead of nonlocal, or keep the value in self"),
+    (r"invalid character '(.)'", "the character {found} does not belong into a program: type it again"),
+)
+#: What only the row shows, where Python says no more than "invalid syntax"; the first pattern that fits wins.
+_ROWS: Sequence[tuple[str, str]] = (
+    (r"[(,]\s*/\w", "a topic is a text: put it into quotation marks, '/name'"),
+    (
+        r"^\s*(?:function|func|void|int|double|float)\s+\w+\s*\(",
+        "a function begins with def, and ends its first line with a colon",
+    ),
+    (r"^\s*(?:elseif|elsif|else if)\b", "in Python this is written elif"),
+    (r"^\s*def\s+\w+\s*:", "brackets are missing behind the name of the function: def name(self):"),
+    (r"^\s*(?:class|def)\s+\w+[- ]\w", "a name has no space and no hyphen: write _ instead"),
+    (r"^\s+\w+\s*\(self.*\):\s*$", "def is missing before the name of the method"),
+    (r"\w\s+['\"]|['\"]\s+\w|['\"]\s*['\"]/", "a comma is missing, before or after the text"),
+    (r"^\s*import\s+\w+\s+from\b", "the module comes first: from module import name"),
+    (r"=\s*$", "a value is missing behind the ="),
+    (r"^\s*\w+\s*=\s*\+\+|\+\+\w", "in Python this is written += 1"),
 )
 #: A key that every notebook has, and how many lines of a file are searched for it.
 _NOTEBOOK, _NOTEBOOK_LINES = re.compile(r'^\{\s*"(?:cells|metadata|nbformat)"\s*:|"cell_type"\s*:'), 200
@@ -61,7 +116,15 @@ def _notebook(crash: Crash) -> Clue | None:
 @crash_rule("", FaultKind.SYNTAX_ERROR, in_file=False)
 def _syntax(crash: Crash) -> Clue | None:
     fault, row = crash.fault, crash.case.source.line(crash.line)
-    return _python_2(fault, row) or _newer_f_string(fault, row) or _other_language(fault, row) or _said(fault, row)
+    known = _python_2(fault, row) or _newer_f_string(fault, row) or _other_language(fault, row) or _said(fault, row)
+    return known or _shown_by_row(fault, row)
+
+
+def _shown_by_row(fault: Fault, row: str) -> Clue | None:
+    if not fault.said("invalid syntax|invalid non-decimal"):
+        return None
+    advice = next((advice for pattern, advice in _ROWS if re.search(pattern, row[:500])), None)
+    return None if advice is None else Clue(f"{advice}: {quote(row, 60)}")
 
 
 def _python_2(fault: Fault, row: str) -> Clue | None:
@@ -84,17 +147,23 @@ def _newer_f_string(fault: Fault, row: str) -> Clue | None:
 
 
 def _other_language(fault: Fault, row: str) -> Clue | None:
-    if not fault.said("invalid syntax"):
+    if not fault.said("invalid syntax|expected ':'"):
         return None
+    if re.match(r"\s*else\s+(?!if\b|:)\S", row[:500]):
+        return Clue(f"else has no condition: write else: alone, or elif with the condition: {quote(row, 60)}")
     right = next((word for pattern, word in _OPERATORS if re.search(pattern, row[:500])), None)
     return Clue(f"in Python this is written {right}: {quote(row, 60)}") if right else None
 
 
 def _said(fault: Fault, row: str) -> Clue | None:
-    template = next((template for pattern, template in _SAYINGS if fault.said(pattern)), None)
-    if template is None or ("{code}" in template and not row.strip()):
+    if fault.said("Maybe you meant '=='") and re.match(r"\s*(?:if|elif|while)\b", row[:200]):
+        return Clue("to compare, write == instead of =")
+    known = ((found, template) for pattern, template in _SAYINGS if (found := fault.said(pattern)) is not None)
+    found, template = next(known, (None, ""))
+    if found is None or ("{code}" in template and not row.strip()):
         return None
-    return Clue(template.format(code=quote(row, 60), indent=_indent(row)))
+    named = found[1] if found.re.groups else ""
+    return Clue(template.format(code=quote(row, 60), indent=_indent(row), found=named))
 
 
 def _indent(row: str) -> str:
@@ -186,6 +255,9 @@ def _cannot_import(crash: Crash) -> Clue | None:
         hint = f"the file that Python takes for {module} is not finished when it is asked: two files import each other"
         return Clue(f"{hint}, or a file of yours has the name of a module")
     near = closest(name, MODULES.get(module, ()), 0.7)
+    begun = [n for n in MODULES.get(module, ()) if n.rstrip("0123456789") == name]
+    if begun:
+        return Clue(f"there is no {name} in {module}: there are {' and '.join(begun)}")
     same = [n for n in MODULES.get(module, ()) if n.lower() == name.lower()]
     if same:
         return Clue(f"upper and lower case matter: from {module} import {same[0]}")
@@ -208,43 +280,6 @@ def _missing_file(crash: Crash) -> Clue | None:
         hint = f"`ros2 run` starts a program in any folder: let setup.py install {name} with data_files"
         return Clue(f"{hint}, and open it in the folder that get_package_share_directory returns")
     return Clue(f"{name} is not in the submission: hand it in, in the folder of the program")
-
-
-@crash_rule(r"^(?:NameError|UnboundLocalError).*name '(\w+)' is not defined")
-def _undefined_name(crash: Crash) -> Clue | None:
-    name, source = crash.found[1], crash.source
-    inside = [f for f in source.functions() if covers(f, crash.line)]
-    if name == "self":
-        return _no_self(source, inside)
-    methods = [f for f in source.functions(name) if source.is_method(f)]
-    if methods and inside and len(methods) == len(source.functions(name)):
-        return Clue(f"{name} is a method: write self.{name}")
-    if methods and not inside and len(methods) == len(source.functions(name)):
-        owner = source.class_of(methods[0])
-        hint = f"{name} is indented into the class {owner.name if owner is not None else ''}: "
-        return Clue(f"{hint}begin its def, and what belongs to it, at the left edge", source.place(methods[0]))
-    if import_of(name):
-        return Clue(f"the import is missing: {import_of(name)}")
-    if inside and source.stores(f"self.{name}"):
-        return Clue(f"{name} belongs to the object: write self.{name}")
-    near = closest(name, _defined(source), 0.8)
-    return Clue(f"{name} is not defined; the file has {near}") if near else None
-
-
-def _no_self(source: Source, inside: list[Function]) -> Clue | None:
-    lacking = next((f for f in reversed(inside) if source.is_method(f) and "self" not in parameters(f)), None)
-    if lacking is None:
-        return None
-    rest = "".join(f", {p}" for p in parameters(lacking))
-    return Clue(f"self is missing: def {lacking.name}(self{rest}):", source.place(lacking))
-
-
-def _defined(source: Source) -> list[str]:
-    names = [n.id for n in source.all(ast.Name) if isinstance(n.ctx, ast.Store)]
-    names += [f.name for f in source.functions() if not source.is_method(f)]
-    names += [c.name for c in source.all(ast.ClassDef)]
-    names += [a.arg for a in source.all(ast.arg)]
-    return names + [(a.asname or a.name).split(".")[0] for a in source.all(ast.alias)]
 
 
 @crash_rule(r"partially initialized module '(\w+)' has no attribute", in_file=False)

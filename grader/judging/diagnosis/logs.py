@@ -8,9 +8,9 @@ from collections import Counter
 
 from grader.core.exercise import Location, Outcome, ProblemKind
 from grader.core.quantities import seconds
-from grader.judging.checks.logs import UsesLogger
+from grader.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
-from grader.judging.checks.received import LogsReceived
+from grader.judging.checks.received import LogsReceived, LogsValues
 from grader.judging.diagnosis.rules import Case, Clue, rule
 from grader.judging.diagnosis.wiring import (
     Made,
@@ -127,6 +127,44 @@ def _nothing_logged(case: Case) -> bool:
     return not student_records(case.trace, case.process)
 
 
+#: A field of an f-string, and a placeholder of `%`, in a text that is logged as it stands.
+_FIELD = re.compile(r"\{(?P<value>[A-Za-z_][\w.]*(?:\(\))?(?:\[[^\]{}]*\])*)(?:![rsa])?(?::[^{}]*)?\}")
+_PERCENT = re.compile(r"%[-+ 0#]*\d*(?:\.\d+)?[dfgeEsi](?![A-Za-z])")
+
+
+@rule(LogsPosition, LogsReceived, LogsValues, LogsMatching)
+def _text_as_it_stands(case: Case) -> Clue | None:
+    """The f of an f-string is missing, or the values behind a `%` or in `format`."""
+    source = case.source
+    logs = [n for n in source.all(ast.Call) if is_log(source, n) or chain(n.func) == "print"]
+    plain = [(call, t) for call in logs if len(call.args) == 1 and (t := text_of(call.args[0])) is not None]
+    written = {o.text.strip() for o in student_records(case.trace, case.process)}
+    written |= {o.text.strip() for o in printed_lines(case.trace, case.process)}
+    doubled = [
+        c for c in logs if c.args and isinstance(c.args[0], ast.JoinedStr) and "{{" in source.code(c.args[0], 200)
+    ]
+    for call in doubled:
+        if any("{" in w and "}" in w for w in written):
+            hint = f"double braces are braces as text: write single ones, in {source.code(call.args[0], 50)}"
+            return Clue(hint, source.place(call))
+    for call, text in plain:
+        fields = [m["value"] for m in _FIELD.finditer(text)]
+        if fields and text.strip() in written:
+            return Clue(f"the f before the text is missing: f{source.code(call.args[0], 50)}", source.place(call))
+        empty = re.findall(r"\{(?::[^{}]*)?\}", text)
+        if empty and text.strip() in written:
+            values = ", ".join(["..."] * len(empty))
+            return Clue(
+                f"{empty[0]} stays as it is without a value: put .format({values}) behind the text", source.place(call)
+            )
+        places = _PERCENT.findall(text)
+        if places and text.strip() in written:
+            values = ", ".join(["..."] * len(places))
+            hint = f"{places[0]} stays as it is without a value: put % ({values}) behind the text"
+            return Clue(hint, source.place(call))
+    return None
+
+
 @rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.NOT_MET)
 def _level_raised(case: Case) -> Clue | None:
     """The program hides its own records."""
@@ -136,6 +174,18 @@ def _level_raised(case: Case) -> Clue | None:
             hint = f"{case.source.code(call)} hides what is logged below the level {level.upper()}: take it out"
             return Clue(hint, case.source.place(call), key="level_raised")
     return None
+
+
+@rule(LogsReceived)
+def _received_at_debug(case: Case) -> Clue | None:
+    """What is received is logged at a level that is not shown."""
+    item = made_for(case.source, "subscription", case.check.topic)
+    inside = runs(case.source, item) if item is not None else []
+    logs = [n for n in inside if isinstance(n, ast.Call) and is_log(case.source, n)]
+    if not logs or any(last_name(c.func) != "debug" for c in logs) or any(case.source.calls("set_level")):
+        return None
+    hint = f"{case.source.code(logs[0], 60)} is not shown: the level is INFO unless it is changed; use info"
+    return Clue(hint, case.source.place(logs[0]))
 
 
 @rule(UsesLogger, LogsPosition)
@@ -305,4 +355,29 @@ def _error_while_waiting(case: Case) -> Clue | None:
     call = next(logs, None)
     if call is None or last_name(call.func) not in ("error", "fatal"):
         return None
-    return Clue(f"that no data has come yet is no failure: use info or warn instead of {last_name(call.func)}")
+    return Clue(f"this is no failure of the node: use info or warn instead of {last_name(call.func)}")
+
+
+@rule(LogsEvery)
+def _log_every(case: Case) -> Clue | None:
+    """`count % 100 == 0` where one log for every ten messages is asked for, or no condition at all."""
+    source, every, call = case.source, case.check.every, position_log(case)
+    logs = [n for n in source.all(ast.Call) if is_log(source, n)]
+    timed = [n for m in made(source, "timer") for n in runs(source, m)]
+    call = next((c for c in logs if c in timed), call)
+    test = next(source.around(call, ast.If), None) if call is not None else None
+    if call is not None and call in timed and test is None:
+        return Clue(f"this logs every message: put it under if count % {every} == 0", source.place(call))
+    divisions = [n for n in ast.walk(test.test) if isinstance(n, ast.BinOp)] if test is not None else []
+    by = [n for n in divisions if isinstance(n.op, ast.Mod)]
+    worth = constant(source, by[0].right) if len(by) == 1 else None
+    if worth is None or test is None:
+        return None
+    rest = number_at(source, test.test.comparators[0]) if isinstance(test.test, ast.Compare) else None
+    if rest is not None and rest >= worth.value:
+        hint = f"'{source.code(test.test, 40)}' is never true, the rest is below {number(worth.value)}: compare with 0"
+        return Clue(hint, source.place(test))
+    if worth.value == every:
+        return None
+    hint = f"{source.code(by[0], 40)} is 0 for every {number(worth.value)}th message: write {every} instead of "
+    return Clue(f"{hint}{number(worth.value)}", source.place(worth.origin))

@@ -49,6 +49,41 @@ RCLPY = words(
     "init spin spin_once spin_until_future_complete shutdown try_shutdown ok create_node get_default_context "
     "get_global_executor"
 )
+#: Names that other languages and releases use for methods of Node, with the method that is meant.
+NODE_SLIPS = {
+    "create_subscriber": "create_subscription",
+    "subscribe": "create_subscription",
+    "subscription": "create_subscription",
+    "create_wall_timer": "create_timer",
+    "advertise": "create_publisher",
+    "publisher": "create_publisher",
+    "create_server": "create_service",
+    "create_service_client": "create_client",
+    "logger": "get_logger()",
+    "get_log": "get_logger",
+    "clock": "get_clock()",
+    "now": "get_clock().now",
+    "get_time": "get_clock().now",
+    "declare_param": "declare_parameter",
+    "get_param": "get_parameter",
+}
+#: The positional parameters of the methods of Node that create something, without `self`.
+SIGNATURES = {
+    "create_publisher": ("msg_type", "topic", "qos_profile"),
+    "create_subscription": ("msg_type", "topic", "callback", "qos_profile"),
+    "create_timer": ("timer_period_sec", "callback"),
+    "create_service": ("srv_type", "srv_name", "callback"),
+    "create_client": ("srv_type", "srv_name"),
+    "create_rate": ("frequency",),
+}
+#: Keywords that other releases and languages use -> the parameter that is meant.
+KEYWORD_SLIPS = {
+    **dict.fromkeys(("qos", "queue_size", "depth", "history", "queue", "qos_depth"), "qos_profile"),
+    **dict.fromkeys(("period", "timer_period", "duration", "seconds", "interval"), "timer_period_sec"),
+    **dict.fromkeys(("name", "topic_name", "service_name"), "topic"),
+    **dict.fromkeys(("type", "message_type", "msg"), "msg_type"),
+    **dict.fromkeys(("cb", "function", "func", "callback_function"), "callback"),
+}
 PUBLISHER = ("publish", "get_subscription_count", "wait_for_all_acked", "destroy", "assert_liveliness")
 #: Functions that run callbacks.
 SPINS = ("spin", "spin_once", "spin_until_future_complete", "spin_once_until_future_complete")
@@ -100,6 +135,32 @@ PLAIN_MODULES = ("rclpy", "time", "math", "random", "sys", "os", "threading", "d
 _ALIASES = {"np": "import numpy as np", "numpy": "import numpy", "sleep": "from time import sleep"}
 _ALIASES |= {"uniform": "from random import uniform", "randint": "from random import randint"}
 
+#: Functions and numbers of Python's modules that students use, and often without the module.
+FUNCTIONS = {
+    "math": words(
+        "sin cos tan asin acos atan atan2 sqrt pow exp log log10 floor ceil trunc fabs fmod hypot radians degrees pi "
+        "tau inf nan isnan isinf isclose copysign dist"
+    ),
+    "random": words(
+        "random uniform randint randrange choice choices sample shuffle gauss normalvariate triangular seed getrandbits"
+    ),
+    "time": words("time sleep monotonic perf_counter time_ns strftime localtime gmtime ctime process_time"),
+    "rclpy": RCLPY,
+}
+#: How other languages write what Python knows under another name.
+OTHER_SPELLINGS = {
+    **dict.fromkeys(("true", "TRUE"), "True"),
+    **dict.fromkeys(("false", "FALSE"), "False"),
+    **dict.fromkeys(("null", "NULL", "nil", "none", "NONE", "Null", "nullptr", "undefined"), "None"),
+    **dict.fromkeys(("this", "Self", "slef", "sefl"), "self"),
+    **dict.fromkeys(("string", "String_"), "str"),
+    **dict.fromkeys(("double", "Double"), "float"),
+    "boolean": "bool",
+    "printf": "print",
+    "Print": "print",
+    "elif_": "elif",
+}
+
 #: Path to a field that people look for in the wrong message.
 FIELDS = {
     **{(m, f): f"msg.pose.pose.position.{f}" for m in ("Odometry", "PoseWithCovariance", "Pose") for f in ("x", "y")},
@@ -123,8 +184,14 @@ MESSAGE_FIELDS = {
     "TwistWithCovariance": ("twist", "covariance"),
     "Pose": ("position", "orientation"),
     "Temperature": ("header", "temperature", "variance"),
+    "Trigger_Response": ("success", "message"),
+    "SetBool_Request": ("data",),
+    "SetBool_Response": ("success", "message"),
     **dict.fromkeys(_NUMBERS, ("data",)),
+    "Bool": ("data",),
 }
+#: Messages with one field, which holds a number.
+SINGLE_NUMBERS = frozenset(_NUMBERS) - {"String"}
 
 
 def import_of(name: str) -> str:
@@ -135,6 +202,8 @@ def import_of(name: str) -> str:
         return f"import {name}"
     if name in PACKAGES:
         return ""
+    if name in ("sin", "cos", "tan", "sqrt", "pi", "radians", "degrees", "atan2"):
+        return f"from math import {name}"
     homes = [module for module, names in MODULES.items() if name in names]
     return f"from {homes[0]} import {name}" if len(homes) == 1 else ""
 
@@ -145,3 +214,8 @@ def closest(name: str, candidates: Iterable[str], cutoff: float = 0.75) -> str:
     plain = {c.lower().replace("_", ""): c for c in sorted(set(candidates) - {name}) if len(c) <= 80}
     found = difflib.get_close_matches(name.lower().replace("_", ""), plain, n=1, cutoff=cutoff)
     return plain[found[0]] if found else ""
+
+
+def article(name: str) -> str:
+    """Return `a` or `an`, as it stands before a name."""
+    return "an" if name[:1] in "AEIO" else "a"

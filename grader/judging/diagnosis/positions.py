@@ -8,7 +8,7 @@ from grader.core.exercise import Outcome
 from grader.judging.checks.odometry import LogsPosition
 from grader.judging.diagnosis.logs import position_log
 from grader.judging.diagnosis.rules import Case, Clue, Maker, rule
-from grader.judging.diagnosis.wiring import is_flag, made, names_in, number_at, reached, roots, runs
+from grader.judging.diagnosis.wiring import is_flag, made, message_classes, names_in, number_at, reached, roots, runs
 from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
 
 _POSITION = "msg.pose.pose.position"
@@ -153,6 +153,22 @@ def _rounded_away(case: Case) -> Clue | None:
     return None
 
 
+@_position_rule("constant", "nothing", "no_pair")
+def _thrown_away(case: Case) -> Clue | None:
+    """The function that logs puts a new message in the place of the stored one."""
+    source, call = case.source, position_log(case)
+    function = source.function_of(call) if call is not None else None
+    callbacks = [f for m in made(source, "subscription") for f in roots(source, m.callback)]
+    for statement in source.all(ast.Assign):
+        name = chain(statement.targets[0])
+        fresh = isinstance(statement.value, ast.Call) and last_name(statement.value.func) in message_classes(source)
+        kept = any(source.function_of(n) in callbacks for n in source.stores(name))
+        if function is not None and source.function_of(statement) is function and fresh and kept:
+            hint = f"{source.code(statement)} throws away what came: take it out"
+            return Clue(hint, source.place(statement))
+    return None
+
+
 @_position_rule("constant")
 def _never_stored(case: Case) -> Clue | None:
     """The callback assigns local variables, but others are logged."""
@@ -182,18 +198,32 @@ def _scaled_position(case: Case) -> Clue | None:
     return None
 
 
-@_position_rule("stale")
+@_position_rule("stale", "wrong")
 def _old_messages(case: Case) -> Clue | None:
-    """A callback that sleeps lags behind the messages."""
+    """A callback that sleeps lags behind the messages, and so does a loop that handles one at a time and sleeps."""
     source = case.source
-    oldest = _oldest_taken(source)
+    oldest = _oldest_taken(source) if case.evidence("cause") == "stale" else None
     if oldest is not None:
         return oldest
+    if case.evidence("cause") == "wrong" and not case.evidence("right"):
+        return None
     for item in made(source, "subscription"):
         for node in runs(source, item):
-            if isinstance(node, ast.Call) and chain(node.func) in ("time.sleep", "sleep"):
+            if isinstance(node, ast.Call) and source.resolved(node.func) in ("time.sleep", "sleep"):
                 hint = f"{source.code(node)} in the callback makes messages wait in the queue: take it out"
-                return Clue(hint, source.place(node))
+                return Clue(hint, source.place(node), key="old_messages")
+    return _one_at_a_time(source)
+
+
+def _one_at_a_time(source: Source) -> Clue | None:
+    """Return a clue if a loop handles one message each time, and sleeps."""
+    for call in source.calls("spin_once"):
+        loop = next((n for n in source.around(call, ast.AST) if isinstance(n, (ast.While, ast.For))), None)
+        inside = list(reached(source, [loop])) if loop is not None else []
+        sleeps = [n for n in inside if isinstance(n, ast.Call) and source.resolved(n.func) in ("time.sleep", "sleep")]
+        if sleeps:
+            hint = f"{source.code(call)} takes one message, and {source.code(sleeps[0])} lets others wait: "
+            return Clue(f"{hint}spin all the time and log from a timer", source.place(sleeps[0]), key="old_messages")
     return None
 
 

@@ -79,8 +79,10 @@ def _period(paced: _Paced) -> Clue | None:
     if worth is None or _same(worth.value, paced.period_s):
         return None
     if worth.value == 0:
-        hint = f"{timer_code(paced.source, timers[0])} never pauses, its period is 0"
-        return Clue(f"{hint}: {number(paced.period_s)} s is asked for", paced.source.place(worth.origin))
+        code = timer_code(paced.source, timers[0])
+        why = "; // divides to a whole number, / does not" if "//" in code else ""
+        hint = f"{code} has a period of 0 s: write {number(paced.period_s)}{why}"
+        return Clue(hint, paced.source.place(worth.origin))
     explains = _same(1 / worth.value, paced.found_hz) or (paced.count <= 2 and _same(worth.value, paced.first_s))
     return _period_clue(paced.source, timers[0], worth, paced.wanted_hz) if explains else None
 
@@ -116,6 +118,24 @@ def _callback_held_up(paced: _Paced) -> Clue | None:
             hint = f"{paced.source.code(call)} holds up the callback: take it out, the timer sets the pace"
             return Clue(hint, paced.source.place(call))
     return _held_up_now_and_then(paced)
+
+
+@rule(TopicRate, given=_paced)
+def _loops_in_callback(paced: _Paced) -> Clue | None:
+    """The callback of the timer publishes in a loop that never ends."""
+    for timer in paced.timers():
+        for node in runs(paced.source, timer):
+            if not isinstance(node, ast.While) or not _endless(node) or not set(paced.calls) & set(ast.walk(node)):
+                continue
+            name = paced.source.function_name(node) or "the callback"
+            hint = f"the loop '{head_of(paced.source, node)}' keeps {name} from returning: "
+            return Clue(f"{hint}take the loop away, the timer calls {name} again", paced.source.place(node))
+    return None
+
+
+def _endless(loop: ast.While) -> bool:
+    plain = isinstance(loop.test, ast.Constant) or chain(getattr(loop.test, "func", None)) == "rclpy.ok"
+    return plain and not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in ast.walk(loop))
 
 
 def _held_up_now_and_then(paced: _Paced) -> Clue | None:

@@ -201,6 +201,11 @@ def _future_is_no_answer(crash: Crash) -> Clue | None:
             return Clue(f"result is a method: write {code}().{name}", source.place(node))
     if crash.found[1] is None:
         return None
+    for call in source.calls("call_async"):
+        waits = isinstance(source.parents.get(call), ast.Await)
+        if isinstance(source.function_of(call), ast.AsyncFunctionDef) and not waits:
+            code = source.code(call, 50)
+            return Clue(f"call_async returns a future: write await {code} to get the response", source.place(call))
     hint = f"call_async returns a future, and {name} belongs to the response: call "
     return Clue(f"{hint}rclpy.spin_until_future_complete(node, future), then future.result().{name}")
 

@@ -28,6 +28,7 @@ from grader.judging.diagnosis.wiring import (
     is_log,
     made,
     made_for,
+    names_in,
     node_made,
     publish_calls,
     reached,
@@ -35,12 +36,13 @@ from grader.judging.diagnosis.wiring import (
     runs,
     short,
     spins,
+    target_of,
     timer_code,
     used,
     variable_of,
 )
 from grader.judging.output import student_records
-from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, text_of
+from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, subtree, text_of
 from grader.judging.values import carries_number, student_endpoints
 from grader.judging.wording import quote
 
@@ -264,6 +266,116 @@ def _never_publishes(case: Case) -> Clue | None:
 
 
 @rule(given=_unseen)
+def _destroyed_first(unseen: _Unseen) -> Clue | None:
+    """The node is destroyed before it spins."""
+    source = unseen.source
+    for call in source.calls("destroy_node", "destroy_publisher", "destroy_timer"):
+        spun = [n for n in spins(source) if source.function_of(n) is source.function_of(call)]
+        later = [n for n in spun if first_line(n) > first_line(call)]
+        if later and len(later) == len(spun) and not any(source.around(call, ast.If)):
+            hint = (
+                f"{source.code(call)} comes before {last_name(later[0])} in line {first_line(later[0])}: put it after"
+            )
+            return Clue(hint, source.place(call))
+    return None
+
+
+@rule(given=_unseen)
+def _never_reached(unseen: _Unseen) -> Clue | None:
+    """The code stands after a return, or is left by the one before."""
+    source = unseen.source
+    leaving: list[ast.stmt] = [*source.all(ast.Return), *source.all(ast.Continue), *source.all(ast.Break)]
+    for stop in sorted(leaving, key=first_line):
+        rest = _after(source, stop)
+        if unseen.calls and rest and all(any(covers(s, first_line(c)) for s in rest) for c in unseen.calls):
+            hint = f"{source.code(stop, 40)} ends {source.function_name(stop)} here, so that "
+            return Clue(f"{hint}line {first_line(unseen.calls[0])} never runs: take it out", source.place(stop))
+    return None
+
+
+def _after(source: Source, statement: ast.stmt) -> list[ast.stmt]:
+    """Return the statements behind one in its block."""
+    parent = source.parents.get(statement)
+    for block in ("body", "orelse", "finalbody"):
+        statements = getattr(parent, block, None)
+        if isinstance(statements, list) and statement in statements:
+            return statements[statements.index(statement) + 1 :]
+    return []
+
+
+@rule(given=_unseen)
+def _lambda_names(unseen: _Unseen) -> Clue | None:
+    """`lambda: self.tick` names the method and does not call it."""
+    source = unseen.source
+    for item in made(source, "timer", "subscription"):
+        body = item.callback.body if isinstance(item.callback, ast.Lambda) else None
+        if isinstance(body, (ast.Name, ast.Attribute)) and source.functions(last_name(body)):
+            code = source.code(body, 40)
+            return Clue(f"the lambda names {code} and does not call it: pass {code} itself", source.place(item.call))
+    return None
+
+
+@rule(given=_unseen)
+def _never_true(unseen: _Unseen) -> Clue | None:
+    """The condition around the code can never hold: a publisher is no None."""
+    source = unseen.source
+    owned = {target_of(source, m.call) for m in made(source, "publisher", "subscription", "timer")} - {""}
+    for call in unseen.calls:
+        for test in source.around(call, ast.If):
+            asked = test.test
+            none = isinstance(asked, ast.Compare) and isinstance(asked.ops[0], ast.Is) and chain(asked.left) in owned
+            turned = isinstance(asked, ast.UnaryOp) and isinstance(asked.op, ast.Not) and chain(asked.operand) in owned
+            if none or turned:
+                code = source.code(asked, 40)
+                return Clue(f"'if {code}' is never true, for there is one: take the condition out", source.place(test))
+    return None
+
+
+@rule(given=_unseen)
+def _kept_in_local(unseen: _Unseen) -> Clue | None:
+    """What is logged or published waits for a value that the callback keeps in a local variable."""
+    source = unseen.source
+    for call in unseen.calls:
+        for test in conditions(source, call):
+            if not is_flag(test.test):
+                continue
+            for name in names_in(test.test):
+                clue = _kept_elsewhere(source, name)
+                if clue is not None:
+                    return clue
+    return None
+
+
+def _kept_elsewhere(source: Source, waited: str) -> Clue | None:
+    """Return a clue if a variable that is waited for is only ever set to None, and a callback sets a local one."""
+    stores = source.stored.get(waited, ())
+    values = [getattr(source.parents.get(n), "value", None) for n in stores]
+    early = [isinstance(v, ast.Constant) and not v.value for v in values]
+    callbacks = [f for m in made(source, "subscription") for f in roots(source, m.callback)]
+    inside = [n for f in callbacks for n in subtree(f)]
+    locals_ = [n for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    bare = waited.removeprefix("self.")
+    if len(callbacks) != 1 or "." in bare:
+        return None
+    function = callbacks[0]
+    name = getattr(function, "name", "the callback")
+    if waited == bare:  # a variable of the file
+        mine = [n for n in locals_ if n.id == waited]
+        declared = any(waited in g.names for g in source.all(ast.Global) if g in inside)
+        if not mine or declared or not any(source.function_of(n) is None for n in stores):
+            return None
+        hint = f"{name} assigns {waited}, so Python takes it for a variable of {name} alone"
+        return Clue(f"{hint}: begin {name} with: global {waited}", source.place(mine[0]))
+    if not stores or not all(early):
+        return None
+    chosen = [n for n in locals_ if n.id == bare] or locals_
+    if chosen:
+        kept = min(chosen, key=first_line)
+        return Clue(f"{kept.id} is a variable of {name} only: assign to {waited}", source.place(kept))
+    return Clue(f"nothing sets {waited}: assign what came to it in {name}", source.place(function))
+
+
+@rule(given=_unseen)
 def _not_spun(unseen: _Unseen) -> Clue | None:
     source = unseen.source
     node = node_made(source)
@@ -307,7 +419,7 @@ def _nested_spin(unseen: _Unseen) -> Clue | None:
 @rule(LogsPosition)
 def _stopped_listening(case: Case) -> Clue | None:
     """The subscription requests a deadline that no publisher offers, or is destroyed before the data arrives."""
-    if case.evidence("right") != 0:
+    if case.evidence("right") != 0 or case.evidence("cause") not in ("nothing", "constant"):
         return None
     source = case.source
     for item in made(source, "subscription"):

@@ -13,7 +13,17 @@ from grader.judging.checks.fields import FieldFunction, RandomInRange
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues
 from grader.judging.diagnosis.rules import Case, Clue, rule
-from grader.judging.diagnosis.wiring import Constant, constant, given_leaf, made, made_for, number_at, runs, variable_of
+from grader.judging.diagnosis.wiring import (
+    Constant,
+    constant,
+    given_leaf,
+    made,
+    made_for,
+    number_at,
+    runs,
+    target_of,
+    variable_of,
+)
 from grader.judging.source import Source, chain, first_line, last_name, words
 from grader.judging.values import as_number, leaves, published, published_numbers, value_at
 from grader.judging.wording import moment, number
@@ -235,6 +245,23 @@ def _not_every_message(wrong: _Wrong) -> Clue | None:
 
 
 @rule(FieldValues, given=_wrong)
+def _not_assigned(wrong: _Wrong) -> Clue | None:
+    """`msg.linear.x == 0.5` compares, and `msg.linear.x: 0.5` is a note on the type: neither sets the field."""
+    source = wrong.source
+    for path in wrong.found:
+        compared = [n.value for n in source.all(ast.Expr) if isinstance(n.value, ast.Compare)]
+        noted = [n for n in source.all(ast.AnnAssign) if n.value is None]
+        pairs: list[tuple[ast.expr, ast.AST, ast.expr]] = [(c.left, c, c.comparators[0]) for c in compared]
+        pairs += [(n.target, n, n.annotation) for n in noted]
+        for target, node, value in pairs:
+            if chain(target).endswith(f".{path}"):
+                code = source.code(node)
+                hint = f"{code} sets nothing: write {source.code(target)} = {source.code(value, 40)}"
+                return Clue(hint, source.place(node))
+    return None
+
+
+@rule(FieldValues, given=_wrong)
 def _field_never_set(wrong: _Wrong) -> Clue | None:
     """A required field is never set."""
     for path, value in wrong.found.items():
@@ -319,6 +346,83 @@ def _publishes(call: ast.Call, name: str) -> bool:
 
 
 @rule(FieldFunction, problem=ProblemKind.WRONG_VALUE)
+def _in_degrees(case: Case) -> Clue | None:
+    """The argument of a sine is turned into degrees."""
+    source = case.source
+    places = given_leaf(source, case.check.field.rpartition(".")[2])
+    inside = [n for p in places for n in ast.walk(p) if isinstance(n, ast.Call)]
+    turned = [n for n in inside if last_name(n.func) in ("degrees", "rad2deg")]
+    if len(turned) != 1 or "deg" in str(case.check.formula) or len(turned[0].args) != 1:
+        return None
+    argument = source.code(turned[0].args[0], 40)
+    hint = f"{source.code(turned[0])} turns radians into degrees: write {argument}"
+    return Clue(hint, source.place(turned[0]))
+
+
+@rule(FieldFunction)
+def _other_function(case: Case) -> Clue | None:
+    """`cos` for `sin`, or a division that rounds down."""
+    source, formula = case.source, str(case.check.formula)
+    inside = [n for p in given_leaf(source, case.check.field.rpartition(".")[2]) for n in ast.walk(p)]
+    turned = [n for n in inside if isinstance(n, ast.Call) and last_name(n.func) in ("sin", "cos", "tan")]
+    wrong = [n for n in turned if f"{last_name(n.func)}(" not in formula]
+    right = next((f for f in ("sin", "cos", "tan") if f"{f}(" in formula), "")
+    if len(wrong) == 1 and right:
+        hint = f"{source.code(wrong[0])} does not compute {formula}: write math.{right}"
+        return Clue(hint, source.place(wrong[0]))
+    whole = [n for n in inside if isinstance(n, ast.BinOp) and isinstance(n.op, ast.FloorDiv)]
+    if len(whole) == 1:
+        code = source.code(whole[0], 40)
+        return Clue(f"{code} rounds down to a whole number: write / instead of //", source.place(whole[0]))
+    return None
+
+
+@rule(FieldFunction)
+def _counter_reset(case: Case) -> Clue | None:
+    """The counter is set to its first value before each message."""
+    source = case.source
+    timed = {n for m in made(source, "timer") for n in runs(source, m)}
+    for counter in _counters(case):
+        for store in source.stores(counter):
+            statement = source.parents.get(store)
+            value = getattr(statement, "value", None)
+            plain = isinstance(statement, ast.Assign) and isinstance(value, ast.Constant)
+            if statement is not None and plain and store in timed and not any(source.around(statement, ast.If)):
+                hint = f"{source.code(statement)} begins anew with each message: set it in __init__ only"
+                return Clue(hint, source.place(statement))
+    return None
+
+
+@rule(FieldFunction)
+def _counts_sometimes(case: Case) -> Clue | None:
+    """The counter grows only on a condition, or `=+ 1` gives it the same number again and again."""
+    source = case.source
+    for counter in _counters(case):
+        for store in source.stores(counter):
+            statement = source.parents.get(store)
+            value = getattr(statement, "value", None)
+            if statement is None or source.function_name(store) in ("", "__init__"):
+                continue
+            if isinstance(statement, ast.Assign) and isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.UAdd):
+                code = source.code(statement)
+                hint = f"{code} assigns {source.code(value.operand)} each time: write {counter} += "
+                return Clue(f"{hint}{source.code(value.operand)}", source.place(statement))
+            test = next(source.around(statement, ast.If), None)
+            grows = isinstance(statement, ast.AugAssign) and isinstance(statement.op, ast.Add)
+            if grows and test is not None and _publishes_beside(source, test):
+                hint = f"{source.code(statement)} runs only under 'if {source.code(test.test, 40)}': "
+                return Clue(f"{hint}move it to the left, so that it counts each message", source.place(statement))
+    return None
+
+
+def _publishes_beside(source: Source, test: ast.If) -> bool:
+    """Return whether messages are published in the function of a condition, and not under it."""
+    function = source.function_of(test)
+    sends = [c for c in source.calls("publish") if source.function_of(c) is function]
+    return bool(sends) and not any(test in list(source.around(c, ast.If)) for c in sends)
+
+
+@rule(FieldFunction, problem=ProblemKind.WRONG_VALUE)
 def _needless_pi(case: Case) -> Clue | None:
     """The value is computed with pi, which the formula does not have."""
     formula = str(case.check.formula)
@@ -389,6 +493,16 @@ def _attributes(value: ast.expr) -> Iterator[str]:
             yield chain(node)
 
 
+@rule(RandomInRange, problem=ProblemKind.NO_NUMBER)
+def _drawn_as_text(case: Case) -> Clue | None:
+    """The type of the messages has no number."""
+    item = made_for(case.source, "publisher", case.check.topic)
+    if item is None:
+        return None
+    hint = f"{item.type} carries no number: use a numeric type such as Float32 in both files"
+    return Clue(hint, case.source.place(item.call), key=f"apart:{case.check.topic}")
+
+
 @rule(RandomInRange)
 def _draw_limits(case: Case) -> Clue | None:
     """The limits of the random draw are wrong."""
@@ -440,6 +554,41 @@ def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: in
     if isinstance(node.op, ast.Sub):
         return left - right
     return left * right if isinstance(node.op, ast.Mult) else None
+
+
+@rule(RandomInRange)
+def _drawn_and_lost(case: Case) -> Clue | None:
+    """The drawn number is put into a variable that is not used."""
+    source, calls = case.source, draws(case.source)
+    if len(calls) != 1 or list(given_leaf(source, "data")):
+        return None
+    name = target_of(source, calls[0])
+    sends = list(source.calls("publish"))
+    sent = chain(sends[0].args[0]) if len(sends) == 1 and len(sends[0].args) == 1 else ""
+    if not name or "." in name or not sent or name == sent:
+        return None
+    hint = f"{name} never gets into the message: write {sent}.data = {source.code(calls[0], 50)}"
+    return Clue(hint, source.place(calls[0]))
+
+
+@rule(RandomInRange)
+def _shifted_draw(case: Case) -> Clue | None:
+    """Something is added to a draw between the right limits."""
+    source, check, calls = case.source, case.check, draws(case.source)
+    if case.evidence("outside") is None or len(calls) != 1 or last_name(calls[0].func) not in ("uniform", "randint"):
+        return None
+    around = source.parents.get(calls[0])
+    limits = [number_at(source, a) for a in calls[0].args]
+    least, most = case.evidence("min"), case.evidence("max")
+    if not isinstance(around, ast.BinOp) or limits != [check.low, check.high]:
+        return None
+    ends = [end for limit in (check.low, check.high) if (end := _with(source, around, calls[0], limit)) is not None]
+    known = len(ends) == len(limits) and isinstance(least, float) and isinstance(most, float)
+    # single precision rounds by less than this
+    if not known or not min(ends) - 1e-3 <= least or not most <= max(ends) + 1e-3:  # type: ignore[operator]
+        return None
+    hint = f"{source.code(around, 60)} moves the values out of {number(check.low)} to {number(check.high)}: write "
+    return Clue(f"{hint}{source.code(calls[0], 50)} alone", source.place(around))
 
 
 @rule(RandomInRange, problem=ProblemKind.CONSTANT)

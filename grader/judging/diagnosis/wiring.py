@@ -421,3 +421,63 @@ def timer_code(source: Source, item: Made) -> str:
 def short(type_: str) -> str:
     """Return the class name of a message type."""
     return quote(type_.rpartition("/")[2], 40)
+
+
+def received(source: Source, function: Function | None) -> Received | None:
+    """Return what the callback of a subscription receives; None for any other function."""
+    if function is None:
+        return None
+    for item in made(source, "subscription"):
+        if function in roots(source, item.callback):
+            names = parameters(function)
+            own = names[1:] if source.is_method(function) or names[:1] == ["self"] else names
+            return Received(own[0] if own else "", item.type, len(own), item)
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """The message that a callback receives.
+
+    Attributes:
+        name: The first parameter; empty if there is none.
+        type: Last part of the message type's name.
+        count: Number of parameters, without self.
+    """
+
+    name: str
+    type: str
+    count: int
+    item: Made
+
+
+def message_classes(source: Source) -> set[str]:
+    """Return the names in a file that stand for message classes and for classes of the file."""
+    imported = {name for name, dotted in source.aliases.items() if ".msg." in f".{dotted}" and name[:1].isupper()}
+    return imported | {c.name for c in source.all(ast.ClassDef)}
+
+
+def bare_statements(source: Source) -> list[ast.Name | ast.Attribute]:
+    """Return the statements that consist of a name alone, such as `rclpy.spin`, which do nothing."""
+    values = (n.value for n in source.all(ast.Expr))
+    return [v for v in values if isinstance(v, (ast.Name, ast.Attribute))]
+
+
+def sole_assignment(source: Source, name: ast.Name) -> ast.expr | None:
+    """Return the value of the only assignment to a local variable in the function of a name."""
+    function = source.function_of(name)
+    inside = [n for n in bindings(source, name.id) if source.function_of(n) is function]
+    return _value(inside[0]) if len(inside) == 1 else None
+
+
+#: Methods that return nothing, and are taken for ones that do.
+_NOTHING = frozenset({"publish", "append", "sort", "extend", "update", "clear", "shuffle", "spin", "destroy_node"})
+
+
+def returns_nothing(source: Source, call: ast.Call) -> bool:
+    """Return whether a call gives None: of a function of the file without a value, or of a well-known method."""
+    functions = source.functions(last_name(call.func))
+    if functions:
+        returns = [r for r in source.all(ast.Return) if r.value is not None and source.function_of(r) in functions]
+        return not returns and not any(isinstance(f, ast.AsyncFunctionDef) for f in functions)
+    return last_name(call.func) in (*_NOTHING, *LOG_METHODS) and isinstance(call.func, ast.Attribute)
