@@ -36,7 +36,8 @@ BODIES = {
     "a barrier": "b = threading.Barrier(3); [self.run(lambda n=n: (time.sleep(n / 10), b.wait(), self.say(n))) "
     "for n in range(3)]",
     "a condition": "c = threading.Condition(); self.run(lambda: [(c.acquire(), c.wait(), self.say('woken'), "
-    "c.release()) for _ in range(3)]); self.create_timer(0.3, lambda: (c.acquire(), c.notify_all(), c.release()), group())",
+    "c.release()) for _ in range(3)]); self.create_timer(0.3, "
+    "lambda: (c.acquire(), c.notify_all(), c.release()), group())",
     "its own service": "self.create_service(Trigger, 'own', lambda a, b: b, callback_group=group()); "
     "c = self.create_client(Trigger, 'own', callback_group=group()); "
     "self.create_timer(0.3, lambda: c.call_async(Trigger.Request()).add_done_callback(lambda f: self.say('answered')))",
