@@ -5,7 +5,7 @@ Usage: python benchmarks/agreement.py RESULTS [--jobs N] [--parts N] [--only TEX
        as a class is), or auto-executed (every student's process is executed, none is forked from a starter); RESULTS is
        a JSON file that is added to, so that a run that was stopped goes on. Without a MODE only the table of what
        RESULTS holds is printed. With --parts the submissions are shared out among so many processes, each with its own
-       jobs: auto-checked mostly waits, and takes 30 minutes with --jobs 1 --parts 6 on two processors.
+       jobs: auto-checked mostly waits, about 10 s for a submission, so six parts keep two processors busy.
 
 The reports, without their duration, are kept in the folder RESULTS.reports, by mode. If there are some of auto and of
 auto-executed, the table also says which differ; `diff -r` shows how. Those on the wall clock hold measured times and

@@ -82,7 +82,7 @@ def test_a_link_is_no_kept_key(tmp_path: Path) -> None:
     """A folder for results may come from somewhere else."""
     (tmp_path / "target").write_text(KEY)
     (tmp_path / "key").symlink_to(tmp_path / "target")
-    with pytest.raises(KeyFileError, match="no plain file"):
+    with pytest.raises(KeyFileError, match="not a regular file"):
         kept_key(tmp_path / "key")
 
 

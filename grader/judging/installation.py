@@ -13,7 +13,7 @@ from grader.judging.source import read, words
 #: Python packages that come with a desktop installation of ROS 2 and not with the wheels of rclpy.
 ROS_PACKAGES = frozenset(
     words(
-        "action_tutorials_interfaces angles catkin_pkg composition_interfaces cv2 cv_bridge domain_coordinator "
+        "action_tutorials_interfaces angles catkin_pkg composition_interfaces cv_bridge domain_coordinator "
         "image_geometry interactive_markers joint_state_publisher laser_geometry launch launch_ros "
         "launch_testing launch_testing_ros launch_xml launch_yaml logging_demo map_msgs message_filters "
         "osrf_pycommon pcl_msgs pendulum_msgs PyKDL python_qt_binding qt_gui resource_retriever robot_state_publisher "

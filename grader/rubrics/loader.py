@@ -163,7 +163,7 @@ def _cut_off(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree)
     """Yield a mistake if, for some draw, a case is lost because the observation ends before it."""
     time, needed_ns = observed.duration_ns, longest_course_ns(stimulus)
     if (isinstance(time, TimeBetween) or is_open(stimulus)) and needed_ns > shortest(time):
-        text = f"expected at least {duration(needed_ns)}, so that every case comes whatever is drawn, found "
+        text = f"expected at least {duration(needed_ns)}, so that every case is played whatever is drawn, found "
         text += f"{'as little as ' if isinstance(time, TimeBetween) else ''}{duration(shortest(time))}"
         yield tree.at(path).mistake(text)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import re
 import subprocess
 import sys
 from fractions import Fraction
@@ -23,8 +24,9 @@ from grader.classroom.cluster.sending import checks_of
 from grader.classroom.messages import GradingJob, Terms
 from grader.classroom.store import Conditions
 from grader.cli import main
+from grader.core.author_files import run
 from grader.core.errors import RubricError
-from grader.core.exercise import Outcome
+from grader.core.exercise import Location, Outcome
 from grader.core.report import Verdict
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import Trace
@@ -243,6 +245,31 @@ def test_it_travels_to_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     task = write_task(terms, GradingJob("ada", b"ada", b"class/ada", b""), tmp_path / "there")
     (found,) = (tmp_path / "there").rglob("pump.yaml")
     assert (task.rubrics, read_rubric(found).digest) == ((rubric,), before)
+
+
+def test_the_examples_on_the_page_about_own_checks_work() -> None:
+    """Points in proportion, and a check that names a line of the student's file."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "own-check.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    (proportional,) = (block for block in blocks if block.startswith("@dataclass(frozen=True)\nclass MeanError"))
+    (sources,) = (block for block in blocks if block.startswith("    def judge_sources"))
+    names = "from collections.abc import Mapping\nfrom dataclasses import replace\n"
+    names += "from grader.core.exercise import Location\nfrom grader.testing import partly\n"
+    own = run("_example", "own-check.md", f"{blocks[0]}\n{names}\n\n{proportional}\n{sources}".encode())
+    check = vars(own)["MeanError"]("/goal", full=1.0, none=3.0)
+
+    def at(*distances: float) -> Trace:
+        trace = TraceBuilder("planner.py")
+        for second, x in enumerate(distances):
+            fields = {"pose": {"position": {"x": x, "y": 0.0, "z": 0.0}}}
+            trace.message(second, "/goal", "geometry_msgs/msg/PoseStamped", fields)
+        return trace.trace()
+
+    assert [judge(check, at(x, x)).credit for x in (0.5, 1.0, 1.5, 2.7, 3.0)] == [1, 1, 0.75, Fraction(3, 20), 0]
+    assert judge(check, at()).blocked_by == "publishes"
+    assert check.expected == "a mean distance of at most 1 m"
+    found = judge(check, at(2.0), {"planner.py": "import rclpy\nplace = PLACES[0]\n"})
+    assert (found.location, found.credit) == (Location("planner.py", 2), Fraction(1, 2))
 
 
 @pytest.mark.ros

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.ros
 
 WRITER = b"<of>"
 ONE = struct.pack("<iI", 0, 1)
-#: Submessages by kind with a plausible body (DDSI-RTPS 2.3, 9.4.5): the reader is everybody, the writer the sender's own.
+#: Submessages by kind with a plausible body (DDSI-RTPS 2.3, 9.4.5): to every reader, from the sender's own writer.
 BODIES = {
     0x06: bytes(4) + WRITER + ONE + struct.pack("<III", 32, 0xFFFFFFFF, 7),  # acknowledges
     0x07: bytes(4) + WRITER + ONE + struct.pack("<iII", 0, 50, 7),  # has messages 1 to 50

@@ -273,7 +273,7 @@ def test_a_blocked_criterion_takes_one_line() -> None:
     assert lines[0] == "  blocked    0/10  Publishes at 20 Hz: needs publishes_twist (not met)"
     assert len(lines) == 3
     lines = [line for line in render(crashed()).splitlines() if line.startswith("  blocked")]
-    assert lines == ["  blocked    0/20  3 more, judged once what they need is met"]
+    assert lines == ["  blocked    0/20  3 more: judged once the criteria that they need are met"]
 
 
 def test_long_call_chains_are_shortened_in_the_middle() -> None:

@@ -105,7 +105,7 @@ def test_messages_come_in_a_drawn_order_too(scenario: Callable[..., Any]) -> Non
     assert server.responses == (AnyOrder(({"success": True}, {"message": "x"})), {"success": False})
 
 
-CUT = "so that every case comes whatever is drawn, found"
+CUT = "so that every case is played whatever is drawn, found"
 
 
 @pytest.mark.parametrize(

@@ -379,7 +379,7 @@ class RandomInRange:
             return None
         first = bad[0]
         side = f"above {number(self.high)}" if first.value > self.high else f"below {number(self.low)}"
-        side = "that is no number" if math.isnan(first.value) else f"{side}{unit}"
+        side = "that is not a number" if math.isnan(first.value) else f"{side}{unit}"
         reason = f"{self.topic}: first {side} at {moment(first.t_ns)} ({number(first.value)}{unit}); "
         reason += f"{len(bad)} of {len(values)} values lie outside {number(self.low)} to {number(self.high)}{unit}"
         evidence = self._evidence(values) | {"outside": len(bad), "first_outside_s": seconds(first.t_ns)}
