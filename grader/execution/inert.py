@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ast
+import os
+import stat
 import warnings
 from pathlib import Path
 
-from grader.student_host.packages import parse
+from grader.student_host.packages import parsed
 
 #: A larger file is left to the student's process and its limits: parsing takes up to 500 bytes of memory for each byte.
 MOST_BYTES = 256 << 10
@@ -23,11 +25,25 @@ def read(path: Path) -> ast.Module | SyntaxError | None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # as error, a warning about a string would be a syntax error
         try:
-            return parse(str(path)) if path.stat().st_size <= MOST_BYTES else None
+            text = _text(path)
+            return None if text is None else parsed(text, str(path))
         except SyntaxError as error:
             return error
         except (OSError, ValueError, RecursionError, MemoryError):
             return None
+
+
+def _text(path: Path) -> bytes | None:
+    """Return the content of a file; None if it is large, or a pipe or device, which might never end or begin."""
+    if not stat.S_ISREG(path.stat().st_mode):
+        return None
+    with open(path, "rb", opener=_without_waiting) as file:
+        found = os.fstat(file.fileno())  # it may have been replaced
+        return file.read(MOST_BYTES) if stat.S_ISREG(found.st_mode) and found.st_size <= MOST_BYTES else None
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC)
 
 
 def is_inert(tree: ast.Module | None) -> bool:

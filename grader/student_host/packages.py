@@ -56,7 +56,11 @@ class StartMethod(NamedTuple):
 def parse(path: str) -> ast.Module:
     """Parse a file as the interpreter would; raises what it cannot compile as an error with a line."""
     with open(path, "rb") as source:
-        text = source.read()
+        return parsed(source.read(), path)
+
+
+def parsed(text: bytes, path: str) -> ast.Module:
+    """Parse the text of a file, as `parse` does."""
     before, null, _ = text.partition(b"\0")
     if null:  # Python's own error has no line number
         raise SyntaxError("source code cannot contain null bytes", (path, before.count(b"\n") + 1, None, None))

@@ -49,10 +49,15 @@ class Host:
         self.time = make_time(clock, self.link, self.describer)
         self.has_ros = False
 
-    def install_ros(self) -> None:
-        """Import rclpy and install the clock in it, once."""
+    def install_ros(self, *, hidden: bool = False) -> None:
+        """Import rclpy and install the clock in it, once.
+
+        Args:
+            hidden: Whether a module of the submission hides another one, so that whatever is imported may fail.
+        """
         if not self.has_ros:
-            import_without_needless("rosidl_generator_py")
+            if not hidden:
+                import_without_needless("rosidl_generator_py")
             self.time.install_ros()
         self.has_ros = True
 
@@ -78,13 +83,15 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     log = Log(request["log_format"])
     ready = {"kind": "ready", "log_token": log.token}
 
+    hidden = not prepared and hides_modules(request)
+
     def install_ros() -> None:
-        host.install_ros()
+        host.install_ros(hidden=hidden)
         log.open()
 
     if prepared:
         install_ros()
-    elif not hides_modules(request):  # otherwise done when the program imports rclpy
+    elif not hidden:  # otherwise done when the program imports rclpy
         install_ros()
         preload(os.path.join(request["root"], request["file"]))
     seed_randomness(request["seed"])

@@ -1,0 +1,141 @@
+"""Programs with threads get the same report on one processor and on all of this machine."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+pytestmark = [pytest.mark.ros, pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="there is one processor only")]
+
+ROOT = Path(__file__).parents[1]
+SUBMISSIONS = ROOT / "tests" / "submissions"
+GRADE = str(Path(sys.executable).with_name("grade"))
+WITH_THREADS = ("threading", "MultiThreadedExecutor", "ThreadPool")
+EXECUTORS = ["MultiThreadedExecutor()", "MultiThreadedExecutor(num_threads=2)", "SingleThreadedExecutor()"]
+#: What a node does, in its constructor. `say` logs, `group()` makes a reentrant callback group.
+BODIES = {
+    "sleeping callbacks": "[self.create_timer(0.2, lambda n=n: (time.sleep(0.15), self.say(n)), group()) "
+    "for n in range(6)]",
+    "more than four": "[self.create_timer(0.5, lambda n=n: (self.say(n), time.sleep(0.4)), group()) for n in range(9)]",
+    "threads that publish": "[threading.Thread(target=self.work, args=(n,), daemon=True).start() for n in range(4)]",
+    "a pool": "self.pool = ThreadPoolExecutor(); [self.pool.submit(self.work, n, 2) for n in range(12)]",
+    "as many as processors": "[threading.Thread(target=self.work, args=(n, 2)).start() for n in range(os.cpu_count())]",
+    "a queue": "q = queue.Queue(2); self.run(lambda: [q.put(n) for n in range(9)]); "
+    "self.run(lambda: [self.say(q.get()) "
+    "for _ in range(9)])",
+    "a barrier": "b = threading.Barrier(3); [self.run(lambda n=n: (time.sleep(n / 10), b.wait(), self.say(n))) "
+    "for n in range(3)]",
+    "a condition": "c = threading.Condition(); self.run(lambda: [(c.acquire(), c.wait(), self.say('woken'), "
+    "c.release()) for _ in range(3)]); self.create_timer(0.3, "
+    "lambda: (c.acquire(), c.notify_all(), c.release()), group())",
+    "its own service": "self.create_service(Trigger, 'own', lambda a, b: b, callback_group=group()); "
+    "c = self.create_client(Trigger, 'own', callback_group=group()); "
+    "self.create_timer(0.3, lambda: c.call_async(Trigger.Request()).add_done_callback(lambda f: self.say('answered')))",
+    "timers of threading": "[threading.Timer(n / 10, self.say, (n,)).start() for n in range(8)]",
+}
+PROGRAM = """
+import os, queue, threading, time
+from concurrent.futures import ThreadPoolExecutor
+import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup as group
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+class Threads(Node):
+    def __init__(self):
+        super().__init__("threads")
+        self.out = self.create_publisher(String, "words", 10)
+        {body}
+    def say(self, what):
+        self.get_logger().info(str(what))
+        self.out.publish(String(data=str(what)))
+    def run(self, what):
+        threading.Thread(target=what, daemon=True).start()
+    def work(self, number, times=9):
+        for turn in range(times):
+            time.sleep(0.1)
+            self.say((number, turn))
+rclpy.init()
+executor = {executor}
+executor.add_node(Threads())
+executor.spin()
+"""
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """An empty folder; unlike pytest's own, every user can enter what is above it."""
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
+def told(*arguments: str | Path, one: bool) -> Any:
+    """Return the JSON that a command prints, on one processor or on all; without what belongs to the run."""
+    before = ["taskset", "-c", str(min(os.sched_getaffinity(0)))] if one else []
+    command = [*before, GRADE, *map(str, arguments), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=500)
+    assert done.stdout, done.stderr
+    found = json.loads(done.stdout)
+    for name in ("run", "environment", "duration_s"):
+        found.pop(name, None)
+    return found
+
+
+def with_threads() -> list[str]:
+    """Return the test submissions that use threads, as `correct/NAME`."""
+    found = []
+    for place in sorted(SUBMISSIONS.glob("*/*")):
+        texts = [path.read_text(encoding="utf-8", errors="replace") for path in place.rglob("*.py")]
+        if any(word in text for text in texts for word in WITH_THREADS):
+            found.append(place.relative_to(SUBMISSIONS).as_posix())
+    return found
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("executor", EXECUTORS)
+@pytest.mark.parametrize("body", BODIES)
+def test_what_a_program_does(folder: Path, body: str, executor: str) -> None:
+    """Each message and each log record at the same time."""
+    program = folder / "threads.py"
+    program.write_text(PROGRAM.format(body=BODIES[body], executor=executor), encoding="utf-8")
+    one, all_ = (told("observe", program, "--duration", "2", one=one) for one in (True, False))
+    assert one == all_
+    assert one["records"]
+    assert one["clock"] == "virtual"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", with_threads())
+def test_what_a_submission_gets(folder: Path, name: str) -> None:
+    """Outcomes, reasons, hints and charts."""
+    expected = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
+    shutil.copytree(SUBMISSIONS / name, folder / "s")
+    exercises = [word for exercise in expected[name]["graded"] for word in ("--exercise", exercise)]
+    one, all_ = (told(folder / "s", *exercises, "--seed", "7", one=one) for one in (True, False))
+    assert one == all_
+
+
+def test_a_client_that_waits_in_a_callback(folder: Path) -> None:
+    """With a single thread in its executor it would wait for ever; a machine with one processor would give it that."""
+    program = folder / "threads.py"
+    body = (
+        "self.create_service(Trigger, 'own', lambda a, b: b, callback_group=group()); "
+        "c = self.create_client(Trigger, 'own', callback_group=group()); "
+        "self.create_timer(0.3, lambda: (c.call(Trigger.Request()), self.say('answered')), group())"
+    )
+    program.write_text(PROGRAM.format(body=body, executor=EXECUTORS[0]), encoding="utf-8")
+    one, all_ = (told("observe", program, "--duration", "1", one=one) for one in (True, False))
+    assert one == all_
+    assert [record["text"] for record in one["records"]] == ["answered"] * 3
