@@ -1,6 +1,10 @@
-"""Makes the parts of the site that are written in the code: commands, the grammar of rubrics, checks, and exercises.
+"""Makes the parts of the documentation that the code already says: commands, rubrics' grammar, checks, and exercises.
 
-A page says where such a part goes with a comment, `<!-- generated: NAME -->`; NAMES lists the names.
+Usage: python docs/generated.py     renews them in the pages
+
+Such a part stands in its page, so that it can be read in the repository too, between the comments
+`<!-- generated: NAME -->` and `<!-- end of generated: NAME -->`; NAMES lists the names. What is too large for the
+repository, reports and charts, is made when the site is built: `<!-- site: TEXT -->` is text of the site alone.
 """
 
 from __future__ import annotations
@@ -71,10 +75,11 @@ def _sections(path: str, command: click.Command) -> Iterator[str]:
     usage = " ".join([path, *command.collect_usage_pieces(context)])
     yield f"\n{level} `{path}`\n\n    {usage}\n\n{_described(command)}\n"
     yield "| option | meaning |\n|---|---|"
-    for parameter in command.get_params(context):
+    for parameter in command.params:
         record = parameter.get_help_record(context)
         if record is not None:
             yield f"| {', '.join(f'`{name}`' for name in record[0].split(', '))} | {_cell(record[1])} |"
+    yield "| `-h`, `--help` | Show this message and exit. |"
 
 
 def _described(command: click.Command) -> str:
@@ -208,7 +213,7 @@ def _check(e: CheckExplanation, pictures: Mapping[str, Chart]) -> str:
         lines.append(f"Used by {', '.join(map(_gallery_link, e.used_by))}.")
     if e.name in pictures:
         chart = pictures[e.name]
-        lines.append(f"![{_cell(f'{chart.title}. {chart.about}')}](charts/{e.name}.svg)")
+        lines.append(_on_site(f"![{_cell(f'{chart.title}. {chart.about}')}](charts/{e.name}.svg)"))
     return "\n\n".join(filter(None, lines))
 
 
@@ -309,12 +314,19 @@ def _exercise(exercise: Exercise, explained: list[CriterionExplanation]) -> str:
         for e, check in zip(mine, checks_used, strict=True)
     ]
     lines = [
-        f"## {exercise.title} {{ #{exercise.id} }}",
+        f'<a id="{exercise.id}"></a>\n\n## {exercise.title}',
         f"{files}; {float(points):g} points; `grade . --exercise {exercise.id}`",
         "\n".join(["| criterion | points | check |", "|---|---|---|", *rows]),
-        f"[A report of a real submission](examples/{exercise.id}.html), with one mistake.",
+        _on_site(f"[A report of a real submission](examples/{exercise.id}.html), with one mistake."),
+        f"To see a report of a submission with one mistake: `grade tests/submissions/{EXAMPLES[exercise.id]} "
+        f"--exercise {exercise.id} --open`",
     ]
     return "\n\n".join(lines)
+
+
+def _on_site(text: str) -> str:
+    """Return text that only the site shows."""
+    return f"<!-- site: {text.replace('--', '-')} -->"
 
 
 def examples() -> str:
@@ -336,7 +348,7 @@ def _example(folder: Path) -> str:
     command = f"grade FOLDER --rubric examples/{folder.name}/{folder.name}.yaml"
     lost = YAML(typ="safe").load((folder / "expected.yaml").read_text(encoding="utf-8"))
     lines = [
-        f"## {title.removeprefix('# ')} {{ #{exercise.id} }}",
+        f'<a id="{exercise.id}"></a>\n\n## {title.removeprefix("# ")}',
         about,
         f"{', '.join(f'`{file}`' for file in exercise.files)}; {float(points):g} points; `{command}`",
         "\n".join(["| criterion | points | check |", "|---|---|---|", *map(_example_row, exercise.criteria)]),
@@ -379,3 +391,30 @@ NAMES: Mapping[str, Callable[[], str]] = {
     "gallery": gallery,
     "examples": examples,
 }
+
+_PART = re.compile(r"(<!-- generated: (\w+) -->)\n.*?(<!-- end of generated: \2 -->)", re.DOTALL)
+_FOR_SITE = re.compile(r"<!-- site: (.*?) -->", re.DOTALL)
+
+
+def renewed(markdown: str) -> str:
+    """Return a page with its generated parts made anew."""
+    return _PART.sub(lambda found: f"{found[1]}\n\n{NAMES[found[2]]().strip()}\n\n{found[3]}", markdown)
+
+
+def for_site(markdown: str) -> str:
+    """Return a page with the text that only the site shows."""
+    return _FOR_SITE.sub(lambda found: found[1], markdown)
+
+
+def main() -> None:
+    """Renew the generated parts of all pages."""
+    for page in sorted((ROOT / "docs").rglob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        new = renewed(text)
+        if new != text:
+            page.write_text(new, encoding="utf-8")
+            print(f"renewed: {page.relative_to(ROOT)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,4 +1,4 @@
-"""What MkDocs does beyond Markdown when it builds the site: generated parts, and links into the repository."""
+"""What MkDocs does beyond Markdown when it builds the site: reports, charts, and links into the repository."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parent.parent
 _LINK = re.compile(r"(\]\()(\.\./[^)\s]*)(\))")
-_GENERATED = re.compile(r"<!-- generated: (\w+) -->")
 _log = get_plugin_logger("rclpy-grader")
 
 
@@ -39,8 +38,8 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, **_: Any) -> str:
-    """Put in what is generated, and let links that leave `docs/` lead to the repository."""
-    markdown = _GENERATED.sub(lambda found: generated.NAMES[found[1]](), markdown)
+    """Show what only the site has, and let links that leave `docs/` lead to the repository."""
+    markdown = generated.for_site(markdown)
     folder = Path(config.docs_dir, page.file.src_uri).parent
 
     def outside(found: re.Match[str]) -> str:

@@ -35,8 +35,8 @@ from grader.core.trace import (
     ServiceEnd,
     Trace,
 )
+from grader.judging.authored import breach
 from grader.judging.findings import met, not_met, partly
-from grader.judging.run_check import breach
 
 __all__ = ["TraceBuilder", "judge", "met", "not_met", "partly"]
 

@@ -30,6 +30,9 @@ DOCUMENTS = [
 
 _LINK = re.compile(r"\]\(([^)\s]+)\)")
 _CODE = re.compile(r"`([^`\n]+)`")
+_ONLY_SITE = re.compile(r"<!-- site: .*? -->", re.DOTALL)
+#: The usage of a command, on the page that is made from the code.
+_USAGE = re.compile(r"\[OPTIONS\]|\[SUBMISSION\]|\w+\.\.\.$")
 #: The end of the name of a format, which looks like a path.
 _SCHEMA = re.compile(r"/v\d+$")
 #: A folder at the top and what follows; a file at the top. `{a,b}` stands for several, `*` for any.
@@ -56,7 +59,8 @@ def paths(text: str) -> Iterator[str]:
 
 
 def missing(text: str, folder: Path) -> list[str]:
-    """Return what a document in a folder names and nobody finds."""
+    """Return what a document in a folder names and nobody finds; what only the site has, MkDocs checks."""
+    text = _ONLY_SITE.sub("", text)
     made = [f"examples/{exercise}.html" for exercise in generated.EXAMPLES]
     dead = [target for target in links(text) if not (folder / target).exists() and target not in made]
     named = [path for path in paths(text) if not _SCHEMA.search(path)]
@@ -101,7 +105,7 @@ def grade_commands(text: str) -> Iterator[str]:
     lines = re.findall(r"^(?: {4,}|\$ )(.*)$", text, re.MULTILINE)
     for shown in (*lines, *_CODE.findall(text)):
         found = _GRADE.match(shown.strip())
-        if found and not found[1].startswith(_NO_COMMAND):
+        if found and not found[1].startswith(_NO_COMMAND) and not _USAGE.search(found[1]):
             yield _REST.sub("", found[1])
 
 
@@ -167,19 +171,38 @@ def test_a_message_that_nothing_says_is_found() -> None:
     assert len(_messages()) > 30
 
 
+@pytest.mark.parametrize("document", [d for d in DOCUMENTS if "<!-- generated: " in (ROOT / d).read_text("utf-8")])
+def test_what_is_generated_is_current(document: str) -> None:
+    """`python docs/generated.py` renews it."""
+    text = (ROOT / document).read_text(encoding="utf-8")
+    assert generated.renewed(text) == text
+
+
+def test_an_old_part_is_noticed() -> None:
+    """And what stands around it is kept."""
+    old = "# Commands\n\n<!-- generated: commands -->\nold\n<!-- end of generated: commands -->\n\nMore.\n"
+    new = generated.renewed(old)
+    assert "old\n" not in new
+    assert new.startswith("# Commands\n\n<!-- generated: commands -->\n\n## `grade`\n")
+    assert new.endswith("\n\n<!-- end of generated: commands -->\n\nMore.\n")
+
+
 def test_the_site_names_every_command_option_check_and_key() -> None:
-    """The pages are made from the code when the site is built; nothing of it is left out."""
+    """The pages are made from the code; nothing of it is left out."""
     commands, checks, grammar, gallery, examples = (make() for make in generated.NAMES.values())
     for name, command in app.commands.items():
-        options = [option for parameter in command.params for option in parameter.opts if option.startswith("--")]
+        described = [parameter for parameter in command.params if not getattr(parameter, "hidden", False)]
+        options = [option for parameter in described for option in parameter.opts if option.startswith("--")]
         assert command.hidden or f"`grade {name}`" in commands
         assert [option for option in options if option not in commands] == []
     assert [name for name in CHECKS if f"\n## {name}\n" not in checks] == []
     assert [
         word for word in ("just_above", "stimuli", "cancel_after", "some_of", "copies") if f"`{word}`" not in grammar
     ] == []
-    assert [name for name in generated.exercises() if f"#{name} }}" not in gallery] == []
-    assert [p.parent.name for p in ROOT.glob("examples/*/README.md") if f"#{p.parent.name} }}" not in examples] == []
+    assert [name for name in generated.exercises() if f'<a id="{name}"></a>' not in gallery] == []
+    assert [
+        p.parent.name for p in ROOT.glob("examples/*/README.md") if f'<a id="{p.parent.name}"></a>' not in examples
+    ] == []
 
 
 def test_the_page_about_the_report_tells_the_chart_of_every_check() -> None:
@@ -189,6 +212,7 @@ def test_the_page_about_the_report_tells_the_chart_of_every_check() -> None:
 
 
 def test_every_part_that_is_generated_stands_on_a_page() -> None:
-    """A comment in the Markdown says where."""
+    """Two comments in the Markdown say where."""
     text = "".join((ROOT / d).read_text(encoding="utf-8") for d in DOCUMENTS)
-    assert [name for name in generated.NAMES if f"<!-- generated: {name} -->" not in text] == []
+    ends = [(f"<!-- generated: {name} -->\n", f"\n<!-- end of generated: {name} -->\n") for name in generated.NAMES]
+    assert [pair for pair in ends if [text.count(end) for end in pair] != [1, 1]] == []

@@ -17,7 +17,9 @@ from grader.app.observe import ObserveRequest
 from grader.cli.main import app
 from grader.core.checkup import Checkup, Fact, TierReport
 from grader.core.errors import EnvironmentFault, HarnessError
+from grader.core.limits import Limits
 from grader.execution import machine
+from grader.reporting.doctor import checkup_to_json, render_checkup
 
 BY_ROOT = TierReport("bubblewrap-root", "A2", usable=False, why="not root", remedy="run it with sudo")
 BY_USER = TierReport("bubblewrap", "A1", usable=False, why="none", remedy="install bubblewrap")
@@ -36,6 +38,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str]]:
 
     monkeypatch.setattr(doctor, "find_ros", lambda: None)
     monkeypatch.setattr(doctor, "software", lambda ros: ())
+    monkeypatch.setattr(doctor, "weaknesses", lambda ros: ())
     monkeypatch.setattr(doctor, "observe", observe)
     monkeypatch.setattr(doctor, "is_for_others", lambda name: name == "bubblewrap-root")
     return seen
@@ -115,6 +118,21 @@ def test_bubblewrap_that_is_not_there_is_told_with_its_command(monkeypatch: pyte
     fact = next(fact for fact in machine.software(None) if fact.name == "bubblewrap")
     assert (fact.value, fact.fits) == ("not installed", True)
     assert fact.remedy.endswith("install -y bubblewrap")
+
+
+def test_known_weaknesses_are_told_with_their_fixes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One line each, as text and as JSON; none of them makes grading unsafe."""
+    monkeypatch.setattr(machine, "_said_by", lambda program: "bubblewrap 0.8.0")
+    monkeypatch.setattr(machine, "repaired_here", frozenset)
+    monkeypatch.setattr(shutil, "which", lambda name: __file__)
+    facts = [fact for fact in machine.weaknesses(None) if "bubblewrap" in fact.value]
+    assert [fact.value.split(": ")[:2] for fact in facts] == [["bubblewrap 0.8.0", "CVE-2026-87766"]]
+    checkup = Checkup(tuple(facts), None, (), "", "", Limits())
+    text = render_checkup(checkup, width=200, colour=False)
+    assert sum("known weakness" in line for line in text.splitlines()) == 1
+    assert "fix: install the updates of your distribution, or bubblewrap 0.12.0 or newer" in text
+    (told,) = json.loads(checkup_to_json(checkup))["facts"]
+    assert (told["name"], told["fits"], told["remedy"]) == ("known weakness", True, facts[0].remedy)
 
 
 def test_a_setting_that_forbids_namespaces_is_told_with_both_commands(

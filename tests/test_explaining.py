@@ -150,3 +150,20 @@ def test_a_manual_is_read_from_the_docstring() -> None:
     assert manual.parameters["first"] == "What it is, on two lines."
     assert manual.parameters["second"] == "Another."
     assert manual_of(type("Bare", (), {})).summary == ""
+
+
+def test_without_a_name_all_of_them_are_listed() -> None:
+    """Criteria by exercise, then checks; the JSON has everything about them."""
+    done = grade()
+    assert done.exit_code == 0
+    lines = done.output.splitlines()
+    assert [name for name in CHECKS if not any(line.startswith(f"  {name} ") for line in lines)] == []
+    assert [
+        c.id
+        for e in _read(GradeRequest("", every=True), recorded=True)
+        for c in e.criteria
+        if not any(line.split() == [c.id, *c.title.split()] for line in lines)
+    ] == []
+    rows = json.loads(grade("--json").output)["explanations"]
+    assert {row["kind"] for row in rows} == {"criterion", "check"}
+    assert len(rows) > len(CHECKS)

@@ -19,6 +19,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from grader.app import interface_packages
 from grader.app.interface_packages import (
     GRADER,
     RUBRIC,
@@ -35,11 +36,15 @@ from grader.app.start import grade
 from grader.classroom.store import Conditions
 from grader.cli import main
 from grader.core.report import Report
+from grader.core.submission import Submission
+from grader.execution import confined_build
 from grader.execution.evidence.store import open_evidence
+from grader.execution.real_time_budget import FOREVER_S
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.ros_installation import find_ros
 from grader.reporting.json_report import report_to_json
 from grader.rubrics.interfaces import Interfaces
+from grader.submissions.projects import read_projects
 
 REAL = Path(__file__).parent / "real_checks"
 RUBRIC_FILE = REAL / "brought.yaml"
@@ -134,13 +139,16 @@ def session() -> Iterator[RecordingSession]:
         yield opened
 
 
-def provided(session: RecordingSession, folder: Path, files: Mapping[str, str]) -> Provided:
+def provided(
+    session: RecordingSession, folder: Path, files: Mapping[str, str], *, budget_s: float = FOREVER_S
+) -> Provided:
     """Return what a submission of these files gets."""
     for name, text in files.items():
         path = folder / "own" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    return provide(session, (), (), folder / "own")
+    submission = Submission("own", str(folder), folder / "own", "", projects=read_projects(folder / "own")[0])
+    return provide(session, (), (), submission, budget_s)
 
 
 @pytest.mark.sandbox
@@ -203,6 +211,58 @@ def test_a_hostile_definition_is_refused_or_stays_text(session: RecordingSession
     else:
         assert "Hostile.msg" in found.problems[0]
     assert not canary.exists()
+
+
+@pytest.mark.sandbox
+def test_a_build_that_ends_at_a_limit_is_a_note_that_is_remembered(
+    session: RecordingSession, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The submission is graded without its packages, and the next time at no cost."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(confined_build, "PROCESSOR_S", 1)
+    fields = "".join(f"float64 x{n}\n" for n in range(499))
+    files = {f"big_msgs/msg/M{n}.msg": fields for n in range(250)}
+    first = provided(session, tmp_path, files)
+    assert first.packages == ()
+    assert len(first.problems) == 1
+    assert "processor time" in first.problems[0]
+    assert first.spent_s > 0
+    monkeypatch.setattr(interface_packages, "build_confined", None)
+    again = provided(session, tmp_path, files)
+    assert (again.problems, again.spent_s) == (first.problems, 0)
+    (kept,) = (tmp_path / "cache" / "rclpy-grader" / "interfaces").glob("submitted-*")
+    assert [path.name for path in kept.iterdir()] == ["told.json"]
+
+
+@pytest.mark.sandbox
+def test_a_build_takes_no_longer_than_the_time_budget(
+    session: RecordingSession, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it took is told; with another budget it may end otherwise, so that is not remembered."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    files = {"own_msgs/msg/Mine.msg": "int32 x\n"}
+    found = provided(session, tmp_path, files, budget_s=0.01)
+    assert found.problems == (
+        "the interface definitions of the submission are not used: building them took all of the time budget",
+    )
+    assert found.spent_s >= 0.01
+    assert [package.name for package in provided(session, tmp_path, files).packages] == ["own_msgs"]
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        None,
+        {"packages": {"a": "x"}, "folder": "0" * 32, "problems": []},
+        {"packages": {"../a": f"sha256:{'0' * 64}"}, "folder": "0" * 32, "problems": []},
+        {"packages": {"a": f"sha256:{'0' * 64}"}, "folder": "../../elsewhere", "problems": []},
+        {"packages": {"a": f"sha256:{'0' * 64}"}, "folder": "", "problems": []},
+        {"packages": {}, "folder": "", "problems": [5]},
+    ],
+)
+def test_what_a_build_tells_is_checked(answer: object) -> None:
+    """Its process has read what students made, and names folders."""
+    assert confined_build.told_of(answer) is None
 
 
 @pytest.mark.sandbox

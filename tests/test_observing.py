@@ -22,9 +22,10 @@ from grader.core.trace import (
     Message,
     Observation,
     Offer,
+    ServiceEnd,
     Trace,
 )
-from grader.judging.judge_run import summarise
+from grader.judging.summary import summarise
 from grader.reporting.observed import render_summary, summary_to_json
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -39,6 +40,9 @@ def a_trace(*observations: Observation, stop_s: int = 10) -> Trace:
     return Trace("observed", ClockKind.VIRTUAL, stop_s * NS_PER_S, tuple(observations))
 
 
+SERVED = (("client", "/a"), ("service", "/b"))
+
+
 def messages(count: int, period_ms: int = 100, value: Callable[[int], object] = float) -> list[Message]:
     return [Message(n * period_ms * NS_PER_MS, "/t", FLOAT, {"data": value(n)}) for n in range(count)]
 
@@ -51,7 +55,45 @@ def test_a_topic_is_described_by_its_pace_and_its_values() -> None:
     assert topic.pace is not None
     assert (topic.messages, topic.first_s, topic.pace.rate_hz) == (11, 0.0, pytest.approx(10.0))
     assert (topic.pace.min_s, topic.pace.max_s) == (pytest.approx(0.1), pytest.approx(0.1))
-    assert topic.ranges == {"data": (0.0, 9.0), "deep.x": (1.0, 1.0)}
+    assert topic.ranges == {"data": (0.0, 9.0), "deep.x": (1.0, 1.0), "deep.list[]": (5.0, 5.0)}
+    assert topic.lengths == {"deep.list": (1, 1)}
+
+
+def test_texts_and_arrays_are_described() -> None:
+    """A text by its first different values, an array by its size and its elements; what is empty comes last."""
+    said = [
+        Message(
+            n * NS_PER_S, "/t", FLOAT, {"none": [], "words": f"w{n}", "ids": ["l", "r"], "zero": 0, "xs": [n] * (1 + n)}
+        )
+        for n in range(5)
+    ]
+    graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
+    text = render_summary(summarise(a_trace(graph, *said), ["a.py"], "none"))
+    assert [line.strip() for line in text.splitlines() if line.startswith("    ")][2:] == [
+        'words: "w0", "w1", "w2" and 2 more',
+        'ids[]: "l", "r"',
+        "ids: 2 elements",
+        "xs: 1 to 5 elements, 0 to 4",
+        "none: 0 elements",
+        "zero: 0",
+    ]
+    told = json.loads(summary_to_json(summarise(a_trace(graph, *said), ["a.py"], "none")))["topics"][0]
+    assert told["texts"]["words"] == {"values": ["w0", "w1", "w2", "w3", "w4"], "different": 5}
+    assert told["lengths"]["xs"] == [1, 5]
+
+
+def test_whole_numbers_are_shown_in_full() -> None:
+    """The seconds of a stamp differ in their last digits."""
+    graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
+    text = render_summary(summarise(a_trace(graph, *messages(3, value=lambda n: 1767225600 + n)), ["a.py"], "none"))
+    assert "data: 1767225600 to 1767225602\n" in text
+
+
+def test_the_graph_with_the_most_parts_is_drawn() -> None:
+    """Services count as well, and of equal ones the last."""
+    ends = tuple(ServiceEnd(kind, "/go", "std_srvs/srv/Trigger", node) for kind, node in SERVED)
+    graphs = (GraphSnapshot(0, (), ()), GraphSnapshot(1, ("/a", "/b"), (), ends), GraphSnapshot(2, (), ()))
+    assert "Graph:\n  /a ┄┄/go┄┄▶ /b\n" in render_summary(summarise(a_trace(*graphs), ["a.py"], "none"))
 
 
 @pytest.mark.parametrize("count", [0, 1])
@@ -135,6 +177,81 @@ def test_a_file_of_a_package_may_import_the_package(tmp_path: Path) -> None:
     )
     summary = observe(ObserveRequest((node,), NS_PER_S, clock="virtual"), lambda _: None)
     assert ([r.text for r in summary.records], summary.faults) == (["from the package"], ())
+
+
+@pytest.mark.ros
+def test_a_traceback_begins_with_the_program(tmp_path: Path) -> None:
+    """As `python3 FILE` prints it, also where a module of the program fails while it is imported."""
+    file = tmp_path / "node.py"
+    for text, first in (("import rclpy\n1 / 0\n", "node.py"), ("import rclpy\nimport other\n", "node.py")):
+        file.write_text(text)
+        (tmp_path / "other.py").write_text("{}['x']\n")
+        lines = [o.text for o in observe(ObserveRequest((file,), NS_PER_S, clock="virtual"), lambda _: None).lines]
+        assert lines[:2] == ["Traceback (most recent call last):", f'  File "{first}", line 2, in <module>']
+        assert not any("grader" in line for line in lines)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+def test_a_class_that_needs_arguments_is_not_started(tmp_path: Path, clock: str) -> None:
+    """It is for other modules: `python3 FILE` does nothing, and nothing is the student's fault."""
+    file = tmp_path / "relay.py"
+    file.write_text(
+        "from rclpy.node import Node\nclass Relay(Node):\n"
+        "    def __init__(self, robot):\n        super().__init__(f'relay_{robot}')\n"
+    )
+    summary = observe(ObserveRequest((file,), NS_PER_S, clock=clock), lambda _: None)
+    assert [fault.text for fault in summary.faults] == ["exited with code 0"]
+    assert [note.split(",")[0] for note in summary.notes] == ["relay.py: nothing starts Relay"]
+
+
+def a_package(folder: Path, name: str, **files: str) -> None:
+    """Write a Python package with an entry point for each module; a name may have `__` for a folder."""
+    scripts = ", ".join(f"'{n.replace('__', '_')} = {name}.{n.replace('__', '.')}:main'" for n in files)
+    inner = folder / name / name
+    inner.mkdir(parents=True)
+    (inner.parent / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    (inner.parent / "setup.py").write_text(
+        f"from setuptools import setup\nsetup(name='{name}', entry_points={{'console_scripts': [{scripts}]}})\n"
+    )
+    for module, text in files.items():
+        path = inner / f"{module.replace('__', '/')}.py"
+        path.parent.mkdir(exist_ok=True)
+        (path.parent / "__init__.py").touch()
+        (inner / "__init__.py").touch()
+        path.write_text(text)
+
+
+LOGS = "import rclpy\n{}\ndef main():\n    rclpy.init()\n    rclpy.create_node('n').get_logger().info({})\n"
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("above", ["src", "anything", "src/repository"])
+@pytest.mark.parametrize("target", ["two/two/speaker.py", "two/speaker", "two/launch/all.launch.py"])
+def test_the_packages_beside_one_are_there(tmp_path: Path, above: str, target: str) -> None:
+    """As in a workspace that is built, whatever its folder is called and whatever is named."""
+    a_package(tmp_path / above, "one", words="TEXT = 'from the other package'\n")
+    a_package(tmp_path / above, "two", speaker=LOGS.format("from one.words import TEXT", "TEXT"))
+    launch = tmp_path / above / "two" / "launch" / "all.launch.py"
+    launch.parent.mkdir()
+    launch.write_text(
+        "from launch import LaunchDescription\nfrom launch_ros.actions import Node\n"
+        "def generate_launch_description():\n"
+        "    return LaunchDescription([Node(package='two', executable='speaker')])\n"
+    )
+    summary = observe(ObserveRequest((tmp_path / above / target,), NS_PER_S, clock="virtual"), lambda _: None)
+    assert [r.text for r in summary.records] == ["from the other package"]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("room", ["hall", "kitchen"])
+def test_the_file_that_is_named_runs(tmp_path: Path, room: str) -> None:
+    """A package may have two files of a name."""
+    a_package(tmp_path, "rooms", hall__main=LOGS.format("", "'hall'"), kitchen__main=LOGS.format("", "'kitchen'"))
+    file = tmp_path / "rooms" / "rooms" / room / "main.py"
+    summary = observe(ObserveRequest((file,), NS_PER_S, clock="virtual"), lambda _: None)
+    assert [r.text for r in summary.records] == [room]
+    assert [note for note in summary.notes if "not graded" in note] == []
 
 
 WORKSPACE = ROOT / "tests" / "packages" / "workspace"

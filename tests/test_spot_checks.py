@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,18 @@ from grading import grade_until_decided, say_nothing
 from grader.app.grade import Progress
 from grader.app.request import GradeRequest
 from grader.app.spot_checks import SpotChecks, check, is_drawn, shortened
+from grader.app.start import grade
+from grader.core.exercise import Criterion, Exercise
 from grader.core.report import Report
+from grader.core.scenario import Scenario, Span
+from grader.core.submission import Run, StudentFile, Submission
 from grader.core.trace import ClockKind, Trace
 from grader.execution.plan import Plan
 from grader.execution.supervisor import Job
+from grader.judging.beginnings import BeginningJudge
+from grader.judging.checks.fields import FieldEqual
+from grader.judging.checks.rate import TopicRate
+from grader.student_host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 from grader.testing import TraceBuilder
 
 HERE = Path(__file__).parent / "spot_checks"
@@ -28,12 +37,28 @@ S = 1_000_000_000
 
 
 def job(scenario: str = "alone", **fields: Any) -> Job:
-    return Job(scenario, Plan(scenario, (), "/", "00", 10 * S, "/x", 60 * S, (), (), "virtual", **fields))
+    return Job(
+        scenario, Plan(scenario, (("a.py", "a.py"),), "/", "00", 10 * S, "/x", 60 * S, (), (), "virtual", **fields)
+    )
 
 
-def trace(clock: ClockKind = ClockKind.VIRTUAL, *, rate_hz: float = 20.0, **fields: Any) -> Trace:
-    made = TraceBuilder("a.py", clock=clock).messages("/x", FLOAT, {"data": 1.0}, rate_hz=rate_hz).trace()
+def trace(clock: ClockKind = ClockKind.VIRTUAL, *, rate_hz: float = 20.0, value: float = 1.0, **fields: Any) -> Trace:
+    made = TraceBuilder("a.py", clock=clock).messages("/x", FLOAT, {"data": value}, rate_hz=rate_hz).trace()
     return replace(made, scenario="alone", **fields)
+
+
+#: The value of every message that is right.
+RIGHT = 1.0
+CRITERION = Criterion("value", "Publishes 1", Fraction(4), "alone", FieldEqual("/x", {"data": RIGHT}))
+
+
+def judge_of(key: tuple[str, str]) -> BeginningJudge:
+    """Return what judges a scenario of one program whose messages hold a constant."""
+    scenario = Scenario(key[1], ("a.py",), Span(10 * S))
+    criteria = (replace(CRITERION, scenario=key[1]),)
+    exercise = Exercise(key[0], "1", "One", True, ("a.py",), (scenario,), criteria, "sha256:0")
+    submission = Submission("s", "s", Path("s"), "sha256:0", {"a.py": StudentFile("a.py", "a.py")})
+    return BeginningJudge(exercise, key[1], submission, {})
 
 
 class Recorder:
@@ -62,7 +87,7 @@ def checked(
     checks = SpotChecks(share, 1, "sha256:0", reaches)
     jobs = {("one", "alone"): job(**fields)}
     traces = {("one", "alone"): virtual or trace()}
-    found = check(checks, jobs, traces, recorder, lambda key, t: heard.append((key, t)))
+    found = check(checks, jobs, traces, recorder, lambda key, t: heard.append((key, t)), judge_of)
     assert heard == [(key, found[key]) for key in found] or not recorder.plans
     return found["one", "alone"]
 
@@ -84,7 +109,7 @@ def test_where_the_clocks_agree_virtual_time_counts() -> None:
     recorder = Recorder(SAME)
     assert checked(recorder) == trace()
     (plan,) = recorder.plans
-    assert (plan.clock, plan.bare, plan.duration_ns) == ("wall", True, 6 * S)
+    assert (plan.clock, plan.bare, plan.duration_ns) == ("wall", True, 4 * S)
 
 
 def test_where_they_disagree_the_wall_clock_decides() -> None:
@@ -93,7 +118,69 @@ def test_where_they_disagree_the_wall_clock_decides() -> None:
     decided = checked(recorder)
     assert decided.clock is ClockKind.WALL
     assert decided.clock_reason.endswith("/x had 20.0 Hz in virtual time and 1.0 Hz on the wall clock")
-    assert [plan.duration_ns for plan in recorder.plans] == [6 * S, 6 * S, 10 * S]
+    assert [plan.duration_ns for plan in recorder.plans] == [4 * S, 4 * S, 10 * S]
+
+
+def test_a_criterion_that_is_met_on_one_clock_only_lets_the_wall_clock_decide() -> None:
+    """Also where the values are close: the check compares, with its own tolerance."""
+    off = trace(ClockKind.WALL, value=1.001)
+    decided = checked(Recorder(off, off, off))
+    assert decided.clock_reason.endswith('"Publishes 1" was met in virtual time and not met on the wall clock')
+    assert decided.messages("/x") == off.messages("/x")
+    assert checked(Recorder(off, SAME)) == trace()
+
+
+def starved(found: Trace) -> Trace:
+    return replace(found, most_starved_ns=S)
+
+
+def test_a_criterion_that_a_busy_machine_left_open_is_asked_again() -> None:
+    """A node that had to wait for a processor may be wrong for that, and never counts; its rate is not compared."""
+    with_rate = replace(CRITERION, check=TopicRate("/x", 20.0, 1.0))
+    slow = starved(trace(ClockKind.WALL, rate_hz=18.5))
+
+    def judges_rate(key: tuple[str, str]) -> BeginningJudge:
+        judge = judge_of(key)
+        exercise = replace(judge._exercise, criteria=(with_rate,))
+        return BeginningJudge(exercise, key[1], judge._submission, {})
+
+    def found(*walls: Trace) -> Trace:
+        checks, key, recorder = SpotChecks(0.0, 1, "sha256:0", ("gc",)), ("one", "alone"), Recorder(*walls)
+        return check(checks, {key: job()}, {key: trace()}, recorder, lambda *_: None, judges_rate)[key]
+
+    assert found(slow, slow, slow).harness_problem.startswith("the machine was too busy")
+    assert found(slow, SAME) == trace()
+    assert found(*[trace(ClockKind.WALL, rate_hz=18.5)] * 3).clock is ClockKind.WALL
+
+
+def several(**programs: str) -> dict[tuple[str, str], Job]:
+    """Return the jobs of an exercise whose scenarios run so many programs, named by letters."""
+    made = {("one", name): job(name) for name in programs}
+    return {
+        key: replace(one, plan=replace(one.plan, processes=tuple((p, p) for p in programs[key[1]])))
+        for key, one in made.items()
+    }
+
+
+def drawn_scenarios(jobs: dict[tuple[str, str], Job], number: int, reaches: tuple[str, ...] = ()) -> set[str]:
+    checks = SpotChecks(1.0, 1, f"sha256:{number}", reaches)
+    return {scenario for _, scenario in checks.due(jobs, dict.fromkeys(jobs, trace()))}
+
+
+def test_each_program_is_checked_in_one_scenario() -> None:
+    """By itself if it can be; which one, only the key tells, and now and then those of several programs too."""
+    jobs = several(first="a", second="a", third="b", both="ab")
+    drawn = [drawn_scenarios(jobs, number) for number in range(400)]
+    assert all("third" in found and len(found & {"first", "second"}) == 1 for found in drawn)
+    assert 150 < sum("first" in found for found in drawn) < 250
+    assert 60 < sum("both" in found for found in drawn) < 140
+    assert drawn_scenarios(jobs, 0, ("gc",)) == {"first", "second", "third", "both"}
+
+
+def test_a_program_that_never_runs_alone_is_checked_beside_others() -> None:
+    """And an exercise with one scenario is checked in that one."""
+    assert drawn_scenarios(several(both="ab"), 3) == {"both"}
+    assert drawn_scenarios(several(all="abc", two="ab"), 3) >= {"all", "two"}
 
 
 def test_only_what_disagrees_beside_others_is_recorded_alone() -> None:
@@ -101,7 +188,8 @@ def test_only_what_disagrees_beside_others_is_recorded_alone() -> None:
     keys = ("one", "alone"), ("two", "alone"), ("two", "beside")
     jobs = {key: job(f"{key[0]} {key[1]}") for key in keys}
     recorder = Recorder(SAME, BUSY, OTHER, SAME, OTHER, OTHER, OTHER, OTHER)
-    found = check(SpotChecks(1.0, 1, "sha256:0"), jobs, dict.fromkeys(keys, trace()), recorder, lambda *_: None)
+    checks = SpotChecks(0.0, 1, "sha256:0", ("gc",))
+    found = check(checks, jobs, dict.fromkeys(keys, trace()), recorder, lambda *_: None, judge_of)
     assert recorder.parallel == [f"{one} {two}, checked on the wall clock" for one, two in keys]
     assert [plan.scenario for plan in recorder.plans[3:6]] == ["two alone", "two beside", "two beside"]
     assert [found[key].clock for key in keys] == [ClockKind.VIRTUAL, ClockKind.WALL, ClockKind.WALL]
@@ -152,7 +240,7 @@ def test_who_is_suspected_is_checked_on_the_wall_clock_as_well() -> None:
 def test_a_slow_start_is_waited_for() -> None:
     """As long as in virtual time, and some more."""
     late = TraceBuilder("a.py").messages("/x", FLOAT, {"data": 1.0}, start_s=8.0, rate_hz=20.0).trace()
-    assert shortened(job().plan, late).wait_at_most_ns == 18 * S
+    assert shortened(job().plan, late, judge_of(("one", "alone"))).wait_at_most_ns == 18 * S
 
 
 def test_the_draw_repeats_and_has_the_share_asked_for() -> None:
@@ -208,6 +296,23 @@ def test_an_honest_program_keeps_its_marks(tmp_path: Path, file: Path) -> None:
 
 
 @pytest.mark.ros
+@pytest.mark.nightly
+@pytest.mark.parametrize("folder", sorted((HERE / "checked").iterdir()), ids=lambda folder: folder.name)
+def test_what_only_a_rubrics_check_tells_apart_is_found(folder: Path) -> None:
+    """Texts, logged numbers, values that vary, and a rate that is 30 % off: each keeps its points in virtual time."""
+    (file,) = folder.iterdir()
+    asked = {"battery_service_server.py": "project_3", "simple_publisher.py": "project_1"}
+    asked |= {"odom_subscriber.py": "exercise_2", "velocity_publisher.py": "exercise_1"}
+    rubrics = (HERE.parents[1] / "rubrics" / f"{asked[file.name]}.yaml",)
+    report = grade_until_decided(GradeRequest(str(folder), rubrics=rubrics, spot_checks=1.0))
+    (exercise,) = report.exercises
+    assert exercise.clock is ClockKind.WALL
+    assert exercise.clock_reason.endswith(" was met in virtual time and not met on the wall clock")
+    before = grade_until_decided(GradeRequest(str(folder), rubrics=rubrics, clock="virtual"))
+    assert report.score < before.score
+
+
+@pytest.mark.ros
 def test_defining_classes_is_no_reason_for_a_check(tmp_path: Path) -> None:
     """Named tuples, data classes and enumerations run code that Python writes itself."""
     steps: list[str] = []
@@ -217,6 +322,51 @@ def test_defining_classes_is_no_reason_for_a_check(tmp_path: Path) -> None:
 
     report = graded(tmp_path, HERE / "makes_classes.py", hear)
     assert (report.score, [step for step in steps if "wall clock" in step]) == (30, [])
+
+
+def told_of(tmp_path: Path, seed: int) -> tuple[int, int, str]:
+    """Return the date, the uptime and the order of a set that a program sees in virtual time, as it logs them."""
+    folder = tmp_path / str(seed)
+    folder.mkdir(exist_ok=True)
+    shutil.copy(HERE / "tells_the_time.py", folder / "velocity_publisher.py")
+    runs: list[Run] = []
+    request = GradeRequest(str(folder), exercises=("velocity_publisher",), clock="virtual", seed=seed)
+    grade(request, say_nothing, lambda run, _: runs.append(run), pictures=False)
+    (found,) = runs[0].traces.values()
+    date, uptime, order = found.records()[0].text.split()
+    return int(date), int(uptime), order
+
+
+@pytest.mark.ros
+def test_the_date_and_the_hashes_follow_from_the_seed(tmp_path: Path) -> None:
+    """So no program knows them, and the same file gets the same report on every day."""
+    first, again, other = (told_of(tmp_path, seed) for seed in (1, 1, 2))
+    assert first == again
+    assert all(one != another for one, another in zip(first, other, strict=True))
+    for date, uptime, order in (first, other):
+        assert 0 <= date - EPOCH_NS // S <= EPOCH_SPAN_S
+        assert 0 <= uptime - UPTIME_NS // S <= UPTIME_SPAN_S
+        assert sorted(order) == list("abcdefghijklmnop")
+
+
+@pytest.mark.ros
+def test_the_order_of_a_set_in_a_fork_helps_nobody(tmp_path: Path) -> None:
+    """A program that uses it runs with hashes of its own, also in virtual time."""
+    assert graded(tmp_path, HERE / "order_of_a_set.py", clock="virtual").score <= 20
+
+
+@pytest.mark.ros
+def test_a_module_that_nobody_read_is_a_reason_for_a_check(tmp_path: Path) -> None:
+    """One that the program writes; one of its own files is not."""
+    steps: list[str] = []
+    assert graded(tmp_path, HERE / "honest" / "writes_a_module.py", steps.append).score == 30
+    assert any("checked on the wall clock" in step for step in steps)
+    (tmp_path / "submission" / "helper.py").write_text("SPEED = 0.5\n", encoding="utf-8")
+    text = (HERE / "makes_classes.py").read_text(encoding="utf-8")
+    (tmp_path / "uses_helper.py").write_text(text.replace("import rclpy\n", "import helper\nimport rclpy\n", 1))
+    steps.clear()
+    assert graded(tmp_path, tmp_path / "uses_helper.py", steps.append).score == 30
+    assert [step for step in steps if "wall clock" in step] == []
 
 
 @pytest.mark.ros

@@ -15,7 +15,7 @@ from grader.core.errors import EnvironmentFault, GraderError
 from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S
 from grader.execution.byte_code import byte_code
-from grader.execution.machine import software, system
+from grader.execution.machine import software, system, weaknesses
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.bubblewrap import ENTERABLE
 from grader.execution.sandbox.choose import inspect_tiers, sandbox_memory
@@ -42,7 +42,7 @@ def examine(progress: Progress) -> Checkup:
     """Find out what this machine can do; takes a few seconds."""
     progress("looking for ROS 2")
     ros, lack = _ros()
-    facts = (*software(ros), *lack, *system(), _archives(), *_interfaces(ros))
+    facts = (*software(ros), *lack, *system(), *weaknesses(ros), _archives(), *_interfaces(ros))
     if ros is None:
         return Checkup(facts, None, (), "", "", Limits())
     progress("looking at the byte code")

@@ -57,6 +57,11 @@ def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanat
     raise _unknown(name, [*(c.id for _, c in pairs), *checks])
 
 
+def everything(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
+    """Explain all criteria of the given rubrics, or of the built-in ones, and all checks."""
+    return [*explain_rubrics(rubrics), *explain_checks(rubrics)]
+
+
 def explain_rubrics(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
     """Explain every criterion of the given rubrics, or of the built-in ones if none are given."""
     return [_criterion(e, c) for e, c in _pairs(rubrics)]

@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 import grader
 from grader.app.interface_packages import definitions, known_interfaces, provide
@@ -31,8 +32,11 @@ from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
 from grader.rubrics.builtin import builtin_exercises, builtin_odometry, exercise_ids
 from grader.submissions.collected import listed, shown
-from grader.submissions.sources import read_reaches, read_sources
+from grader.submissions.sources import HASHES, read_reaches, read_sources
 from grader.submissions.submission import stage_collected, stage_submission
+
+if TYPE_CHECKING:
+    from grader.judging.beginnings import BeginningJudge
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
@@ -110,13 +114,18 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         odometry = read_recording(request, exercises)
         seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
         environment = _environment(session)
-        provided = provide(session, exercises, request.interfaces, submission.root)
+        provided = provide(session, exercises, request.interfaces, submission, request.time_budget_s)
         submission = replace(submission, notes=(*submission.notes, *provided.problems))
         kept = _kept(request, exercises, submission, odometry, seed, environment, provided.offered)
         done = {exercise for exercise, _ in kept}
         unrecorded = [exercise for exercise in exercises if exercise.id not in done]
-        prefixes = install_shares(submission.root, Path(prefix), session.ros) if unrecorded else ()
-        jobs = plan_jobs(request, unrecorded, submission, odometry, seed, provided.folders, prefixes)
+        prefixes: tuple[str, ...] = ()
+        if unrecorded:
+            prefixes, problems = install_shares(submission.root, submission.projects, Path(prefix), session.ros)
+            submission = replace(submission, notes=(*submission.notes, *problems))
+        reaches = read_reaches(submission.root)
+        folders, own_hashes = provided.folders, not HASHES.isdisjoint(reaches)
+        jobs = plan_jobs(request, unrecorded, submission, odometry, seed, folders, prefixes, own_hashes=own_hashes)
         run = Run(
             submission=submission,
             traces=kept,
@@ -130,7 +139,7 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
             offered=provided.offered,
         )
         take = EarlyReports(exercises, jobs, run, on_partial_report).take if on_partial_report is not None else None
-        checks = SpotChecks(request.spot_checks, seed, submission.digest, read_reaches(submission.root))
+        checks = SpotChecks(request.spot_checks, seed, submission.digest, reaches)
         later = request.clock == AUTO and checks.certain
         first = None if later else take
 
@@ -138,12 +147,13 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
             _judge()
             under_way()
 
-        budget_s = request.time_budget_s
-        traces = session.record(jobs, request.clock, progress, first, budget_s=budget_s, under_way=meanwhile)
+        budget = RealTimeBudget(request.time_budget_s, spent_s=provided.spent_s)
+        traces = session.record(jobs, request.clock, progress, first, budget=budget, under_way=meanwhile)
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
-            traces = check(checks, jobs, traces, record, take or (lambda *_: None))
+            judge_of = partial(_judge_of, exercises, submission, run.sources)
+            traces = check(checks, jobs, traces, record, take or (lambda *_: None), judge_of)
         run = replace(run, traces={**kept, **traces}, duration_s=time.perf_counter() - started)
         run = replace(run, definitions=definitions(run.traces.values(), provided))
         if on_recorded is not None:
@@ -156,6 +166,16 @@ def _judge() -> Callable[..., Report]:
     from grader.judging.judge_run import judge_run  # noqa: PLC0415
 
     return judge_run
+
+
+def _judge_of(
+    exercises: Sequence[Exercise], submission: Submission, sources: Mapping[str, str], key: Key
+) -> BeginningJudge:
+    """Return what judges the beginnings of the recordings of a scenario."""
+    from grader.judging.beginnings import BeginningJudge  # noqa: PLC0415 - as `judge_run`
+
+    exercise = next(exercise for exercise in exercises if exercise.id == key[0])
+    return BeginningJudge(exercise, key[1], submission, sources)
 
 
 def _kept(  # noqa: PLR0913  all that a recording depends on
@@ -237,17 +257,28 @@ def plan_jobs(  # noqa: PLR0913  each comes from a different stage
     seed: int,
     interfaces: Sequence[Path] = (),
     prefixes: tuple[str, ...] = (),
+    *,
+    own_hashes: bool = False,
 ) -> dict[tuple[str, str], Job]:
     """Plan the recordings, by exercise and scenario; scenarios with a missing file are left out.
 
     The interfaces are the folders of packages that are not installed; the prefixes are what `install_shares` returns.
+    `own_hashes` is whether the order of a set may matter to the programs.
     """
     clock = planned_clock(request.clock)
     return {
         (exercise.id, scenario.id): Job(
             f"{exercise_name(exercise.number)}: {', '.join(scenario.processes)} ({scenario.id.replace('_', ' ')})",
             replace(
-                plan_scenario(exercise.id, scenario, submission, seed=seed, odometry=odometry, clock=clock),
+                plan_scenario(
+                    exercise.id,
+                    scenario,
+                    submission,
+                    seed=seed,
+                    odometry=odometry,
+                    clock=clock,
+                    own_hashes=own_hashes,
+                ),
                 interfaces=tuple(map(str, interfaces)),
                 prefixes=prefixes,
             ),

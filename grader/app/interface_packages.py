@@ -5,29 +5,33 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import re
 import shutil
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import time
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from grader.app.ros_packages import LENDABLE, Lent, copied, lent_to
 from grader.compiled import compiled, state_of, state_of_package
 from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault, RubricError
 from grader.core.exercise import Exercise
 from grader.core.report import BroughtPackage, DescribedPackage
 from grader.core.shipped import PACKAGE
-from grader.core.submission import Definition
+from grader.core.submission import Definition, Submission
 from grader.core.trace import Delivery, Message, Trace
-from grader.execution.confined_build import build_confined
+from grader.execution.confined_build import Build, build_confined, told_of
+from grader.execution.real_time_budget import FOREVER_S
 from grader.execution.recording_session import RecordingSession
 from grader.execution.ros_installation import RosInstallation, find_ros
-from grader.execution.temp_dirs import kept_interfaces
+from grader.execution.temp_dirs import kept_interfaces, make_room
 from grader.interfaces.build import BuiltInterfaces, build
 from grader.interfaces.definitions import SHIPPED, InterfacePackage, digest, files_in, find_packages, shipped_packages
 from grader.interfaces.program import needed
@@ -62,11 +66,13 @@ class Provided:
     offered: str = ""  # digest of all packages of rubrics and class, used or not; empty if there are none
     notes: tuple[str, ...] = ()  # sentences for whoever runs the grader
     problems: tuple[str, ...] = ()  # sentences for the student, about packages of the submission
+    lent: tuple[Path, ...] = ()  # the folder of the other Python packages of ROS that the run gets, if it gets any
+    spent_s: float = 0.0  # real time that the build of the submission's packages took
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """Where their modules are, the first one first."""
-        return tuple(BuiltInterfaces(prefix, ()).python for prefix in self.builds)
+        """Where all modules are, the first one first."""
+        return (*(BuiltInterfaces(prefix, ()).python for prefix in self.builds), *self.lent)
 
 
 def is_installed(name: str, ros: RosInstallation) -> bool:
@@ -174,30 +180,50 @@ def offered_digest(course: Sequence[Path], exercises: Iterable[Exercise]) -> str
     return _digest(packages) if packages else ""
 
 
-def provide(session: RecordingSession, exercises: Sequence[Exercise], course: Sequence[Path], root: Path) -> Provided:
+def provide(
+    session: RecordingSession,
+    exercises: Sequence[Exercise],
+    course: Sequence[Path],
+    submission: Submission,
+    budget_s: float = FOREVER_S,
+) -> Provided:
     """Build what a run needs: the packages of rubrics and class, those of the grader that it names, and a submission's.
 
     Args:
         session: Its sandbox and limits hold for the packages of the submission.
         exercises: The exercises to grade.
         course: The folders of the class.
-        root: The staged submission.
+        submission: The staged submission.
+        budget_s: Real time that may be spent on the packages of the submission.
     """
-    ros = session.ros
+    ros, root = session.ros, submission.root
     given = offers((Path(folder) for e in exercises for folder in e.interfaces), course, ros)
     taken = {offer.package.name for offer in given}
     ready = [p for p in _shipped() if p.name not in taken and not is_installed(p.name, ros)]
-    text = b"".join([repr(exercises).encode("utf-8", "replace"), *_programs(root)])
-    named = [package for package in ready if package.name.encode() in text]
+    texts = chain([repr(exercises).encode("utf-8", "replace")], _programs(root))
+    names = {*(package.name for package in ready), *LENDABLE}
+    mentioned = _named_in(texts, names)
+    lent = lent_to(mentioned, lambda name: is_installed(name, ros))
+    mentioned |= _named_in([lent.text], names)
+    named = [package for package in ready if package.name in mentioned]
     used = needed([*(offer.package for offer in given), *named], ready)
     given += [Offer(package, GRADER) for package in used if package.name not in taken]
     brought = [BroughtPackage(offer.package.name, offer.origin, _digest([offer.package])) for offer in given]
     builds = [_copied(built(used, ros).prefix, session.folder)] if used else []
-    own = _of_submission(session, root, [*used, *(package for package in ready if package not in used)])
-    builds += [_copied(folder, root.parent) for folder in own.builds]
+    others = [*used, *(package for package in ready if package not in used)]
+    own = _of_submission(session, submission, others, budget_s)
+    try:
+        builds += [_copied(folder, root.parent) for folder in own.builds]
+    except OSError:  # another run has made room in the meantime
+        shutil.rmtree(root.parent / "interfaces", ignore_errors=True)
+        again = _of_submission(session, submission, others, budget_s - own.spent_s)
+        own = replace(again, spent_s=own.spent_s + again.spent_s)
+        builds += [_copied(folder, root.parent) for folder in own.builds]
     packages = tuple(sorted([*brought, *own.packages], key=lambda package: package.name))
     offered = offered_digest(course, exercises)
-    return Provided(packages, tuple(builds), offered, tuple(_notes(packages)), own.problems)
+    lent_at = (copied(lent.names, session.folder),) if lent.names else ()
+    notes = tuple(_notes(packages, lent))
+    return Provided(packages, tuple(builds), offered, notes, own.problems, lent_at, own.spent_s)
 
 
 def definitions(traces: Iterable[Trace], provided: Provided) -> dict[str, Definition]:
@@ -220,10 +246,14 @@ class _Own:
     packages: tuple[BroughtPackage, ...] = ()
     builds: tuple[Path, ...] = ()
     problems: tuple[str, ...] = ()
+    spent_s: float = 0.0
 
 
-def _of_submission(session: RecordingSession, root: Path, others: Sequence[InterfacePackage]) -> _Own:
+def _of_submission(
+    session: RecordingSession, submission: Submission, others: Sequence[InterfacePackage], budget_s: float
+) -> _Own:
     """Build the packages in a submission, which may use others, but not replace them, in the sandbox of a session."""
+    root = submission.root
     files = files_in([root])
     if not any(path.suffix != ".xml" for path in files):
         return _Own()
@@ -233,29 +263,49 @@ def _of_submission(session: RecordingSession, root: Path, others: Sequence[Inter
     for path in files:
         key.update(f"{path.relative_to(root)}\0{path.stat().st_size}\0".encode("utf-8", "replace") + path.read_bytes())
     place = (kept_interfaces() or session.folder) / f"submitted-{key.hexdigest()}"
-    if not (place / _TOLD).is_file():
-        names = {name for path in files for name in _names(path)}
-        taken = {other.name for other in others} | {name for name in names if is_installed(name, session.ros)}
-        with tempfile.TemporaryDirectory(prefix="build-", dir=place.parent, ignore_cleanup_errors=True) as fresh:
-            into = Path(fresh, "whole")
+    kept = _kept_build(place)
+    if kept is not None:
+        return _own_from(kept, place)
+    names = {folder.name for path in files for folder in path.parents} | {one.name for one in submission.projects}
+    taken = {other.name for other in others} | {name for name in names if is_installed(name, session.ros)}
+    started = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="build-", dir=place.parent, ignore_cleanup_errors=True) as fresh:
+        into = Path(fresh, "whole")
+        into.mkdir()
+        told = build_confined(session.isolation, session.ros, root, into, others=others, taken=taken, left_s=budget_s)
+        spent_s = time.monotonic() - started
+        if not told.packages:  # what was begun is of no use
+            shutil.rmtree(into)
             into.mkdir()
-            told = build_confined(session.isolation, session.ros, root, into, others=others, taken=taken)
-            (into / _TOLD).write_text(json.dumps(told), encoding="utf-8")
-            with suppress(OSError):  # another process was faster
-                into.rename(place)
-    return _own_from(json.loads((place / _TOLD).read_text(encoding="utf-8")), place)
+        written = {"packages": dict(told.packages), "folder": told.folder, "problems": told.problems}
+        (into / _TOLD).write_text(json.dumps(written), encoding="utf-8")
+        if not told.lasting:
+            return replace(_own_from(told, place), spent_s=spent_s)
+        with suppress(OSError):  # another process was faster
+            into.rename(place)
+    make_room(place.parent, keep=place)
+    return replace(_own_from(told, place), spent_s=spent_s)
 
 
-def _names(file: Path) -> Iterator[str]:
-    """Yield what the package of a definition may be called: as the folders around it, and as its manifest says."""
-    if file.name == "package.xml":
-        yield from re.findall(r"<name>\s*(\w+)\s*</name>", file.read_text(encoding="utf-8", errors="replace"))
-    yield from (folder.name for folder in file.parents)
+def _kept_build(place: Path) -> Build | None:
+    """Return what was built before; None if it was not, or if that was damaged since."""
+    try:
+        told = told_of(json.loads((place / _TOLD).read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        return None
+    with suppress(OSError):
+        os.utime(place)  # what is in use is not the oldest
+    return told
 
 
-def _own_from(told: Mapping[str, Any], place: Path) -> _Own:
-    found = tuple(BroughtPackage(name, SUBMISSION, told["packages"][name]) for name in sorted(told["packages"]))
-    return _Own(found, (place / told["folder"],) if found else (), tuple(told["problems"]))
+def _own_from(told: Build, place: Path) -> _Own:
+    found = tuple(BroughtPackage(name, SUBMISSION, told.packages[name]) for name in sorted(told.packages))
+    return _Own(found, (place / told.folder,) if found else (), told.problems)
+
+
+def _named_in(texts: Iterable[bytes], names: Iterable[str]) -> set[str]:
+    """Return the names that are in any of the texts."""
+    return {name for text in texts for name in names if name.encode() in text}
 
 
 def _programs(root: Path) -> Iterator[bytes]:
@@ -272,11 +322,13 @@ def _copied(folder: Path, into: Path) -> Path:
     return copy
 
 
-def _notes(packages: Iterable[BroughtPackage]) -> Iterator[str]:
-    """Yield the note on the packages of a run, in words."""
+def _notes(packages: Iterable[BroughtPackage], lent: Lent) -> Iterator[str]:
+    """Yield the notes on the packages of a run, in words."""
     by_origin: dict[str, list[str]] = {}
     for package in packages:
         by_origin.setdefault(package.origin, []).append(package.name)
     parts = [f"{listed(names, 'and')} of {_WORDS[origin]}" for origin, names in sorted(by_origin.items())]
     if parts:
         yield f"interface packages that are not installed: {'; '.join(parts)}"
+    if lent.names:
+        yield f"{listed(lent.names, 'and')}: not installed, the grader's own version was used"

@@ -1,12 +1,14 @@
 """Spot checks: records a scenario again on the wall clock, with no code of the grader in the student's process.
 
-If the two recordings disagree, the wall clock decides.
+If a criterion that is met in the first recording is not met in the second, or the recordings differ in another way, the
+wall clock decides.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_S
@@ -15,10 +17,14 @@ from grader.execution.plan import Plan, derive
 from grader.execution.recording_session import WALL
 from grader.execution.stimuli import schedule
 from grader.execution.supervisor import Job
-from grader.judging.agreement import Difference, differences, sentence
+from grader.judging.agreement import Difference, differences, sentence, start_of
 
-#: How long a program is observed after its first message or the first stimulus.
-WATCHED_NS = 6 * NS_PER_S
+if TYPE_CHECKING:
+    from grader.judging.beginnings import BeginningJudge
+
+#: The share of submissions of which scenarios with several programs are checked as well. Each program is checked in a
+#: scenario of its own; a program that is wrong only beside the other one is found in this share.
+TOGETHER = 0.25
 #: How much longer than in virtual time the first message may take.
 PATIENCE_NS = 10 * NS_PER_S
 #: How often a disagreement must occur to count, and after how many attempts on a busy machine the check is given up.
@@ -30,18 +36,22 @@ BUSY = "the machine was too busy for a check on the wall clock"
 Key = tuple[str, str]
 Record = Callable[[Sequence[Job]], Sequence[Trace]]
 Finished = Callable[[Key, Trace], None]
+#: Returns what judges the beginnings of the recordings of a scenario.
+JudgeOf = Callable[[Key], "BeginningJudge"]
 
 
-def shortened(plan: Plan, virtual: Trace) -> Plan:
+def shortened(plan: Plan, virtual: Trace, judge: BeginningJudge) -> Plan:
     """Shorten a plan to its beginning, for a spot check on the wall clock with the same stimuli."""
     bare = bare_plan(plan, virtual)
     if plan.first_message_on:
         messages = virtual.messages(plan.first_message_on)
-        first_ns = messages[0].t_ns if messages else WATCHED_NS
-        watched_ns, waited_ns = min(plan.duration_ns, WATCHED_NS), min(plan.wait_at_most_ns, first_ns + PATIENCE_NS)
+        watched_ns = judge.length_ns(virtual, messages[0].t_ns if messages else 0)
+        first_ns = messages[0].t_ns if messages else watched_ns
+        watched_ns, waited_ns = min(plan.duration_ns, watched_ns), min(plan.wait_at_most_ns, first_ns + PATIENCE_NS)
         return replace(bare, duration_ns=watched_ns, wait_at_most_ns=waited_ns, shutdown_ns=0)
     begins_ns = min((due.t_ns for due in schedule(plan) if due.t_ns > 0), default=0)
-    return replace(bare, duration_ns=min(plan.duration_ns, begins_ns + WATCHED_NS), shutdown_ns=0)
+    watched_ns = begins_ns + judge.length_ns(virtual, begins_ns)
+    return replace(bare, duration_ns=min(plan.duration_ns, watched_ns), shutdown_ns=0)
 
 
 def bare_plan(plan: Plan, virtual: Trace) -> Plan:
@@ -78,25 +88,49 @@ class SpotChecks:
         return self.drawn or bool(self.reaches)
 
     def due(self, jobs: Mapping[Key, Job], traces: Mapping[Key, Trace]) -> list[Key]:
-        """Select the recordings to check: valid ones in virtual time, and of a suspect also those on the wall clock."""
-        drawn = self.drawn
+        """Select the recordings to check.
+
+        Of a submission that is drawn these are valid recordings in virtual time, of each program at least one. Of a
+        suspect these are all, also those on the wall clock.
+        """
+        drawn = self._drawn_of(jobs, traces) if self.drawn else ()
         return [
             key
             for key, job in jobs.items()
-            if _is_due(job.plan, traces[key], drawn=drawn, suspect=self.suspects(key, traces))
+            if _is_due(job.plan, traces[key], drawn=key in drawn, suspect=self.suspects(key, traces))
         ]
+
+    def _drawn_of(self, jobs: Mapping[Key, Job], traces: Mapping[Key, Trace]) -> set[Key]:
+        """Draw one scenario of each program in which as few others as possible run; of some, also other scenarios.
+
+        Starting Python is most of the cost of a check. Nobody but the owner of the key can predict which are drawn.
+        """
+        able = [key for key, job in jobs.items() if _is_due(job.plan, traces[key], drawn=True, suspect=False)]
+        found = {
+            key for key in able if len(jobs[key].plan.processes) > 1 and self._draws(TOGETHER, f"{key[0]} {key[1]}")
+        }
+        for exercise, program in dict.fromkeys((key[0], name) for key in able for name in _programs(jobs[key])):
+            own = [key for key in able if key[0] == exercise and program in _programs(jobs[key])]
+            fewest = min(len(_programs(jobs[key])) for key in own)
+            own = [key for key in own if len(_programs(jobs[key])) == fewest]
+            found.add(own[int(derive(self.seed, "spot check of", exercise, program, self.digest)[:12], 16) % len(own)])
+        return found
+
+    def _draws(self, share: float, what: str) -> bool:
+        return is_drawn(share, self.seed, f"{self.digest} {what}")
 
     def suspects(self, key: Key, traces: Mapping[Key, Trace]) -> bool:
         """Whether the exercise must pass its check, because a program accesses internals of its process."""
         return bool(self.reaches) or any(t.reached for (exercise, _), t in traces.items() if exercise == key[0])
 
 
-def check(
+def check(  # noqa: PLR0913  what to check, with what, and who is told
     checks: SpotChecks,
     jobs: Mapping[Key, Job],
     traces: Mapping[Key, Trace],
     record: Record,
     finished: Finished,
+    judge_of: JudgeOf,
 ) -> dict[Key, Trace]:
     """Run the spot checks that are due; where the clocks disagree, replace the exercise's traces by wall-clock ones.
 
@@ -108,13 +142,13 @@ def check(
     `finished`.
     """
     found = dict(traces)
-    due = checks.due(jobs, traces)
-    agreed = _agreed(due, jobs, traces, record)
+    due = {key: _Checked(jobs[key], traces[key], judge_of(key)) for key in checks.due(jobs, traces)}
+    agreed = _agreed(due, record)
     for exercise in dict.fromkeys(exercise for exercise, _ in due):
         own = [key for key in due if key[0] == exercise and key not in agreed]
         difference = None
         for key in own:
-            difference, busy = _disagreement(jobs[key], traces[key], record)
+            difference, busy = due[key].disagreement(record)
             if difference is not None:
                 break
             if busy:
@@ -124,6 +158,10 @@ def check(
         for key in (key for key in jobs if key[0] == exercise):
             finished(key, found[key])
     return found
+
+
+def _programs(job: Job) -> list[str]:
+    return [name for name, _ in job.plan.processes]
 
 
 def _is_due(plan: Plan, trace: Trace, *, drawn: bool, suspect: bool) -> bool:
@@ -137,38 +175,52 @@ def _is_due(plan: Plan, trace: Trace, *, drawn: bool, suspect: bool) -> bool:
     return wanted and not trace.harness_problem and not plan.starts_ns
 
 
-def _agreed(due: Sequence[Key], jobs: Mapping[Key, Job], traces: Mapping[Key, Trace], record: Record) -> set[Key]:
+@dataclass(frozen=True, slots=True)
+class _Checked:
+    """A scenario that is checked: its recording, and what judges the beginning of another one."""
+
+    job: Job
+    recorded: Trace
+    judge: BeginningJudge
+
+    def again(self) -> Job:
+        """Return the job that records the beginning on the wall clock."""
+        plan = shortened(self.job.plan, self.recorded, self.judge)
+        return Job(f"{self.job.title}, checked on the wall clock", plan)
+
+    def compared(self, wall: Trace) -> tuple[Difference | None, bool]:
+        """Return the most obvious difference, and whether a busy machine prevented a comparison."""
+        first_message_on = self.job.plan.first_message_on
+        starts_ns = start_of(self.recorded, first_message_on), start_of(wall, first_message_on)
+        judged = self.judge.compare(self.recorded, wall, starts_ns)
+        found = (*judged.lost, *differences(self.recorded, wall, first_message_on))
+        return next(iter(found), None), bool(found and wall.harness_problem) or (judged.unsure and not found)
+
+    def disagreement(self, record: Record) -> tuple[Difference | None, bool]:
+        """Return a difference that occurred in repeated attempts, and whether the machine was too busy to find out."""
+        seen: list[Difference] = []
+        busy = 0
+        while busy < BUSY_TIMES:
+            (wall,) = record([self.again()])
+            found, too_busy = self.compared(wall)
+            if too_busy:
+                busy += 1
+            elif found is None:
+                return None, False  # a busy machine makes clocks disagree, never agree
+            else:
+                seen.append(found)
+            if len(seen) == TIMES:
+                return seen[0], False
+        return None, True
+
+
+def _agreed(due: Mapping[Key, _Checked], record: Record) -> set[Key]:
     """Record what is due in parallel, and return where the clocks agree; a single one needs no such round."""
     if len(due) < 2:
         return set()
-    walls = record([replace(_check_of(jobs[key], traces[key]), parallel=True) for key in due])
-    return {key for key, wall in zip(due, walls, strict=True) if not _differences(jobs[key], traces[key], wall)}
-
-
-def _check_of(job: Job, virtual: Trace) -> Job:
-    return Job(f"{job.title}, checked on the wall clock", shortened(job.plan, virtual))
-
-
-def _differences(job: Job, virtual: Trace, wall: Trace) -> Sequence[Difference]:
-    return differences(virtual, wall, job.plan.first_message_on)
-
-
-def _disagreement(job: Job, virtual: Trace, record: Record) -> tuple[Difference | None, bool]:
-    """Return a difference that occurred in repeated attempts, and whether the machine was too busy to find out."""
-    seen: list[Difference] = []
-    busy = 0
-    while busy < BUSY_TIMES:
-        (wall,) = record([_check_of(job, virtual)])
-        found = _differences(job, virtual, wall)
-        if not found:
-            return None, False  # a busy machine makes clocks disagree, never agree
-        if wall.harness_problem:
-            busy += 1
-            continue
-        seen.append(found[0])
-        if len(seen) == TIMES:
-            return seen[0], False
-    return None, True
+    walls = record([replace(one.again(), parallel=True) for one in due.values()])
+    pairs = zip(due.items(), walls, strict=True)
+    return {key for (key, one), wall in pairs if one.compared(wall) == (None, False)}
 
 
 def _unchecked(trace: Trace, *, suspect: bool) -> Trace:

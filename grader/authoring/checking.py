@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import fields
+import difflib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import fields, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from grader.app.interface_packages import known_interfaces
 from grader.core.dataclass import dataclass
-from grader.core.errors import RubricError
+from grader.core.errors import HarnessError, RubricError
 from grader.core.exercise import Criterion, Exercise
 from grader.core.quantities import duration
-from grader.core.scenario import Scenario, shortest
+from grader.core.scenario import Scenario, Simulated, is_launch_file, shortest
 from grader.judging.checks import CHECKS
 from grader.rubrics.check_parameters import manual_of
 from grader.rubrics.draws import First
 from grader.rubrics.loader import RubricMistakes, read_rubric
+from grader.rubrics.simulations import Offered, offered
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlTree, read_yaml
 from grader.submissions.collected import shown
 
@@ -25,6 +28,23 @@ from grader.submissions.collected import shown
 ROUND = 5
 #: Check parameters with a duration that must fit into the scenario.
 _STRETCHES = ("window", "silence")
+#: Check -> parameters that name topics on which only the grader's stimuli can publish.
+_GIVEN: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(("logs_position", "log_period", "waits_gracefully"), ("topic",)),
+    **dict.fromkeys(("logs_received", "logs_values", "logs_texts", "stays_in_range"), ("topic",)),
+    "threshold_response": ("input",),
+    "reaches_goal": ("topic", "goals"),
+}
+#: The same, but another program of the scenario may do it instead: topics, services and actions.
+_HEARD: Mapping[str, tuple[str, ...]] = {
+    "subscribes": ("topic",),
+    **dict.fromkeys(("reaction", "latency"), ("input",)),
+    **dict.fromkeys(("service_answers_all", "service_response", "service_function", "service_sequence"), ("service",)),
+    **dict.fromkeys(("logs_response", "reacts_to_responses"), ("service",)),
+    **dict.fromkeys(("action_result", "action_feedback"), ("action",)),
+}
+#: How alike two names are of which one is taken for a misspelling of the other.
+_ALIKE = 0.8
 
 
 def oddities(exercise: Exercise, tree: YamlTree) -> list[Mistake]:
@@ -45,6 +65,7 @@ def _of_exercise(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
         if scenario.id not in judged:
             text = f"the scenario {scenario.id} is recorded, but no criterion looks at it"
             yield tree.at(("scenarios", index, "id")).mistake(text)
+    yield from _misspelt(exercise, tree)
     run = {process for scenario in exercise.scenarios for process in scenario.handed_in}
     for index, name in enumerate(exercise.files):
         if name not in run:
@@ -60,6 +81,73 @@ def _of_criterion(criterion: Criterion, exercise: Exercise, path: TreePath, tree
         yield where.mistake(f"{criterion.id} is judged by {kind.__name__}, which has no docstring to explain it")
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
     yield from _of_stretches(criterion, scenario, path, tree)
+    yield from _of_inputs(criterion, exercise, path, tree)
+
+
+def _of_inputs(criterion: Criterion, exercise: Exercise, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    """Yield topics, services and actions that the check waits for and nobody uses in the scenario."""
+    name, scenario = criterion.check_name, next(s for s in exercise.scenarios if s.id == criterion.scenario)
+    given, others = _given(scenario), len(scenario.processes) > 1 or any(map(is_launch_file, scenario.processes))
+    own = {topic for other in exercise.criteria for topic in _published(other)}
+    for parameter in (*_GIVEN.get(name, ()), *(() if others else _HEARD.get(name, ()))):
+        asked = getattr(criterion.check, parameter)
+        known = own if name in _HEARD else set()
+        if asked not in given | known and not any(end[:1] == "~" and asked.endswith(end[1:]) for end in given):
+            what = "publishes on" if parameter not in ("service", "action") else "uses"
+            text = f"no stimulus of {scenario.id} {what} {shown(asked)}{_did_you_mean(asked, given)}"
+            yield tree.at((*path, "check", name, parameter)).mistake(text)
+
+
+def _published(criterion: Criterion) -> Iterator[str]:
+    """Yield the topics that a criterion expects the student's nodes to publish on."""
+    if criterion.check_name not in (*_GIVEN, *_HEARD):
+        yield from filter(None, [getattr(criterion.check, "topic", None)])
+    yield from filter(None, [getattr(criterion.check, "output", None)])
+
+
+def _given(scenario: Scenario) -> set[str]:
+    """Return the topics, services and actions that the stimuli of a scenario use."""
+    names = {getattr(one, key) for one in scenario.stimuli for key in _ENDS if hasattr(one, key)}
+    for one in _simulations(scenario):
+        names |= {*one.publishes, *one.serves}
+    return names
+
+
+_ENDS = ("topic", "service", "action")
+
+
+def _simulations(scenario: Scenario) -> Iterator[Offered]:
+    for one in scenario.stimuli:
+        if isinstance(one, Simulated):
+            with suppress(HarnessError):  # it was tried when the rubric was read
+                yield offered(one)
+
+
+def _misspelt(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
+    """Yield what stimuli use and no check names, if a check names something very similar that no stimulus uses."""
+    asked = {getattr(c.check, key, None) for c in exercise.criteria for key in (*_ENDS, "input", "output", "goals")}
+    named = {name for name in asked if isinstance(name, str)}
+    used = {name for scenario in exercise.scenarios for name in (*_given(scenario), *_heard(scenario))}
+    for index, scenario in enumerate(exercise.scenarios):
+        for number, stimulus in enumerate(scenario.stimuli):
+            place: TreePath = ("scenarios", index, "stimuli", number)
+            own = {getattr(stimulus, key) for key in _ENDS if hasattr(stimulus, key)}
+            if isinstance(stimulus, Simulated):
+                alone = replace(scenario, stimuli=(stimulus,))
+                own = {*_given(alone), *_heard(alone)}
+            for name in sorted(own - named):
+                hint = _did_you_mean(name, named - used)
+                if hint:
+                    yield tree.at(place).mistake(f"no criterion looks at {shown(name)}{hint}")
+
+
+def _heard(scenario: Scenario) -> set[str]:
+    return {name for one in _simulations(scenario) for name in one.hears}
+
+
+def _did_you_mean(name: str, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(name, sorted(known), n=1, cutoff=_ALIKE)
+    return f": did you mean {shown(near[0])}?" if near else ""
 
 
 def _of_stretches(criterion: Criterion, scenario: Scenario, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:

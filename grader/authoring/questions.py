@@ -8,12 +8,12 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from grader.authoring.skeleton import DraftCriterion, DraftQuantity, as_id, in_seconds
 from grader.core.dataclass import dataclass
-from grader.core.quantities import NS_PER_S, seconds
+from grader.core.quantities import NS_PER_S, counted, seconds
 from grader.core.report import TopicSummary
 from grader.core.trace import Delivery, Message, Offer, Trace
-from grader.judging.judge_run import summarise
+from grader.judging.summary import summarise
 from grader.judging.values import carries_number, leaves, student_endpoints
-from grader.judging.wording import counted, number
+from grader.judging.wording import number
 
 #: What every node has.
 _EVERYBODYS = ("use_sim_time", "start_type_description_service")

@@ -59,6 +59,7 @@ class Draft:
     stimuli: tuple[DraftStimulus, ...] = ()
     criteria: tuple[DraftCriterion, ...] = ()
     remarks: tuple[str, ...] = ()
+    simulations: tuple[str, ...] = ()  # files of simulations, relative to the rubric
 
 
 def as_id(text: str) -> str:
@@ -92,7 +93,10 @@ def _lines(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]]) -> Iter
     yield from ("schema: grader/rubric/v1", "", "exercise:", f"  id: {draft.id}")
     title = draft.id.replace("_", " ").capitalize()
     yield from ('  number: "1"  # decide: what is its number in the course?', f"  title: {_scalar(title)}")
-    yield from ("  required: true", "", f"files: {_value(list(draft.files))}", "")
+    yield from ("  required: true", "", f"files: {_value(list(draft.files))}")
+    if draft.simulations:
+        yield f"simulations: {_value(list(draft.simulations))}"
+    yield ""
     yield from _scenario(draft)
     yield from ("", "criteria:")
     yield from _comment(f"decide: what is each of these worth? All have {POINTS} points so far.", "  ")

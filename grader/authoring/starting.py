@@ -10,8 +10,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from grader.app.grade import Progress
+from grader.app.inputs import FIRST_S, NOTHING, SentMessages, copied, period_s
 from grader.app.interface_packages import known_interfaces
-from grader.app.observe import ObserveRequest, watch
+from grader.app.observe import ObserveRequest, undisturbed, watch
 from grader.authoring.questions import Seen, parameters, questions
 from grader.authoring.skeleton import (
     Draft,
@@ -26,33 +27,40 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError, RubricError, SubmissionError
 from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S, seconds
-from grader.core.scenario import Scenario
+from grader.core.scenario import Scenario, Simulated
 from grader.core.trace import FaultKind, Trace
 from grader.judging.checks import CHECKS
 from grader.judging.findings import fault_sentence
 from grader.judging.values import carries_number, student_endpoints
 from grader.judging.wording import quote
 from grader.rubrics.loader import RubricMistakes, read_rubric
-from grader.rubrics.yaml_tree import YamlSyntaxError, read_yaml
+from grader.rubrics.simulations import offered
 
 ODOMETRY = "nav_msgs/msg/Odometry"
-#: Time before the first stimulus, to observe how the nodes wait.
-FIRST_S = 1.0
-#: Topic -> fields of the messages that the author wants to send.
-SentMessages = Mapping[str, Sequence[Mapping[str, object]]]
-#: No message was named.
-NOTHING: SentMessages = MappingProxyType({})
 _VALUES = (1, 2, 3, 4)
 _CALLS = 3
+NO_FILES: Mapping[str, Path] = MappingProxyType({})
+_HERE = Path()
+#: What is left for the author to decide about a simulation.
+_VARY = "decide: which parameters are to vary? {x: {between: [-0.9, 0.9]}} draws one from the seed"
 
 
-def stimuli_for(trace: Trace, duration_s: float, given: SentMessages = NOTHING) -> tuple[DraftStimulus, ...]:
-    """Propose stimuli for all endpoints that wait for input; `given` holds the messages that the author named."""
-    return (*_topics(trace, duration_s, given), *_services(trace), *_parameters(trace))
+def stimuli_for(
+    trace: Trace, duration_s: float, given: SentMessages = NOTHING, *, simulated: frozenset[str] = frozenset()
+) -> tuple[DraftStimulus, ...]:
+    """Propose stimuli for all endpoints that wait for input.
+
+    Args:
+        trace: What was observed.
+        duration_s: For how long.
+        given: The messages that the author named.
+        simulated: Topics and services that a simulation publishes or serves.
+    """
+    return (*_topics(trace, duration_s, given, simulated), *_services(trace, simulated), *_parameters(trace))
 
 
-def _topics(trace: Trace, duration_s: float, given: SentMessages) -> Iterator[DraftStimulus]:
-    spoken = {end.topic for end in student_endpoints(trace, "publisher")}
+def _topics(trace: Trace, duration_s: float, given: SentMessages, simulated: frozenset[str]) -> Iterator[DraftStimulus]:
+    spoken = {*simulated, *(end.topic for end in student_endpoints(trace, "publisher"))}
     for topic, type_ in dict.fromkeys((e.topic, e.type) for e in student_endpoints(trace, "subscription")):
         if topic in given:
             yield _named(topic, type_, duration_s, given[topic])
@@ -77,14 +85,13 @@ def _messages(topic: str, type_: str, duration_s: float) -> DraftStimulus:
 
 def _named(topic: str, type_: str, duration_s: float, values: Sequence[Mapping[str, object]]) -> DraftStimulus:
     """Spread the author's messages over the available time."""
-    period_s = max(0.1, math.floor(10 * (duration_s - FIRST_S) / (len(values) + 1)) / 10)
-    times = {"period": in_seconds(min(2.0, period_s)), "start": in_seconds(FIRST_S)}
+    times = {"period": in_seconds(period_s(duration_s, len(values))), "start": in_seconds(FIRST_S)}
     sent = {"topic": topic, "type": type_, "values": list(values), **times}
     return DraftStimulus("messages", sent, "decide: what else tells right from wrong?")
 
 
-def _services(trace: Trace) -> Iterator[DraftStimulus]:
-    servers = {end.service for end in trace.service_ends("service")}
+def _services(trace: Trace, simulated: frozenset[str]) -> Iterator[DraftStimulus]:
+    servers = {*simulated, *(end.service for end in trace.service_ends("service"))}
     for service, type_ in dict.fromkeys((e.service, e.type) for e in trace.service_ends("service")):
         asked = {"service": service, "type": type_, "requests": [{}], "calls": _CALLS, "start": in_seconds(1)}
         yield DraftStimulus("calls", asked, "decide: which requests? {} leaves all fields at their defaults")
@@ -110,49 +117,36 @@ class Skeleton:
     remarks: tuple[str, ...] = ()
 
 
-def new_rubric(request: ObserveRequest, progress: Progress, *, id_: str = "", sent: Sequence[str] = ()) -> Skeleton:
+def new_rubric(request: ObserveRequest, progress: Progress, *, id_: str = "", beside: Path = _HERE) -> Skeleton:
     """Make the skeleton of a rubric from the behaviour of a reference.
 
     Args:
-        request: The files of the reference, and how to run them.
+        request: The files of the reference, how to run them, and what they are given.
         progress: Called at the start of each step.
         id_: Id of the exercise; empty to derive it from the name of the first file.
-        sent: Messages to send to the reference, as `TOPIC={field: value}`.
+        beside: Folder of the rubric, which has to hold the files of its simulations.
 
     Raises:
         SubmissionError: The reference raises an exception, or does nothing that can be checked.
         GraderError: Something that the run needs cannot be used.
     """
-    given = read_sent(sent)
     alone = watch(request, progress)
     _refuse_broken(alone.trace, alone.processes)
-    draft = _begun(alone.trace, request, id_, given)
-    driven = watch(request, progress, _scenario_of(draft)).trace
+    files = {_relative(file, beside): file for one in request.simulations if (file := one.file) is not None}
+    draft = replace(
+        _begun(alone.trace, request, id_), simulations=tuple(files), remarks=tuple(_elsewhere(files, beside))
+    )
+    driven = watch(request, progress, _scenario_of(draft, files)).trace
     _refuse_broken(driven, draft.files)
-    draft = replace(draft, remarks=tuple(_remarks(driven)))
+    draft = replace(draft, remarks=(*draft.remarks, *_remarks(driven)))
     seen = Seen(alone.trace, driven, draft.files, _window_s(driven, draft.duration_s))
     kept, left_out = _sorted_out(draft, (row for row in questions(seen) if row.check in CHECKS), driven)
     if not kept:
         names = ", ".join(draft.files)
         raise SubmissionError(f"{names}: expected a reference that publishes, listens, serves or logs, found none")
     text = rubric_text(replace(draft, criteria=tuple(kept)), left_out)
-    _read(text)  # find bugs of the grader here, not at the author's
+    _read(text, files)  # find bugs of the grader here, not at the author's
     return Skeleton(text, len(kept), len(left_out), draft.remarks)
-
-
-def read_sent(sent: Sequence[str]) -> SentMessages:
-    """Parse the messages to send, by topic; raises GraderError for invalid ones."""
-    given: dict[str, list[Mapping[str, object]]] = {}
-    for text in sent:
-        topic, _, fields = text.partition("=")
-        try:
-            data = read_yaml(fields).data
-        except YamlSyntaxError:
-            data = None
-        if not topic.startswith("/") or not isinstance(data, dict):
-            raise GraderError(f"--send {quote(text)}: expected TOPIC={{field: value}}, found something else")
-        given.setdefault(topic, []).append(data)
-    return given
 
 
 def _remarks(trace: Trace) -> Iterator[str]:
@@ -161,12 +155,15 @@ def _remarks(trace: Trace) -> Iterator[str]:
             yield f"nothing was published on {topic}: send what its node waits for with --send TOPIC={{field: value}}"
 
 
-def _begun(trace: Trace, request: ObserveRequest, id_: str, given: SentMessages) -> Draft:
+def _begun(trace: Trace, request: ObserveRequest, id_: str) -> Draft:
     """Return a draft with the scenario of the reference and no criteria."""
     files = tuple(file.name for file in request.files)
     duration_s = request.duration_ns / NS_PER_S
-    stimuli = stimuli_for(trace, duration_s, given)
-    unheard = [topic for topic in given if topic not in {s.parameters.get("topic") for s in stimuli}]
+    found = [offered(one) for one in undisturbed(request, files).stimuli if isinstance(one, Simulated)]
+    names = frozenset(name for one in found for name in (*one.publishes, *one.serves))
+    taking_part = [DraftStimulus("simulation", {one.name: one.parameters}, _VARY) for one in request.simulations]
+    stimuli = (*taking_part, *stimuli_for(trace, duration_s, request.sent, simulated=names))
+    unheard = [topic for topic in request.sent if topic not in {s.parameters.get("topic") for s in stimuli}]
     if unheard:
         raise GraderError(f"--send {unheard[0]}: expected a topic that the reference subscribes to, found none")
     spoken = [m.topic for m in trace.messages() if m.topic in {e.topic for e in student_endpoints(trace, "publisher")}]
@@ -181,22 +178,36 @@ def _begun(trace: Trace, request: ObserveRequest, id_: str, given: SentMessages)
     )
 
 
-def _scenario_of(draft: Draft) -> Scenario:
+def _relative(file: Path, folder: Path) -> str:
+    """Return how a rubric in a folder names a file; one that is elsewhere has to be copied there."""
+    inside = file.resolve().is_relative_to(folder.resolve())
+    return file.resolve().relative_to(folder.resolve()).as_posix() if inside else file.name
+
+
+def _elsewhere(files: Mapping[str, Path], folder: Path) -> Iterator[str]:
+    for name, file in files.items():
+        if file.resolve() != (folder / name).resolve():
+            yield f"copy {quote(str(file))} beside the rubric, which names it"
+
+
+def _scenario_of(draft: Draft, files: Mapping[str, Path]) -> Scenario:
     """Return the scenario of a draft, which must have at least one criterion to be read.
 
     Raises GraderError if a message to send has a field or a value that its type has not.
     """
     asked = DraftCriterion("any", "Any", "uses_logger", {"process": draft.files[0]}, "any")
     try:
-        (scenario,) = _read(rubric_text(replace(draft, criteria=(asked,)))).scenarios
+        (scenario,) = _read(rubric_text(replace(draft, criteria=(asked,))), files).scenarios
     except RubricMistakes as error:
         first = error.mistakes[0]
         raise GraderError(f"--send: {first.text}", first.hint) from None
     return scenario
 
 
-def _read(text: str) -> Exercise:
+def _read(text: str, files: Mapping[str, Path] = NO_FILES) -> Exercise:
     with tempfile.TemporaryDirectory(prefix="grade-new-") as folder:
+        for name, file in files.items():
+            copied(file, Path(folder) / name)
         path = Path(folder) / "rubric.yaml"
         path.write_text(text, encoding="utf-8")
         return read_rubric(path, interfaces=known_interfaces())
@@ -234,7 +245,7 @@ def _sorted_out(
 def _unmet(draft: Draft, trace: Trace) -> str:
     """Return why the reference does not meet the only criterion of a draft; empty if it does."""
     try:
-        (criterion,) = _read(rubric_text(draft)).criteria
+        (criterion,) = _read(rubric_text(replace(draft, stimuli=(), simulations=()))).criteria
         finding = criterion.check.judge(trace)
     except RubricError as error:
         return f"it cannot be asked yet: {quote(error.message.partition('.yaml:')[2] or error.message)}"

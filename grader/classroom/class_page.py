@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePath
 
-from grader.classroom.gradebook import Gradebook, Row, Status, exactly, exercises_of, number, remarks
+from grader.classroom.gradebook import Gradebook, Row, Status, decision_line, exactly, exercises_of, remarks
 from grader.classroom.roster import Person
 from grader.classroom.store import Conditions
 from grader.classroom.watching import clock_time
@@ -122,7 +122,7 @@ _TONES = {
 _NOT_GRADED = (Status.REFUSED, Status.FAILED, Status.NOT_RUN)
 # A path with three or more parts in a problem is a path of this machine; ROS names are shorter.
 _PATH = re.compile(r"(?<![\w.])/(?:[^/\s:'\"`]+/){2,}([^/\s:'\"`]+)")
-_ENDED = {"exited": "ended by itself", "killed": "was ended", "hung": "did not come back"}
+_ENDED = {"exited": "ended by itself", "killed": "was killed", "hung": "did not return"}
 
 
 def class_page(book: Gradebook, run: RunOfClass, links: Sequence[PageLink] = ()) -> ClassPage:
@@ -165,10 +165,9 @@ def _student(row: Row, run: RunOfClass) -> StudentRow:
         raw=None if row.report is None else exactly(row.report["score"]),
         max_score=row.max_score,
         final=adjusted.score,
-        adjustments=tuple(_adjustments(row)),
+        adjustments=tuple(line for line in [decision_line(row)] if line),
         remarks=tuple(without_folders(text, run.folders) for text in remarks(row)),
         report=row.report,
-        less=row.handed_back is not None and row.handed_back != row.report,
         counts=not adjusted.ignored,
     )
 
@@ -186,34 +185,28 @@ def _also(row: Row) -> Iterator[str]:
         yield from (row.person.user, row.person.id, row.person.email if row.person.row is not None else "")
 
 
-def _adjustments(row: Row) -> Iterator[str]:
-    adjusted = row.adjusted
-    if adjusted.ignored:
-        yield f"does not count: {adjusted.reason}"
-        return
-    if adjusted.days_late:
-        days = number(adjusted.days_late)
-        cost = f"\u2212{number(adjusted.penalty)} points" if adjusted.penalty else "no points off"
-        yield f"{days} {'day' if days == '1' else 'days'} late: {cost}"
-    if adjusted.override is not None:
-        yield f"set to {number(adjusted.override)}: {adjusted.reason}"
-    elif adjusted.reason:
-        yield adjusted.reason
-
-
 def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator[Listing]:
     """Yield all lists, including empty ones."""
     undecided = [(k, row) for k, row in enumerate(rows) if row.status is Status.UNDECIDED]
     yield Listing(
+        "rubric-mistakes",
+        "Mistakes in the rubric",
+        "They leave criteria undecided. Correct the rubric and give the same command again.",
+        tuple(
+            PageEntry(f"{mistake} (submissions: {len(concerned)})", rows.index(concerned[0]))
+            for mistake, concerned in book.author_mistakes.items()
+        ),
+    )
+    yield Listing(
         "undecided",
         "Undecided",
-        "Not decided through no fault of the student. The same command with --rerun undecided tries again.",
+        "Not decided. The reasons say what is known. The same command with --rerun undecided grades them again.",
         tuple(entry for k, row in undecided for entry in _undecided(k, row, run)),
     )
     yield Listing(
         "not-graded",
         "Not graded",
-        "There is no report. What was refused is for the student to fix; --rerun failed tries again what failed here.",
+        "There is no report. Students have to fix what was refused; --rerun failed grades again what failed here.",
         tuple(
             PageEntry(f"{row.standing}{_problem(row, run)}", k)
             for k, row in enumerate(rows)
@@ -242,27 +235,30 @@ def _roster(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator[L
     yield Listing(
         "unmatched",
         "Not on the roster",
-        "Nobody on the roster, or more than one person, goes with these submissions.",
-        named(matching.unmatched, "nobody goes with it") + named(matching.ambiguous, "several people go with it"),
+        "These submissions match nobody on the roster, or more than one person.",
+        named(matching.unmatched, "matches nobody") + named(matching.ambiguous, "matches several people"),
     )
     yield Listing(
         "duplicates",
         "Several submissions",
-        "All of them are graded; say in the file of adjustments which to ignore.",
+        "All of them are graded; name those to ignore in the file of adjustments.",
         twins,
     )
     yield Listing("missing", "Nothing handed in", "People on the roster without a submission.", missing)
     yield Listing(
-        "outdated", "Old results", "Of other files or of another rubric than now.", named(outdated, "graded before")
+        "outdated",
+        "Outdated results",
+        "The files or the rubric have changed since.",
+        named(outdated, "graded before"),
     )
-    yield Listing("strays", "No submission", "What else lies in the sources.", _texts(book.strays, run))
+    yield Listing("strays", "Not submissions", "Other entries of the sources.", _texts(book.strays, run))
     yield Listing(
         "foreign",
-        "Results of nobody",
-        "Results in this folder that belong to no submission of now.",
+        "Results without a submission",
+        "Results of earlier runs whose submissions are not in the sources.",
         _texts(book.foreign, run),
     )
-    yield Listing("remarks", "To know", "What else was noticed.", _texts(book.remarks, run))
+    yield Listing("remarks", "Remarks", "What else was noticed.", _texts(book.remarks, run))
 
 
 def _texts(texts: Sequence[str], run: RunOfClass) -> tuple[PageEntry, ...]:

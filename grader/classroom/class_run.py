@@ -11,17 +11,19 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime, timezone
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
 import grader
-from grader.app.grade import read_exercises, read_recording
+from grader.app.grade import read_exercises, read_recording, wanted_files
 from grader.app.interface_packages import offered_digest
 from grader.app.request import GradeRequest, recording_digest
 from grader.app.seeds import kept_key
 from grader.classroom.adjustments import Adjustments, read_adjustments, with_criteria
 from grader.classroom.class_page import RunOfClass, folders_of, links_between, title_of, without_folders
-from grader.classroom.gradebook import Gradebook, Row, Status, decisions_for, make_gradebook
+from grader.classroom.final_marks import MARK, dump_mark, kept_mark, shown_mark
+from grader.classroom.gradebook import Gradebook, Row, Status, decisions_for, make_gradebook, number
 from grader.classroom.grading import (
     ClassRequest,
     ClassRun,
@@ -32,17 +34,19 @@ from grader.classroom.grading import (
     with_known_students,
 )
 from grader.classroom.intake import HandedInEntry, Intake, take_in
+from grader.classroom.last_run import RUN, LastRun, dump_last_run, read_last_run
 from grader.classroom.local import LocalScheduler, MakeScheduler
-from grader.classroom.outputs import CHANGES, CLASS, Graded, class_files, exports, summary_json
-from grader.classroom.platforms import final_mark
+from grader.classroom.outputs import CHANGES, CLASS, Graded, class_files, exports, reveals, summary_json
+from grader.classroom.renaming import with_renamed_files
 from grader.classroom.roster import RosterMatch, match, read_roster
 from grader.classroom.store import BEFORE, REPORT, SEED_KEY, Conditions, Store, open_store
 from grader.classroom.watching import Watcher
 from grader.classroom.worker import GRADESCOPE, HANDED_BACK, HANDED_BACK_PAGE, PAGE
-from grader.core.errors import GraderError, HarnessError, SubmissionError
+from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError
 from grader.core.exercise import Exercise
 from grader.execution.temp_dirs import scratch_folder
 from grader.reporting.class_page.contents import PageLink
+from grader.reporting.escape import json_value
 from grader.reporting.html.class_links import with_class_links
 from grader.reporting.html.final_mark import render_refusal, with_final_mark
 from grader.reporting.json_report import ReportData
@@ -73,15 +77,18 @@ def grade_class(
     refuse_without_key(course, exercises)
     conditions = conditions_of(course.grading, exercises)
     roster = None if course.roster is None else read_roster(course.roster)
-    adjustments = _adjustments(course, exercises)
     with open_store(course.results) as store:
+        adjustments = _adjustments(course, exercises, warn)
         intake = take_in(course.sources, course.results, layout=course.layout, pattern=course.pattern)
         matching = match(intake.entries, roster)
         intake = replace(intake, entries=with_known_students(intake.entries, matching.people, exercises))
         own = own_conditions(course, intake.entries, matching.people, exercises, conditions)
-        decisions_for(intake.entries, matching, adjustments)  # reports mistakes before hours of grading
+        decisions = decisions_for(intake.entries, matching, adjustments)  # reports mistakes before hours of grading
+        unpacked = course.results / "unpacked"
+        intake = replace(intake, entries=with_renamed_files(intake.entries, decisions, unpacked))
+        wanted = wanted_files(exercises)
         with scratch_folder() as scratch:
-            read = {entry.name: _digest(entry, scratch) for entry in intake.entries}
+            read = {entry.name: _digest(entry, scratch, wanted) for entry in intake.entries}
         digests = {name: digest for name, (digest, _) in read.items()}
         refusals = {name: error for name, (_, error) in read.items() if error is not None}
         own = _seeded(own, digests, course)
@@ -91,7 +98,9 @@ def grade_class(
         run = ClassRun(course, exercises, own, store, watcher, refusals, digests).with_recordings(due)
         before = len(intake.entries) - len(due)
         watcher.begin(len(due), before, recorded=run.from_recordings)
-        book = partial(_book, store, intake, matching, adjustments, keys)
+        extra = sum((exercise.bonus for exercise in exercises), Fraction(0))
+        book = partial(_book, store, intake, matching, adjustments, keys, extra)
+        store.write(RUN, dump_last_run(_kept_options(course, adjustments)))
         began = time.monotonic()
         try:
             now = run.grade(due, warn, make_scheduler)
@@ -106,14 +115,34 @@ def grade_class(
         return _written(graded, _run(course, conditions, began, graded), store, course)
 
 
-def _adjustments(course: ClassRequest, exercises: Sequence[Exercise]) -> Adjustments:
-    """Read the adjustments that were named, or else those kept in the results folder, if any."""
-    kept = course.results / ADJUSTMENTS
-    path = course.adjustments or (kept if kept.is_file() else None)
-    if path is None:
+def _adjustments(course: ClassRequest, exercises: Sequence[Exercise], warn: Callable[[str], None]) -> Adjustments:
+    """Read the decisions that were named, or else those kept in the results folder, if any.
+
+    Raises ClassError if the last run applied decisions and this one was given none: marks would change in silence.
+    """
+    if course.no_adjustments:
         return Adjustments()
+    kept = course.results / ADJUSTMENTS
+    there = kept if kept.is_file() else None
+    path = course.adjustments or there
+    if path is None:
+        last = read_last_run(course.results)
+        if last.decisions:
+            count = f"{last.decisions} decision{'' if last.decisions == 1 else 's'}"
+            text = f"--adjust: expected the {count} of {last.adjustments}, which the last run applied, found none"
+            raise ClassError(text, "give the file again with --adjust, or leave it out with --no-adjust")
+        return Adjustments()
+    if there is not None and path.resolve() != there.resolve():
+        warn(f"{there} is not applied, because --adjust names {path}")
     points = {f"{e.id}/{criterion.id}": criterion.points for e in exercises for criterion in e.criteria}
-    return with_criteria(read_adjustments(path), points)
+    bonus = sum((e.bonus for e in exercises), Fraction(0))
+    return with_criteria(read_adjustments(path), points, bonus=bonus, files=wanted_files(exercises))
+
+
+def _kept_options(course: ClassRequest, adjustments: Adjustments) -> LastRun:
+    """Return what the next run needs to know of this one."""
+    path = "" if adjustments.path is None else str(adjustments.path.resolve())
+    return LastRun(course.options, path, adjustments.count)
 
 
 def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Conditions:
@@ -133,9 +162,9 @@ def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Condi
     )
 
 
-def _digest(entry: HandedInEntry, scratch: Path) -> tuple[str, SubmissionError | None]:
+def _digest(entry: HandedInEntry, scratch: Path, wanted: Sequence[str]) -> tuple[str, SubmissionError | None]:
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
-        return digest_of(entry, Path(folder))
+        return digest_of(entry, Path(folder), wanted)
 
 
 def _seeded(own: Mapping[str, Conditions], digests: Mapping[str, str], course: ClassRequest) -> dict[str, Conditions]:
@@ -146,8 +175,13 @@ def _seeded(own: Mapping[str, Conditions], digests: Mapping[str, str], course: C
     return {name: replace(conditions, seed=key.seed(digests[name])) for name, conditions in own.items()}
 
 
-def _book(
-    store: Store, intake: Intake, matching: RosterMatch, adjustments: Adjustments, keys: Mapping[str, str]
+def _book(  # noqa: PLR0913  each comes from a different source
+    store: Store,
+    intake: Intake,
+    matching: RosterMatch,
+    adjustments: Adjustments,
+    keys: Mapping[str, str],
+    extra: Fraction,
 ) -> Gradebook:
     names = {entry.name for entry in intake.entries}
     return make_gradebook(
@@ -159,6 +193,7 @@ def _book(
         report_of=lambda name: _report(store.place(name) / REPORT),
         handed_back_of=lambda name: _report(store.place(name) / HANDED_BACK),
         foreign=[name for name in store.names() if name not in names],
+        extra=extra,
     )
 
 
@@ -193,15 +228,32 @@ def _written(graded: Graded, run: RunOfClass, store: Store, course: ClassRequest
     made = exports(graded.book, wanted, results)
     left_out = {platform: export.left_out for platform, export in made.items() if export.left_out}
     remarks = (*graded.remarks, *(export.remark for export in made.values() if export.remark))
-    graded = replace(graded, left_out=left_out, remarks=remarks)
+    remarks = (*remarks, *([reveals(graded.book)] if made and reveals(graded.book) else []))
+    graded = replace(graded, left_out=left_out, remarks=remarks, moved=_moved(graded.book, store))
     files = class_files(graded.book, made, run, links=graded.links, standalone=course.standalone)
-    if graded.changes:
+    if any(each.criteria for each in graded.changes):  # an empty record would replace that of a real change
         files = {CHANGES: render_changes_table(graded.changes).encode(), **files}
     written = _write({CLASS: summary_json(graded).encode(), **files}, store)
     _link_students(graded.book, store)
     _hand_back(graded.book, run, store)
     store.forget_before()
     return replace(graded, files=(*graded.files, *written))
+
+
+def _moved(book: Gradebook, store: Store) -> tuple[str, ...]:
+    """Return the final marks that differ from those that the last run wrote, whatever changed them."""
+    try:
+        students = json.loads((store.folder / CLASS).read_bytes())["students"]
+        before = {(each["name"], each["person"]): each["score"] for each in students}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return ()
+    found = []
+    for row in book.rows:
+        person = None if row.person is None else json_value(row.person.name)
+        old, new = before.get((row.name or None, person)), row.adjusted.score
+        if old is not None and (new is None or json_value(new) != old):
+            found.append(f"{row.shown_name} {number(old)} -> {number(new) or 'no score'}")
+    return tuple(found)
 
 
 def _changes(store: Store) -> tuple[ReportChange, ...]:
@@ -231,13 +283,19 @@ def _link_students(book: Gradebook, store: Store) -> None:
 def _hand_back(book: Gradebook, run: RunOfClass, store: Store) -> None:
     """Put name, final mark and decisions into everybody's page; who was refused gets a page that says why."""
     for row in book.rows:
-        mark = final_mark(row)
+        if not row.name:
+            continue
+        mark = kept_mark(row)
         if row.status is Status.REFUSED:
             problem, hint = (without_folders(text, run.folders) for text in (row.refusal, row.hint))
-            store.write(f"students/{row.name}/{HANDED_BACK_PAGE}", render_refusal(mark, problem, hint).encode())
-        for name in (PAGE, HANDED_BACK_PAGE) if row.report is not None else ():
+            page = render_refusal(shown_mark(mark, None), problem, hint)
+            store.write(f"students/{row.name}/{HANDED_BACK_PAGE}", page.encode())
+        if row.report is None:
+            continue
+        store.write(f"students/{row.name}/{MARK}", dump_mark(mark))
+        for name, report in ((PAGE, row.report), (HANDED_BACK_PAGE, row.handed_back)):
             page = _text(store.place(row.name) / name)
-            marked = with_final_mark(page, mark)
+            marked = page if report is None else with_final_mark(page, shown_mark(mark, report))
             if marked != page:
                 store.write(f"students/{row.name}/{name}", marked.encode())
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from enum import Enum
 from fractions import Fraction
@@ -16,14 +16,19 @@ from grader.classroom.adjustments import (
     CriterionDecision,
     Decision,
     adjust,
+    decided_twice,
+    several_students,
     unknown_student,
 )
 from grader.classroom.intake import HandedInEntry, Intake
-from grader.classroom.roster import Person, RosterMatch, fold_handle
+from grader.classroom.roster import Person, RosterMatch, fold_handle, late_by, late_days
 from grader.classroom.store import Kept, ResultStatus, State
+from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
+from grader.core.exercise import Outcome
+from grader.core.report import AUTHOR_MISTAKE, SUBMISSION_SUSPECTED
 from grader.reporting.escape import csv_cell, shown
-from grader.reporting.json_report import ExerciseData, ReportData
+from grader.reporting.json_report import CriterionData, ExerciseData, ReportData
 
 
 class Status(str, Enum):
@@ -51,6 +56,7 @@ class Row:
     handed_back: ReportData | None = None  # the report with what students may see; None if there is none
     adjusted: Adjusted = field(default_factory=Adjusted)  # the score after the instructor's decisions
     marked_late: bool = False  # whether the platform marked it as late
+    late: str = ""  # how late it was, as the platform says; empty if that is not known
     outdated: bool = False  # whether the result belongs to different files or another rubric than the current ones
     twin_of: tuple[str, ...] = ()  # names of other submissions by the same person
 
@@ -97,6 +103,16 @@ class Gradebook:
         return sum(row.status is status for row in self.rows)
 
     @property
+    def author_mistakes(self) -> Mapping[str, tuple[Row, ...]]:
+        """Mistakes of the rubrics' authors that leave criteria undecided, each with the rows that it concerns."""
+        found: dict[str, list[Row]] = {}
+        for row in self.rows:
+            criteria = [criterion for exercise in exercises_of(row.report) for criterion in exercise["criteria"]]
+            for mistake in dict.fromkeys(filter(None, map(author_mistake, criteria))):
+                found.setdefault(mistake, []).append(row)
+        return {mistake: tuple(rows) for mistake, rows in found.items()}
+
+    @property
     def refused(self) -> tuple[Row, ...]:
         """Rows of people whose submission cannot be used, and who have no score otherwise."""
         without = [row for row in self.rows if row.status is Status.REFUSED and row.adjusted.score is None]
@@ -126,11 +142,13 @@ def make_gradebook(  # noqa: PLR0913  each comes from a different source
     report_of: Callable[[str], ReportData | None],
     handed_back_of: Callable[[str], ReportData | None],
     foreign: Sequence[str] = (),
+    extra: Fraction = Fraction(0),
 ) -> Gradebook:
     """Assemble the gradebook; raises ClassError for a decision about somebody who is not in this class.
 
-    Stored results and the keys that current results have, empty if unknown, are given by name. The two functions read
-    the complete report of a submission, and the one with what students may see.
+    Rubrics allow `extra` points above the maximum. Stored results and the keys that current results have, empty if
+    unknown, are given by name. The two functions read the complete report of a submission, and the one with what
+    students may see.
     """
     decisions = decisions_for(intake.entries, matching, adjustments)
     twins = {name: tuple(n for n in group if n != name) for group in matching.duplicates for name in group}
@@ -142,15 +160,34 @@ def make_gradebook(  # noqa: PLR0913  each comes from a different source
         raw = exactly(report["score"]) if report is not None and report["final"] else None
         decision = decisions.get(entry.name, Decision())
         marked, criteria = _decided(report, decision)
-        adjusted = adjust(raw, decision, adjustments, marked=marked, criteria=criteria)
+        highest = rows[-1].max_score
+        most = None if highest is None else highest + extra
+        adjusted = adjust(raw, decision, adjustments, marked=marked, criteria=criteria, most=most)
         handed_back = handed_back_of(entry.name) if report is not None else None
         rows[-1] = replace(rows[-1], handed_back=handed_back, adjusted=adjusted, twin_of=twins.get(entry.name, ()))
     rows += [_missing(person, adjustments) for person in matching.missing]
-    late = [row.name for row in rows if row.marked_late and not row.adjusted.days_late]
-    remarks = [f"marked as late by the platform, but no late days are named: {', '.join(late)}"] if late else []
     odd = [entry.name for entry in intake.entries if not entry.recognised]
-    remarks += [f"named otherwise than the layout names submissions: {', '.join(odd)}"] if odd else []
+    remarks = [*_late_remarks(rows), *_excess(rows, extra)]
+    remarks += [f"named differently from the layout: {', '.join(odd)}"] if odd else []
     return Gradebook(tuple(rows), matching, intake.strays, tuple(foreign), intake.layouts, tuple(remarks))
+
+
+def _late_remarks(rows: Sequence[Row]) -> Iterator[str]:
+    """Yield a line for each late submission without late days, with what can be copied into the file of decisions."""
+    for row in rows:
+        if row.marked_late and not row.adjusted.days_late and not row.adjusted.ignored:
+            how_much = f" ({row.late})" if row.late else ""
+            given = f"`{row.name}: {{days_late: {late_days(row.late) or 'N'}}}`"
+            yield f"marked as late by the platform, no days given: {row.shown_name}{how_much}; in adjust.yaml: {given}"
+
+
+def _excess(rows: Sequence[Row], extra: Fraction) -> Iterator[str]:
+    """Yield a line for each score that was set above the maximum of a student's own exercises."""
+    for row in rows:
+        score = row.adjusted.override
+        if score is not None and row.max_score is not None and score > row.max_score + extra:
+            most = number(row.max_score + extra)
+            yield f"the score set for {row.shown_name}, {number(score)}, is above the maximum of {most} points"
 
 
 def _decided(report: ReportData | None, decision: Decision) -> tuple[Fraction | None, Mapping[str, CriterionDecision]]:
@@ -173,20 +210,48 @@ def _decided(report: ReportData | None, decision: Decision) -> tuple[Fraction | 
 def decisions_for(
     entries: Sequence[HandedInEntry], matching: RosterMatch, adjustments: Adjustments
 ) -> dict[str, Decision]:
-    """Return name of an entry -> decision; raises ClassError for a decision about somebody outside of the class."""
-    found: dict[str, Decision] = {}
+    """Return name of an entry -> decision.
+
+    The name of a submission counts for this one; a name that it had before others of this name came, and ids of a
+    student, for all submissions of that student. Raises ClassError for a decision about somebody outside of the class,
+    one that several students may be meant by, and a second one about a submission.
+    """
+    found: dict[str, tuple[str, Decision]] = {}
+    by_name = {entry.name: entry for entry in entries}
+    exact = {who: by_name[who] for who in adjustments.students if who in by_name}
+    for who, entry in exact.items():
+        found[entry.name] = (who, adjustments.students[who])
     for who, decision in adjustments.students.items():
-        meant = [entry.name for entry in entries if fold_handle(who) in _called(entry, matching.people.get(entry.name))]
-        exact = [name for name in meant if name == who] or meant
+        if who in exact:
+            continue
+        meant = [entry for entry in entries if fold_handle(who) in _called(entry, matching.people.get(entry.name))]
         absent = any(fold_handle(who) in _handles(person) for person in matching.missing)
-        if not exact and not absent:
+        if not meant and not absent:
             raise unknown_student(decision, who, [entry.name for entry in entries])
-        found.update(dict.fromkeys(exact, decision))
-    return found
+        if len({_student(entry, matching) for entry in meant}) > 1:
+            raise several_students(decision, who, [entry.name for entry in meant])
+        for entry in meant:
+            if entry.name in exact:
+                continue  # what is said of one submission takes precedence over what is said of its student
+            if entry.name in found:
+                raise decided_twice(decision, who, entry.name, found[entry.name][0])
+            found[entry.name] = (who, decision)
+        if meant and all(entry.name in exact for entry in meant):
+            raise decided_twice(decision, who, meant[0].name, meant[0].name)
+    return {name: decision for name, (_, decision) in found.items()}
+
+
+def _student(entry: HandedInEntry, matching: RosterMatch) -> tuple[str, ...]:
+    """Return what tells students apart: equal for two submissions of one student."""
+    person = matching.people.get(entry.name)
+    if person is not None and person.row is not None:
+        return ("on the roster", str(id(person)))
+    return tuple(f"{kind}={text}" for kind, text in sorted(entry.identity.items())) or (fold_handle(entry.label),)
 
 
 def _called(entry: HandedInEntry, person: Person | None) -> set[str]:
-    own = {fold_handle(text) for text in (entry.name, entry.label, *entry.identity.values())}
+    own = {fold_handle(text) for text in (entry.name, entry.label, entry.base, *entry.identity.values())}
+    own -= {""}
     return own | (_handles(person) if person is not None else set())
 
 
@@ -209,7 +274,8 @@ def _row(entry: HandedInEntry, matching: RosterMatch, kept: Kept, report: Report
         problem="" if last is None else last.problem,
         result=result,
         report=report,
-        marked_late=entry.late,
+        marked_late=entry.late or bool(late_by(matching.people.get(entry.name))),
+        late=late_by(matching.people.get(entry.name)),
         outdated=result is not None and bool(key) and result.state is not State.FAILED and result.key != key,
     )
 
@@ -237,6 +303,8 @@ COLUMNS = (
     "reason",
     "remarks",
     "report",
+    "bonus",
+    "decisions",
 )
 _TEXT_LIMIT = 2_000
 
@@ -275,26 +343,65 @@ def remarks(row: Row) -> list[str]:
     """Return the remarks about a row."""
     found = [shown(row.problem, limit=500)] if row.problem else []
     found += [f"hint: {shown(row.hint, limit=500)}"] if row.hint else []
-    found += [f"{id_}: {_decision(decided)}" for id_, decided in row.adjusted.criteria.items()]
+    commented = {id_: decided.comment for id_, decided in row.adjusted.criteria.items() if decided.comment}
+    found += [f"comment on {id_}: {comment}" for id_, comment in commented.items()]
     found += [f"comment: {row.adjusted.comment}"] if row.adjusted.comment else []
     if row.outdated:
         found.append("the result is of other files or of another rubric than now")
     if row.twin_of:
         found.append(f"the same person as {', '.join(row.twin_of)}")
     if row.name and row.person is None:
-        found.append("nobody on the roster goes with it for sure")
+        found.append("matches nobody on the roster for sure")
     if row.marked_late:
-        found.append("marked as late by the platform")
+        found.append(f"marked as late by the platform{f' ({row.late})' if row.late else ''}")
     if row.adjusted.ignored:
         found.append("does not count")
     if row.status.value == "undecided":
-        found.append("not final: a criterion was not decided, through no fault of the student")
+        theirs = any(map(may_be_theirs, (c for e in exercises_of(row.report) for c in e["criteria"])))
+        why = "perhaps because of what the submission does" if theirs else "through no fault of the student"
+        found.append(f"not final: a criterion was not decided, {why}")
     return found
 
 
-def _decision(decided: CriterionDecision) -> str:
-    points = "" if decided.score is None else f"set to {number(decided.score)}, {decided.reason}"
-    return "; ".join(text for text in (points, decided.comment) if text)
+def decision_line(row: Row) -> str:
+    """Return what was decided about a row, as `20 -> 28 (rate, the machine was slow)`; empty if nothing was."""
+    causes = decision_causes(row)
+    if not causes:
+        return ""
+    before = None if row.report is None else exactly(row.report["score"])
+    after = row.adjusted.score
+    return f"{number(before) or 'no score'} -> {number(after) or 'no score'} ({'; '.join(causes)})"
+
+
+def decision_causes(row: Row) -> list[str]:
+    """Return each decision about a row with its reason, in the order in which they count."""
+    adjusted = row.adjusted
+    ids = [f"{e['id']}/{c['id']}" for e in exercises_of(row.report) for c in e["criteria"]]
+    found = [f"{old} renamed to {new}" for old, new in adjusted.rename.items()]
+    if adjusted.ignored:
+        return [*found, f"ignored, {adjusted.reason}"]
+    for id_, decided in adjusted.criteria.items():
+        short = id_.partition("/")[2]
+        name = short if sum(full.endswith(f"/{short}") for full in ids) == 1 else id_
+        found += [f"{name}, {decided.reason}"] if decided.score is not None else []
+    if adjusted.override is not None:
+        found.append(f"score set, {adjusted.reason}")
+    elif adjusted.days_late:
+        points = (
+            "1 point" if adjusted.penalty == 1 else f"{number(adjusted.penalty) if adjusted.penalty else 'no'} points"
+        )
+        found.append(f"{days(adjusted.days_late)} late, {points} off")
+    if adjusted.bonus or adjusted.bonus_lost:
+        counts = f", of which {number(adjusted.bonus)} count: the maximum is reached" if adjusted.bonus_lost else ""
+        found.append(f"bonus {number(adjusted.bonus + adjusted.bonus_lost)}{counts}, {adjusted.reason}")
+    if not found and (adjusted.comment or any(decided.comment for decided in adjusted.criteria.values())):
+        found.append("comment")
+    return found
+
+
+def days(count: Fraction) -> str:
+    """Return a number of days as text."""
+    return f"{number(count)} {'day' if count == 1 else 'days'}"
 
 
 def _cells(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
@@ -313,6 +420,8 @@ def _cells(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, str
         text_cell(adjusted.reason),
         text_cell("; ".join(remarks(row))),
         text_cell(f"students/{row.name}/report.html") if row.report is not None else "",
+        number(adjusted.bonus) if adjusted.bonus else "",
+        text_cell(decision_line(row)),
         *_points(row, exercises, criteria),
     ]
 
@@ -343,3 +452,16 @@ def _points(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, st
 def exercises_of(report: ReportData | None) -> Sequence[ExerciseData]:
     """Return the exercises of a report, none without one."""
     return () if report is None else report["exercises"]
+
+
+def may_be_theirs(criterion: CriterionData) -> bool:
+    """Return whether a criterion is undecided for a reason that the submission itself may have caused."""
+    open_ = criterion["outcome"] == Outcome.UNDECIDED.value
+    return open_ and criterion.get("evidence", {}).get(SUBMISSION_SUSPECTED) is True
+
+
+def author_mistake(criterion: CriterionData) -> str:
+    """Return the mistake of the rubric's author that leaves a criterion undecided, with its place; empty if none."""
+    open_ = criterion["outcome"] == Outcome.UNDECIDED.value
+    found = criterion.get("evidence", {}).get(AUTHOR_MISTAKE) if open_ else None
+    return str(AuthorMistake(**found)) if found else ""

@@ -30,7 +30,7 @@ from grader.execution.temp_dirs import scratch_folder
 from grader.reporting.html.assets import bundle
 from grader.rubrics.draws import Recorded
 from grader.similarity.library import ComparedProgram
-from grader.submissions.submission import stage_submission
+from grader.submissions.submission import collect_submission, stage_collected, stage_submission
 
 #: Values of `--rerun`; each includes new and changed submissions.
 CHANGED, FAILED, UNDECIDED, ALL = "changed", "failed", "undecided", "all"
@@ -38,10 +38,8 @@ CHANGED, FAILED, UNDECIDED, ALL = "changed", "failed", "undecided", "all"
 LEAST_FREE_BYTES = 4 << 20
 #: Seconds that an attempt may take in addition to the limits of its recordings.
 _BEYOND_S = 300.0
-_NOBODY = "whose variant it is to be graded by is not clear: nobody on the roster goes with it for sure"
-_NO_ID = (
-    "whose variant it is to be graded by is not clear: the roster has no number, user name or address of this person"
-)
+_NOBODY = "whose variant to grade it by is not clear: it matches nobody on the roster for sure"
+_NO_ID = "whose variant to grade it by is not clear: the roster has no number, user name or address of this person"
 
 
 _GRADING = GradeRequest("")
@@ -58,6 +56,7 @@ class ClassRequest:
     pattern: str = ""  # a regular expression for names, used instead of the layout; empty for none
     roster: Path | None = None  # CSV file of the class; None if there is none
     adjustments: Path | None = None  # YAML file of late days and changed scores; None if there is none
+    no_adjustments: bool = False  # whether no decisions are applied, not even those kept in the results folder
     grading: GradeRequest = _GRADING  # the request as for one submission; its path is ignored
     jobs: int | None = None  # submissions graded in parallel; None for one per processor
     rerun: str = CHANGED  # `--rerun`, one of the values above
@@ -67,18 +66,22 @@ class ClassRequest:
     platforms: Platforms = _NO_PLATFORMS
     # Code handed out to everyone, ignored when submissions are compared; None to skip the comparison
     given: tuple[ComparedProgram, ...] | None = None
+    # The options that the next run repeats: name without dashes -> values as they were typed
+    options: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-def digest_of(entry: HandedInEntry, scratch: Path) -> tuple[str, SubmissionError | None]:
+def digest_of(entry: HandedInEntry, scratch: Path, wanted: Sequence[str]) -> tuple[str, SubmissionError | None]:
     """Return the digest of a submission, copied to an empty folder, and why it cannot be used, if so.
 
-    The digest is empty if it cannot be computed; grading the submission in its own process will report why.
+    Wanted are the names of the files that exercises ask for, for the hint. The digest is empty if it cannot be
+    computed; grading the submission in its own process will report why.
     """
     if entry.problem:
         error = SubmissionError(entry.problem)
         return unusable_digest(error), error
     try:
-        return stage_submission(str(entry.path), (), scratch).digest, None
+        collected = collect_submission(str(entry.path), wanted, scratch)
+        return stage_collected(collected, str(entry.path), (), scratch).digest, None
     except SubmissionError as error:
         return unusable_digest(error), error
     except (GraderError, OSError, MemoryError, RecursionError):

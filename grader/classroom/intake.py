@@ -67,6 +67,8 @@ class HandedInEntry:
     late: bool = False  # whether the platform marked it as late
     recognised: bool = True  # whether its name fits the layout
     problem: str = ""  # why it cannot be graded at all; empty if it can
+    # The name without the suffix that makes it unique: that which it has in a class without others of this name
+    base: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +190,10 @@ def _entry(one: _Found, name: str, results: Path) -> HandedInEntry:
     if one.files and not problem:
         path = results / "unpacked" / "together" / name
         problem = _put_together(one.files, path)
-    return HandedInEntry(name, one.label, path, one.named.identity, one.named.late, one.named.recognised, problem)
+    named = one.named
+    return HandedInEntry(
+        name, one.label, path, named.identity, named.late, named.recognised, problem, safe_name(one.wish)
+    )
 
 
 def _put_together(files: Sequence[tuple[str, Path]], into: Path) -> str:

@@ -94,7 +94,8 @@ class LocalScheduler:
 
     A submission that is recorded on the wall clock because virtual time does not suffice spends its time waiting.
     Another one is begun beside it, and up to `WAITING_PER_JOB` wait for each of the jobs. That many of those that are
-    drawn for a spot check are graded at a time, from the beginning, so that the class does not end with them.
+    drawn for a spot check are graded at a time, from the beginning, so that the class does not end with them. While
+    there are more of them, the processes that this needs are kept, because each takes a second to start.
     """
 
     def __init__(self, jobs: int, command: Sequence[str] = WORKER, *, folder: Path | None = None) -> None:
@@ -136,7 +137,7 @@ class LocalScheduler:
             on_step(task.name, "starting")
             process = self._idle_one()
             if process is not None:
-                attempt = self._attempt(process, task, on_step, place)
+                attempt = self._attempt(process, task, on_step, place, waiting)
                 if attempt.status.state is not State.FAILED:
                     return attempt
                 # What a process keeps for the next submission costs no submission its result.
@@ -145,7 +146,7 @@ class LocalScheduler:
                 process = self._start()
             except OSError as error:
                 return failed(task, f"the grader cannot be started: {error.strerror}")
-            return self._attempt(process, task, on_step, place)
+            return self._attempt(process, task, on_step, place, waiting)
 
     @contextmanager
     def _next_task(self, waiting: deque[Task]) -> Iterator[Task]:
@@ -161,7 +162,9 @@ class LocalScheduler:
             with self._lock:
                 self._checks -= task.spot_check
 
-    def _attempt(self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place) -> Attempt:
+    def _attempt(
+        self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place, waiting: Sequence[Task]
+    ) -> Attempt:
         """Grade in a process, and keep it for the next submission unless it failed, or others have taken its place."""
         overdue, status = threading.Event(), None
 
@@ -176,11 +179,12 @@ class LocalScheduler:
             status = self._listen(process, task, on_step, place)
         finally:
             timer.cancel()
-            if status is None or status.state is State.FAILED or not place.taken:
-                self._end(process)
-            else:
-                with self._lock:
+            with self._lock:
+                kept = place.taken or any(other.spot_check for other in waiting)
+                if kept := kept and status is not None and status.state is not State.FAILED:
                     self._idle.append(process)
+            if not kept:
+                self._end(process)
         if status is not None:
             return Attempt(task, status)
         if overdue.is_set():

@@ -5,11 +5,12 @@ from __future__ import annotations
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
+from fractions import Fraction
 from pathlib import Path
 
 from grader.classroom.class_page import RunOfClass, class_page
-from grader.classroom.gradebook import Gradebook, Row, Status, number, remarks, render_gradebook
-from grader.classroom.platforms import Export, export_canvas, export_gradescope, export_moodle, feedback
+from grader.classroom.gradebook import Gradebook, Row, Status, decision_line, number, remarks, render_gradebook
+from grader.classroom.platforms import Export, export_canvas, export_gradescope, export_moodle, feedback, withheld
 from grader.classroom.roster import Table, read_table
 from grader.core.dataclass import dataclass
 from grader.core.report import JsonObject
@@ -63,6 +64,19 @@ def exports(book: Gradebook, wanted: Platforms, results: Mapping[str, str]) -> d
     return made
 
 
+def reveals(book: Gradebook) -> str:
+    """Return a warning if exported scores reveal what students may not see; empty if they do not."""
+    hidden = withheld(book)
+    if not hidden:
+        return ""
+    criteria = "a criterion" if len(hidden) == 1 else f"{len(hidden)} criteria"
+    first = ", ".join(hidden[:_MOST])
+    return (
+        f"the exported grades count {criteria} that the rubric hides from students ({first}): "
+        "who compares the grade with the page learns the result; import them when it may be seen"
+    )
+
+
 def class_files(
     book: Gradebook,
     made: Mapping[str, Export],
@@ -111,6 +125,8 @@ class Graded:
     # Platform -> who is missing in its file, and why
     left_out: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()  # remarks about these files
+    # Final marks that differ from those of the last run, as `NAME 28 -> 20`
+    moved: tuple[str, ...] = ()
     links: tuple[PageLink, ...] = ()  # further pages in the results folder, linked from the class page
 
 
@@ -121,6 +137,8 @@ def render_summary(graded: Graded) -> str:
     lines += change_summary(graded.changes) if graded.changes else []
     lines += [f"{status.value}: {book.count(status)}" for status in Status if book.count(status)]
     lines += _scores(book)
+    lines += _list("final marks that differ from the last run", graded.moved)
+    lines += _decisions(book)
     lines += _lists(book, graded.now.not_replaced)
     lines += [f"not in {platform}: {line}" for platform, out in graded.left_out.items() for line in out]
     lines += [f"note: {remark}" for remark in graded.remarks]
@@ -148,6 +166,7 @@ def summary_json(graded: Graded) -> str:
             "judged_again": graded.now.judged,
             "run_now": graded.now.run,
             "not_replaced": list(graded.now.not_replaced),
+            "moved": json_value(graded.moved),
             "counts": {status.value: book.count(status) for status in Status},
             "students": [_row(row, exported=any(row is each for each in to_export)) for row in book.rows],
             "unmatched": list(matching.unmatched),
@@ -156,6 +175,7 @@ def summary_json(graded: Graded) -> str:
             "strays": json_value(book.strays),
             "left_out": {platform: list(lines) for platform, lines in graded.left_out.items()},
             "remarks": json_value([*book.remarks, *graded.remarks]),
+            "withheld": list(withheld(book)),
             "results_of_nobody": list(book.foreign),
             "layouts": [{"source": json_value(source), "layout": layout} for source, layout in book.layouts],
         }
@@ -175,7 +195,9 @@ def _row(row: Row, *, exported: bool) -> JsonObject:
         "days_late": json_value(adjusted.days_late),
         "penalty": json_value(adjusted.penalty),
         "override": json_value(adjusted.override),
+        "bonus": json_value(adjusted.bonus) if adjusted.bonus else None,
         "reason": json_value(adjusted.reason) or None,
+        "decision": json_value(decision_line(row)) or None,
         "problem": json_value(row.problem) or None,
         "remarks": json_value(remarks(row)),
         "outdated": row.outdated,
@@ -186,36 +208,50 @@ def _row(row: Row, *, exported: bool) -> JsonObject:
 
 
 def _scores(book: Gradebook) -> Iterator[str]:
-    shares = [
-        float(100 * row.adjusted.raw / row.max_score)
-        for row in book.rows
-        if row.adjusted.raw is not None and row.max_score
-    ]
-    if shares:
-        full = sum(share == 100 for share in shares)
-        yield (
-            f"scores: mean {statistics.fmean(shares):.1f} %, median {statistics.median(shares):.1f} %, "
-            f"from {min(shares):.1f} to {max(shares):.1f} %, full: {full}"
-        )
-    changed = [row for row in book.rows if row.adjusted.changed]
-    if changed:
-        yield f"changed by late days or decisions: {len(changed)}"
+    rows = [(row.adjusted, row.max_score) for row in book.rows if row.max_score]
+    raw = [adjusted.raw / most for adjusted, most in rows if adjusted.raw is not None]
+    final = [adjusted.score / most for adjusted, most in rows if adjusted.score is not None]
+    changed = any(row.adjusted.changed for row in book.rows)
+    if raw:
+        yield f"{'scores as graded' if changed else 'scores'}: {_spread(raw)}"
+    if changed and final:
+        yield f"final marks: {_spread(final)}"
+
+
+def _spread(shares: Sequence[Fraction]) -> str:
+    percent = [float(100 * share) for share in shares]
+    full = sum(share >= 100 for share in percent)
+    return (
+        f"mean {statistics.fmean(percent):.1f} %, median {statistics.median(percent):.1f} %, "
+        f"from {min(percent):.1f} to {max(percent):.1f} %, full: {full}"
+    )
+
+
+def _decisions(book: Gradebook) -> Iterator[str]:
+    """Yield every decision that is applied, each in a line of its own: none may pass unseen."""
+    decided = [(row, line) for row in book.rows if (line := decision_line(row))]
+    if decided:
+        yield f"decisions ({len(decided)}):"
+    for row, line in decided:
+        yield f"    {shown(row.shown_name, limit=120)} {shown(line, limit=600)}"
 
 
 def _lists(book: Gradebook, not_replaced: Sequence[str]) -> Iterator[str]:
     matching = book.matching
     twins = [" = ".join(names) for names in matching.duplicates]
-    yield from _list("nobody on the roster goes with", matching.unmatched)
-    yield from _list("several people on the roster go with", matching.ambiguous)
+    yield from _list("not on the roster", matching.unmatched)
+    yield from _list("matches several people on the roster", matching.ambiguous)
     yield from _list("several submissions of one person", twins)
     yield from _list("nothing handed in", [person.name for person in matching.missing])
-    yield from _list("no submission", book.strays)
-    yield from _list("results in this folder that belong to no submission", book.foreign)
-    yield from _list("a new attempt came to less, the result of before stays", not_replaced)
-    yield from _list("results of other files or of another rubric", [r.name for r in book.rows if r.outdated])
+    yield from _list("not a submission", book.strays)
+    yield from _list("results without a submission", book.foreign)
+    yield from _list("a new attempt failed, the earlier result is kept", not_replaced)
+    yield from _list("outdated results, of other files or another rubric", [r.name for r in book.rows if r.outdated])
     for row in book.rows:
         if row.status not in _UNREMARKABLE:
             yield f"{row.status.value}: {shown(row.name, limit=80)}: {shown(row.problem or _points(row), limit=300)}"
+            if row.hint:
+                yield f"    hint: {shown(row.hint, limit=300)}"
     yield from map(shown, book.remarks)
 
 

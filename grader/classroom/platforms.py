@@ -5,15 +5,15 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field
 
+from grader.classroom.final_marks import criteria_of, decisions
 from grader.classroom.gradebook import Gradebook, Row, exercises_of, number, table, text_cell
 from grader.classroom.roster import Person, Table, columns_of, fold_handle, person_of
 from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError
 from grader.reporting.escape import shown as safe
-from grader.reporting.html.final_mark import FinalMark
 from grader.reporting.json_report import CriterionData, json_text
 from grader.submissions.collected import listed, shown
 
@@ -104,6 +104,16 @@ def export_gradescope(book: Gradebook, results: Mapping[str, str]) -> Export:
     return Export({"gradescope.csv": table(GRADESCOPE_COLUMNS, rows), **files}, tuple(map(_line, left_out)))
 
 
+def withheld(book: Gradebook) -> tuple[str, ...]:
+    """Return the criteria that count in an exported score although their students may not see them, by full id."""
+    found: dict[str, None] = {}
+    for row in book.to_export:
+        seen = {full_id for full_id, _ in criteria_of(row.handed_back)}
+        if row.handed_back is not None:
+            found.update({full_id: None for full_id, _ in criteria_of(row.report) if full_id not in seen})
+    return tuple(found)
+
+
 def feedback(row: Row) -> str:
     """Write the feedback for a student in one line: score, decision, and each lost point with its reason.
 
@@ -118,54 +128,11 @@ def feedback(row: Row) -> str:
     return safe(" ".join(part for part in parts if part), limit=_FEEDBACK)
 
 
-def final_mark(row: Row) -> FinalMark:
-    """Return what a student's page says of the mark; without the total where the student may not see everything."""
-    everything = row.handed_back == row.report
-    score = "" if row.adjusted.score is None or not everything else f"final mark {number(row.adjusted.score)}"
-    score += f" of {number(row.max_score)} points" if score and row.max_score is not None else ""
-    ignored = [f"This submission does not count: {row.adjusted.reason}"] if row.adjusted.ignored else []
-    return FinalMark(row.shown_name, score, (*ignored, *decisions(row, totals=everything)))
-
-
 def _first_hint(row: Row) -> list[str]:
     """Return the first thing to do, as far as the student may see it."""
     criteria = [criterion for exercise in exercises_of(row.handed_back) for criterion in exercise["criteria"]]
     lost = [c["hint"] for c in criteria if c["outcome"] in ("not_met", "partly") and c.get("hint")]
     return [f"First hint: {lost[0]}."] if lost else []
-
-
-def decisions(row: Row, *, totals: bool = True) -> list[str]:
-    """Explain to the student what was decided, beside what the grader had found, in a sentence each.
-
-    Without totals nothing is said of the whole score, from which hidden criteria could be reckoned.
-    """
-    adjusted = row.adjusted
-    found = [f"{id_}: {text}" for id_, text in _criteria(row)]
-    if not totals:
-        pass
-    elif adjusted.override is not None:
-        raw = f" instead of {number(adjusted.raw)}" if adjusted.raw is not None else ""
-        found.append(f"The score was set to {number(adjusted.override)}{raw}: {adjusted.reason}.")
-    elif adjusted.penalty:
-        days = number(adjusted.days_late)
-        late = f"{days} {'day' if days == '1' else 'days'} late"
-        found.append(f"{number(adjusted.marked)} points, less {number(adjusted.penalty)} for {late}.")
-    return [*found, f"Comment: {adjusted.comment}"] if adjusted.comment else found
-
-
-def _criteria(row: Row) -> Iterator[tuple[str, str]]:
-    """Yield title and decision of each criterion that a student may see."""
-    for exercise in exercises_of(row.handed_back):
-        for criterion in exercise["criteria"]:
-            decided = row.adjusted.criteria.get(f"{exercise['id']}/{criterion['id']}")
-            if decided is None:
-                continue
-            points, of = number(criterion["score"]), number(criterion["max_score"])
-            parts = [f"{points} of {of} points"]
-            if decided.score is not None:
-                parts = [f"{number(decided.score)} of {of} points instead of {points}: {decided.reason}"]
-            parts += [f"Comment: {decided.comment}"] if decided.comment else []
-            yield criterion["title"], ". ".join(parts) + "."
 
 
 def _lost(criterion: CriterionData) -> str:
@@ -183,7 +150,7 @@ def _counted(book: Gradebook, left_out: list[str], but: Collection[str] = ()) ->
         if id(row) in chosen or row.adjusted.ignored or not row.name or row.name in but:
             continue
         if row.person is None:
-            why = "nobody on the roster goes with it for sure"
+            why = "matches nobody on the roster for sure"
         elif row.adjusted.score is None:
             why = f"no score: {row.status.value}"
         else:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
+from fractions import Fraction
 from pathlib import Path
 
 from grader.classroom.intake import HandedInEntry
@@ -33,6 +35,17 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
 }
 #: Columns that identify a person uniquely.
 _EXACT = ("folder", "user", "email", "id", "canvas", "identifier")
+# Moodle's grading worksheet says `Submitted for grading - 1 day 3 hours late` in this column.
+_STATUS = "status"
+_LATE = re.compile(r"((?:\d+\s+[a-z]+\s+)+)late\b", re.IGNORECASE)
+_HOURS: Mapping[str, int | Fraction] = {
+    "year": 8760,
+    "week": 168,
+    "day": 24,
+    "hour": 1,
+    "min": Fraction(1, 60),
+    "sec": Fraction(1, 3600),
+}
 # Moodle's grading worksheet writes `Participant 657693`, its download only the number.
 _PARTICIPANT = re.compile(r"\D+ (\d+)")
 
@@ -166,6 +179,24 @@ def person_of(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> P
         names=frozenset(spellings(name)),
         row=row,
     )
+
+
+def late_by(person: Person | None) -> str:
+    """Return how late somebody handed in, as a grading worksheet of Moodle in English says; empty if it does not."""
+    row = {} if person is None or person.row is None else person.row
+    status = next((value for name, value in row.items() if name.strip().casefold() == _STATUS), "")
+    found = _LATE.search(status)
+    return " ".join(found[1].split()) if found else ""
+
+
+def late_days(text: str) -> str:
+    """Return a time such as `1 day 3 hours` as a number of days, rounded up to hundredths; empty if it is none."""
+    parts = re.findall(r"(\d+) ([a-z]+)", text.casefold())
+    hours = [Fraction(count) * _HOURS[key] for count, unit in parts for key in _HOURS if unit.startswith(key)]
+    if not hours or len(hours) < len(parts):
+        return ""
+    hundredths = math.ceil(sum(hours, Fraction(0)) * 100 / 24)
+    return f"{hundredths / 100:g}"
 
 
 def _in_reading_order(name: str) -> str:

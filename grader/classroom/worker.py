@@ -24,7 +24,7 @@ from grader.classroom.local import Task
 from grader.classroom.messages import read_collected
 from grader.classroom.store import REPORT, Conditions, ResultStatus, State, refused
 from grader.core.errors import GraderError, SubmissionError
-from grader.core.exercise import Exercise
+from grader.core.exercise import Audience, Exercise
 from grader.core.quantities import NS_PER_S
 from grader.core.report import Report, Reproduction
 from grader.core.submission import Run
@@ -183,12 +183,13 @@ def _used(conditions: Conditions, given: Reproduction) -> Conditions:
 def _files(report: Report, task: Task, today: str) -> Mapping[str, str]:
     assets = None if task.standalone else ASSETS
     page, seen = render_html(report, assets=assets, recordings=EVIDENCE), for_student(report, today)
+    read_by_students = replace(seen, audience=Audience.STUDENT)
     return {
         REPORT: dumps(report),
         PAGE: page,
         HANDED_BACK: dumps(seen),
-        HANDED_BACK_PAGE: render_html(seen, assets=assets),
-        GRADESCOPE: render_gradescope(report, day=today),
+        HANDED_BACK_PAGE: render_html(read_by_students, assets=assets),
+        GRADESCOPE: render_gradescope(replace(report, audience=Audience.STUDENT), day=today),
     }
 
 

@@ -19,8 +19,9 @@ from grader.cli.options import (
     require,
     time_budget_option,
 )
+from grader.cli.remembered import RepeatingCommand, is_left_out, options_to_keep
 from grader.core.checkup import TIERS
-from grader.core.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED
+from grader.core.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED, UNUSABLE
 
 if TYPE_CHECKING:
     from grader.classroom.local import MakeScheduler
@@ -30,7 +31,7 @@ _LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "can
 _RERUNS = ("changed", "failed", "undecided", "all")
 
 
-@click.command(name="batch")
+@click.command(name="batch", cls=RepeatingCommand)
 @click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", "results", metavar="RESULTS", required=True, type=PATH, help="Folder for the results.")
 @click.option("--layout", type=click.Choice(_LAYOUTS), default="auto", help="How submissions are named.")
@@ -116,10 +117,11 @@ def command(  # noqa: PLR0913  one parameter an option
     """Grade a class: every submission in SOURCE, a folder of submissions or a bulk download.
 
     The same command goes on where it was stopped. Only what is new or changed is graded; `--rerun` adds what failed,
-    what was undecided, or all.
+    what was undecided, or all. RESULTS keeps the options that change marks, pages or exported files, such as --adjust
+    and --roster: they apply again unless given otherwise, and --no-adjust, --no-roster and so on leave one out.
 
     Exit codes: 0 everybody was graded, 1 a submission cannot be used, 2 the command or something it was given cannot be
-    used, 3 something failed or was undecided through no fault of a student, 130 interrupted.
+    used, or a rubric has a mistake, 3 something failed or was undecided through no fault of a student, 130 interrupted.
     """
     if scheduler is not None:
         require("--scheduler", "distributed", "dask")
@@ -137,6 +139,7 @@ def command(  # noqa: PLR0913  one parameter an option
         raise click.BadParameter("--canvas-gradebook needs --canvas with the assignment's number")
     if templates and not similarity:
         raise click.BadParameter("--template needs --similarity")
+    ctx = click.get_current_context()
     course = ClassRequest(
         sources=sources,
         results=results,
@@ -144,6 +147,8 @@ def command(  # noqa: PLR0913  one parameter an option
         pattern=pattern,
         roster=roster,
         adjustments=adjustments,
+        no_adjustments=is_left_out(ctx, "adjustments"),
+        options=options_to_keep(ctx),
         grading=GradeRequest("", exercises=tuple(dict.fromkeys(exercises)), seed=seed, **as_given),
         jobs=jobs,
         rerun=rerun,
@@ -160,6 +165,10 @@ def command(  # noqa: PLR0913  one parameter an option
         click.echo("interrupted: what was graded is kept, the same command goes on where it was", err=True)
         return INTERRUPTED
     print_result(lambda: summary_json(graded), lambda _: render_summary(graded), as_json=as_json)
+    for mistake, rows in graded.book.author_mistakes.items():
+        count = "1 submission" if len(rows) == 1 else f"{len(rows)} submissions"
+        complain(f"the rubric has a mistake: {mistake} ({count})", kind="error")
+        complain("correct it, and give the same command again", kind="hint")
     return _code(graded)
 
 
@@ -175,9 +184,11 @@ def _scheduler_factory(scheduler: str | None, jobs: int | None) -> AbstractConte
 
 
 def _code(graded: Graded) -> int:
-    """Return the exit code: failures of the grader or the machine take precedence over unusable submissions."""
+    """Return the exit code: mistakes in a rubric come first, then what failed here, then unusable submissions."""
     from grader.classroom.gradebook import Status
 
+    if graded.book.author_mistakes:
+        return UNUSABLE
     if any(graded.book.count(status) for status in (Status.FAILED, Status.UNDECIDED, Status.NOT_RUN)):
         return UNDECIDED
     return NOT_ALL_MET if graded.book.count(Status.REFUSED) else ALL_MET

@@ -26,6 +26,7 @@ from grader.cli.options import (
     complain,
     drawn_by,
     drawn_with,
+    inputs_options,
     interfaces_option,
     parse_outputs,
     parse_percent,
@@ -63,7 +64,7 @@ if TYPE_CHECKING:
 
 _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
-    "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
+    "given cannot be used, or a rubric has a mistake, 3 undecided through no fault of the student, 130 interrupted."
 )
 _TIERS = ("auto", *TIERS)
 # Environment variable that chooses the sandbox of a machine, such as a container that can have one only.
@@ -362,6 +363,7 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
 @click.option("--odom-bag", type=PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
 @click.option("--isolation", type=click.Choice(_TIERS), default="auto", envvar=_ISOLATION, help="As for grading.")
+@inputs_options
 @interfaces_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
 def _observe(  # noqa: PLR0913  one parameter an option
@@ -371,6 +373,8 @@ def _observe(  # noqa: PLR0913  one parameter an option
     odom_bag: Path | None,
     clock: str,
     isolation: str,
+    sent: tuple[str, ...],
+    simulations: tuple[str, ...],
     interfaces: tuple[Path, ...],
     as_json: bool,
 ) -> int:
@@ -380,9 +384,19 @@ def _observe(  # noqa: PLR0913  one parameter an option
     Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
     """
     from grader.app import observe
+    from grader.app.inputs import read_sent, read_simulations
     from grader.reporting.observed import render_summary, summary_to_json
 
-    request = observe.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation, interfaces)
+    request = observe.ObserveRequest(
+        files,
+        round(duration * 1e9),
+        odom_bag,
+        clock,
+        isolation,
+        interfaces,
+        read_simulations(simulations),
+        read_sent(sent),
+    )
     with shown_progress(wanted=True) as progress:
         summary = observe.observe(request, progress)
     print_result(lambda: summary_to_json(summary), lambda _: render_summary(summary), as_json=as_json)
@@ -410,22 +424,21 @@ def _doctor(*, as_json: bool) -> int:
 
 
 @click.command(name="explain")
-@click.argument("name", metavar="CRITERION", shell_complete=complete_criterion)
+@click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_criterion)
 @click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Look in this rubric; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
-def _explain(*, name: str, rubrics: tuple[Path, ...], as_json: bool) -> int:
-    """Explain a CRITERION, or a check by its name.
+def _explain(*, name: str | None, rubrics: tuple[Path, ...], as_json: bool) -> int:
+    """Explain the criterion or the check NAME; without a name, list all of them.
 
     Says what is asked, in which situation and with which tolerance it is measured, and which part of the chapter asks
     for it.
     """
-    from grader.app.explain import explain
-    from grader.reporting.explained import explanations_to_json, render_explanations
+    from grader.app.explain import everything, explain
+    from grader.reporting.explained import explanations_to_json, list_all, render_explanations
 
-    found = explain(name, rubrics)
-    print_result(
-        lambda: explanations_to_json(found), lambda page: render_explanations(found, width=page.width), as_json=as_json
-    )
+    found = everything(rubrics) if name is None else explain(name, rubrics)
+    render = list_all if name is None else render_explanations
+    print_result(lambda: explanations_to_json(found), lambda page: render(found, width=page.width), as_json=as_json)
     return ALL_MET
 
 

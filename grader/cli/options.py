@@ -189,6 +189,19 @@ def print_result(to_json: Callable[[], str], render: Callable[[PageLayout], str]
     show((lambda _: to_json()) if as_json else render, for_people=not as_json)
 
 
+_SIMULATION = "FILE.py:NAME"
+_SIMULATION_HELP = "A simulation that takes part, or the name of a built-in one; {parameters} follow a =; repeatable."
+
+
+def inputs_options(command: _Command) -> _Command:
+    """Add `--send` and `--simulation`: what programs are given that run without a rubric."""
+    sent = click.option(
+        "--send", "sent", metavar="TOPIC={FIELD: VALUE}", multiple=True, help="A message to send to them; repeatable."
+    )
+    simulation = click.option("--simulation", "simulations", metavar=_SIMULATION, multiple=True, help=_SIMULATION_HELP)
+    return sent(simulation(command))
+
+
 def complain(*lines: str, kind: str = "warning") -> None:
     """Write lines of a warning, an error or a hint on standard error; they may hold foreign text."""
     from grader.reporting.escape import shown

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from grader.cli.options import (
     EVIDENCE,
     PATH,
     audience_options,
+    complain,
     parse_outputs,
     parse_percent,
     print_result,
@@ -29,6 +31,10 @@ if TYPE_CHECKING:
     from grader.app.rejudge import Judgement, Wanted
     from grader.reporting.audience import Readers
     from grader.reporting.delivery import Output
+    from grader.reporting.json_report import ReportData
+
+#: The format of pages, which show the mark that counts where students read them.
+PAGE = "html"
 
 
 @click.command(name="rejudge")
@@ -108,7 +114,8 @@ def command(  # noqa: PLR0913  one parameter an option
     )
     one = len(evidence) == 1 and is_evidence(evidence[0])
     if one and not show_changes:
-        return _one(evidence[0], how, (*outputs, Output("json")) if as_json else outputs, min_score, for_whom)
+        code = _one(evidence[0], how, (*outputs, Output("json")) if as_json else outputs, min_score, for_whom)
+        return _confirmed(code, 1, verify=verify)
     wanted = rejudge.Wanted(
         tuple(outputs),
         reports=as_json and not show_changes,
@@ -117,6 +124,14 @@ def command(  # noqa: PLR0913  one parameter an option
         readers=for_whom,
     )
     return _class(evidence, how, wanted, as_json=as_json, jobs=jobs, table=table)
+
+
+def _confirmed(code: int, count: int, *, verify: bool) -> int:
+    """Say that recordings were verified, and return the exit code."""
+    if verify and count:
+        recordings = "recording shows" if count == 1 else "recordings show"
+        complain(f"the {recordings} what was judged: {count} submission{'' if count == 1 else 's'}", kind="verified")
+    return code
 
 
 def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fraction | None, for_whom: Readers) -> int:
@@ -129,6 +144,13 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
     wanted = tuple(replace(output, evidence=folder) for output in prepared(outputs))
     report = rejudge.rejudge(open_evidence(folder), how)
     deliver(report, wanted, for_whom)
+    if for_whom.only_students:
+        pages = [output.path for output in wanted if output.format == PAGE and output.path is not None]
+        if pages:
+            from grader.reporting.json_report import report_to_json
+
+            data = report_to_json(told(report, for_whom))
+            _add_marks([(report.name, folder, page, data) for page in pages])
     return exit_code(told(report, for_whom), min_score)
 
 
@@ -141,9 +163,27 @@ def _class(  # noqa: PLR0913  one parameter an option
 
     if any(output.path is None for output in wanted.files):
         raise click.BadParameter("a class has many reports: expected FORMAT=FOLDER, found FORMAT=-")
-    results = rejudge.rejudge_class(rejudge.named_evidence(evidence), how, wanted, jobs=jobs)
+    folders = [output.path for output in wanted.files if output.format == PAGE and output.path is not None]
+    marked = bool(folders) and wanted.readers.only_students
+    named = rejudge.named_evidence(evidence)
+    results = rejudge.rejudge_class(named, how, replace(wanted, reports=wanted.reports or marked), jobs=jobs)
+    judged = [(name, folder, result) for (name, folder), result in zip(named, results, strict=True) if result.report]
+    if marked:
+        suffix = FORMATS[PAGE].suffix
+        _add_marks([(n, f, into / f"{n}{suffix}", json.loads(r.report)) for n, f, r in judged for into in folders])
     if table is not None:
-        write_file(table, render_changes_table([r.change for r in results if r.change is not None]).encode())
+        changes = [result.change for result in results if result.change is not None]
+        if table.exists() and not any(each.criteria for each in changes):
+            complain(f"{table} is left as it was: nothing changed", kind="note")
+        else:
+            write_file(table, render_changes_table(changes).encode())
     render = render_changes if wanted.changes else render_results
     print_result(lambda: results_to_json(results, changes=wanted.changes), lambda _: render(results), as_json=as_json)
-    return rejudge.class_code(results)
+    return _confirmed(rejudge.class_code(results), sum(not r.problem for r in results), verify=how.verify)
+
+
+def _add_marks(pages: Sequence[tuple[str, Path, Path, ReportData]]) -> None:
+    """Put the marks of a class into pages for students: name, evidence, page and report of each."""
+    from grader.classroom.handing_back import HandedBack, add_marks
+
+    complain(*add_marks([HandedBack(*page) for page in pages]))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from grader.cli.options import (
     PATH,
     complain,
+    inputs_options,
     interfaces_option,
     print_for_programs,
     print_result,
@@ -18,6 +20,9 @@ from grader.cli.options import (
 )
 from grader.core.checkup import TIERS
 from grader.core.errors import ALL_MET, NOT_ALL_MET, UNUSABLE, GraderError, RubricError
+
+if TYPE_CHECKING:
+    from grader.mutation.results import SelftestResult
 
 
 @click.group(name="rubric")
@@ -108,9 +113,7 @@ def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", type=PATH, metavar="PATH", help="Write it there; by default it is printed.")
 @click.option("--id", "id_", default="", metavar="ID", help="Id of the exercise; by default made of the first file.")
-@click.option(
-    "--send", "sent", metavar="TOPIC={FIELD: VALUE}", multiple=True, help="A message to send to them; repeatable."
-)
+@inputs_options
 @click.option("--duration", type=click.FloatRange(4, 600), default=10.0, show_default=True, help="Seconds observed.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
 @click.option("--isolation", type=click.Choice(("auto", *TIERS)), default="auto", help="As for grading.")
@@ -120,6 +123,7 @@ def _new(  # noqa: PLR0913  one parameter an option
     output: Path | None,
     id_: str,
     sent: tuple[str, ...],
+    simulations: tuple[str, ...],
     duration: float,
     clock: str,
     isolation: str,
@@ -129,6 +133,7 @@ def _new(  # noqa: PLR0913  one parameter an option
     It is a skeleton: comments tell what was seen, and what its author has to decide. The reference meets all of it.
     With -o, rubric.schema.json is written beside it, with which editors complete and check it.
     """
+    from grader.app.inputs import read_sent, read_simulations
     from grader.app.observe import ObserveRequest
     from grader.authoring.starting import new_rubric
     from grader.reporting.escape import shown
@@ -137,8 +142,10 @@ def _new(  # noqa: PLR0913  one parameter an option
     if output is not None and output.exists():
         raise GraderError(f"{output}: expected a new file, found one that is there", "name another, or remove it")
     with shown_progress(wanted=True) as progress:
-        request = ObserveRequest(files, round(duration * 1e9), None, clock, isolation)
-        skeleton = new_rubric(request, progress, id_=id_, sent=sent)
+        request = ObserveRequest(
+            files, round(duration * 1e9), None, clock, isolation, (), read_simulations(simulations), read_sent(sent)
+        )
+        skeleton = new_rubric(request, progress, id_=id_, beside=output.parent if output is not None else Path())
     for remark in skeleton.remarks:
         complain(remark)
     if output is None:
@@ -165,6 +172,7 @@ def _new(  # noqa: PLR0913  one parameter an option
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw the sample and all values from N.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
 @click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for grading.")
+@click.option("--write-notes", is_flag=True, help="Add what is not explained to the notes, with a reason to fill in.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 @click.option("--no-progress", is_flag=True, help="Say nothing while testing.")
 def selftest_command(  # noqa: PLR0913  one parameter an option
@@ -178,6 +186,7 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
     seed: int | None,
     clock: str,
     isolation: str,
+    write_notes: bool,
     as_json: bool,
     no_progress: bool,
 ) -> int:
@@ -185,8 +194,8 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
 
     Notes in NAME.selftest.yaml beside NAME.yaml explain what may survive.
 
-    Exit codes: 0 no unexplained survivor, every criterion noticed something and nothing right was marked down, 1 not,
-    2 the command or something it was given cannot be used.
+    Exit codes: 0 every mistake was detected or explained, every criterion detected one, and no correct program lost a
+    point, 1 not, 2 the command or something it was given cannot be used.
     """
     require("grade selftest", "libcst", "authors")
     from grader.mutation.running import SelftestOptions, selftest
@@ -205,4 +214,22 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
         lambda page: render_results(results, width=page.width, colour=page.colour),
         as_json=as_json,
     )
+    if write_notes:
+        for result in results:
+            _add_notes(result, reference, template)
+    elif not as_json and any(result.survivors or result.marked_down or result.never_turned for result in results):
+        complain("--write-notes adds these to the notes, with a reason to fill in", kind="hint")
     return ALL_MET if all(result.passed for result in results) else NOT_ALL_MET
+
+
+def _add_notes(result: SelftestResult, reference: Path | None, template: Path | None) -> None:
+    from grader.mutation.explained import beside
+    from grader.mutation.writing import noted
+
+    path = beside(Path(result.rubric))
+    before = path.read_text(encoding="utf-8-sig") if path.exists() else None
+    text, entries = noted(result, before, reference=reference, template=template)
+    if entries:
+        write_file(path, text.encode())
+        what = "entry needs" if entries == 1 else "entries need"
+        complain(f"{path}: {entries} {what} a reason after `because:`", kind="written")

@@ -93,6 +93,9 @@ def _upload(  # noqa: PLR0913  one parameter an option
         platform = connect(address, token, course, assignment)
         found = marks.compare(known, platform, with_feedback=not scores_only)
         _show(render_comparison(known, platform, found))
+        if known.withheld:
+            criteria = ", ".join(known.withheld)
+            complain(f"the scores count what the rubric hides from students: {criteria}; a score reveals the result")
         left_out = bool(found.unknown or known.left_out)
         needed = sum(change.needed for change in found.changes)
         if found.unknown and not skip_unknown and send:

@@ -1,4 +1,4 @@
-"""Runs a Python file that the author of a rubric wrote, and finds the line of an error in it."""
+"""Runs a Python file that the author of a rubric wrote, and says where a mistake in it is."""
 
 from __future__ import annotations
 
@@ -6,6 +6,21 @@ import hashlib
 import sys
 import traceback
 from types import ModuleType
+
+from grader.core.dataclass import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class AuthorMistake:
+    """A mistake in a file that a rubric brings, found while a submission was graded; the rubric's author has to act."""
+
+    file: str  # name of the file, relative to the rubric
+    line: int  # the line that failed, or where the function begins that returned something wrong; 0 if unknown
+    text: str  # what is wrong, in one line
+
+    def __str__(self) -> str:
+        """Place and text, as in messages."""
+        return f"{self.file}:{self.line}: {self.text}" if self.line else f"{self.file}: {self.text}"
 
 
 def run(prefix: str, path: str, content: bytes) -> ModuleType:
@@ -36,12 +51,12 @@ def run(prefix: str, path: str, content: bytes) -> ModuleType:
     return module
 
 
-def line_of(error: BaseException, path: str) -> int:
-    """Return the line of a file in which an error arose, or that led to it; 1 if it is not known."""
+def line_of(error: BaseException, path: str, default: int = 1) -> int:
+    """Return the line of a file in which an error arose, or that led to it; the default if it is not known."""
     if isinstance(error, SyntaxError) and error.filename == path:
-        return error.lineno or 1
+        return error.lineno or default
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == path]
-    return (lines[-1] if lines else None) or 1
+    return (lines[-1] if lines else None) or default
 
 
 def words_of(error: BaseException) -> str:

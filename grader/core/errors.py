@@ -20,6 +20,8 @@ def exit_code(report: Report, min_score: Fraction | None) -> int:
 
     The share of the points, in percent, that counts as success is `min_score`; None requires every criterion.
     """
+    if any(verdict.author_mistake for exercise in report.exercises for verdict in exercise.verdicts):
+        return UNUSABLE
     if not report.final:
         return UNDECIDED
     reached = report.all_met if min_score is None else report.score * 100 >= report.max_score * min_score

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import field
 from enum import Enum
 from fractions import Fraction
+from numbers import Rational, Real
 from typing import Any, Protocol, TypeGuard
 
 from grader.core.dataclass import dataclass
@@ -166,17 +168,57 @@ class Outcome(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Location:
-    """A place in a student's file; lines count from 1."""
+    """A place in a student's file; lines count from 1.
+
+    Raises:
+        TypeError: The file is no text, or the line no whole number.
+    """
 
     file: str
     line: int
 
+    def __post_init__(self) -> None:
+        """Check the types: checks that authors write make locations too."""
+        if not isinstance(self.file, str) or isinstance(self.line, bool) or not isinstance(self.line, int):
+            found = f"{type(self.file).__name__} and {type(self.line).__name__}"
+            raise TypeError(f"Location: expected a file name and the number of a line, found {found}")
+
+
+#: Denominators that a float may have as a share of points. With them, 0.7 + 0.2 + 0.1 is 1, and 1 - 1.0000000001 is 0:
+#: a rounding error costs no points and is no mistake. Points are shown with two decimals.
+_FINEST_SHARE = 1_000_000
+
+
+def exact_share(share: object) -> Fraction:
+    """Return a share of the points as a fraction; a float becomes the nearest one with a denominator up to a million.
+
+    Raises:
+        TypeError: It is no number.
+        ValueError: It is not in the range from 0 to 1.
+    """
+    if isinstance(share, bool) or not isinstance(share, Real):
+        raise TypeError(f"Finding: expected a credit from 0 to 1, found a {type(share).__name__}")
+    if isinstance(share, Rational):
+        exact = Fraction(share)
+    elif math.isfinite(share):
+        exact = Fraction(float(share)).limit_denominator(_FINEST_SHARE)
+    else:
+        raise ValueError(f"Finding: expected a credit from 0 to 1, found {float(share)}")
+    if not 0 <= exact <= 1:
+        raise ValueError(f"Finding: expected a credit from 0 to 1, found {float(share):g}")
+    return exact
+
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a check found in a trace."""
+    """What a check found in a trace.
 
-    credit: Fraction  # share of the points earned, in [0, 1]
+    Raises:
+        TypeError: The credit is no number.
+        ValueError: The credit is not in the range from 0 to 1.
+    """
+
+    credit: Fraction  # share of the points earned, in [0, 1]; may be given as any number, see `exact_share`
     reason: str  # one sentence in the form `where: what was found, what was expected`; no markup
     # Plain JSON values behind the reason; keys in a fixed order
     evidence: Mapping[str, Any] = field(default_factory=dict)
@@ -187,6 +229,10 @@ class Finding:
     problem: Problem | None = None  # the problem found, if the check tells several problems apart
     # The reason in a few words, without the place of a fault, for terminals; empty if the reason itself is short
     brief: str = ""
+
+    def __post_init__(self) -> None:
+        """Make the credit a fraction, here and not later, so that the traceback shows the author's line."""
+        object.__setattr__(self, "credit", exact_share(self.credit))
 
 
 class Check(Protocol):
@@ -206,6 +252,26 @@ class SourceCheck(Protocol):
 def reads_sources(check: object) -> TypeGuard[SourceCheck]:
     """Return whether a check also reads the students' files."""
     return callable(getattr(check, "judge_sources", None))
+
+
+class BeginningCheck(Protocol):
+    """A check that judges the beginning of a recording in another way than a whole one.
+
+    Spot checks judge the first seconds of a scenario, recorded again on the wall clock. Any other check judges them as
+    it judges a whole recording, and counts only if the same seconds in virtual time suffice for it.
+    """
+
+    def of_beginning(self) -> Check | None:
+        """Return the check that judges a beginning; None if only a whole recording shows what this check asks."""
+
+
+def of_beginning(check: Check) -> Check | None:
+    """Return the check that judges the beginning of a recording on the wall clock; None if none can."""
+    declared = getattr(check, "of_beginning", None)
+    if not callable(declared):
+        return check
+    found: Check | None = declared()
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,6 +306,7 @@ class Exercise:
     by_request: bool = False  # whether it is graded only on request
     variant: Variant | None = None  # the values for this student; None if nothing varies
     interfaces: tuple[str, ...] = ()  # paths of the folders with interface packages that the rubric brings
+    bonus: Fraction = Fraction(0)  # points above the maximum that an instructor may give
 
     @property
     def plays_odometry(self) -> bool:

@@ -30,7 +30,7 @@ class Limits:
         processes: Processes and threads (16).
         output_bytes: Output kept of each of standard output and standard error; the rest is read and discarded.
         lines: Log records and lines of output that are kept (200).
-        open_files: Open file descriptors of one process (16).
+        open_files: Open file descriptors of one process (33).
         file_bytes: Size of one file.
         scratch_bytes: Total size of the files in one of the folders that the process may write to.
         wall_ns: Real time of the recording (80 s, by our longest scenario on the wall clock).
@@ -46,7 +46,7 @@ class Limits:
     output_bytes: Annotated[Bytes, Least(KIB), "kept of each output stream"] = 4 * MIB
     lines: Annotated[int, Least(1), "log records and lines that are kept"] = 50_000
 
-    open_files: Annotated[int, Least(64), "descriptors of one process"] = 256
+    open_files: Annotated[int, Least(64), "descriptors of one process"] = 128
     file_bytes: Annotated[Bytes, Least(KIB), "of one file"] = 32 * MIB
     scratch_bytes: Annotated[Bytes, Least(MIB), "of all files in a folder"] = 16 * MIB
 

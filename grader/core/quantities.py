@@ -35,6 +35,11 @@ def duration(duration_ns: int) -> str:
     return f"{seconds(duration_ns):g} s"
 
 
+def counted(count: int, noun: str) -> str:
+    """Return `1 message` or `3 messages`."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def within(got: float, want: float, tolerance: float) -> bool:
     """Return whether `got` is in `want ± tolerance`, including the edges; NaN never is."""
     difference = abs(got - want)

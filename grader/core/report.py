@@ -7,6 +7,7 @@ from dataclasses import field
 from fractions import Fraction
 from typing import Any, TypeAlias
 
+from grader.core.author_files import AuthorMistake
 from grader.core.chart import Excerpt, Figure, SourceFile
 from grader.core.checkup import Property
 from grader.core.dataclass import dataclass
@@ -20,6 +21,10 @@ JsonObject: TypeAlias = Mapping[str, JsonValue]
 SCHEMA = "grader/report/v1"
 #: Prefix of the reason of a criterion that is blocked by another one.
 NOT_JUDGED = "not judged: "
+#: Evidence key for the mistake of a rubric's author that leaves a criterion undecided: its file, line and text.
+AUTHOR_MISTAKE = "author_mistake"
+#: The key of the evidence that says that the submission itself may be why a criterion is undecided.
+SUBMISSION_SUSPECTED = "submission_suspected"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +48,17 @@ class Verdict:
     problem: Problem | None = None
     # The reason in a few words, for terminals; empty if the reason itself is short. Not shown in other reports.
     brief: str = ""
+
+    @property
+    def suspected(self) -> bool:
+        """Whether it is undecided for a reason that the submission itself may have caused."""
+        return self.outcome is Outcome.UNDECIDED and self.evidence.get(SUBMISSION_SUSPECTED) is True
+
+    @property
+    def author_mistake(self) -> str:
+        """The mistake of the rubric's author that leaves it undecided, with its place; empty if there is none."""
+        found = self.evidence.get(AUTHOR_MISTAKE)
+        return str(AuthorMistake(**found)) if self.outcome is Outcome.UNDECIDED and found else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +217,12 @@ class TopicSummary:
     messages: int  # how many messages the nodes published on it
     first_s: float | None  # when the first one came; None if none came
     pace: Pace | None  # None for fewer than two messages at different times
-    ranges: Mapping[str, tuple[float, float]]  # numeric field, dotted -> least and greatest value
+    # Numeric field, dotted -> least and greatest value; `name[]` stands for all elements of an array
+    ranges: Mapping[str, tuple[float, float]]
+    # Text field, dotted -> its different values in order of appearance, `MOST_TEXTS` at most, and how many there were
+    texts: Mapping[str, tuple[tuple[str, ...], int]] = field(default_factory=dict)
+    # Array, dotted -> least and greatest number of elements
+    lengths: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from dataclasses import field
 from pathlib import Path
 
 from grader.core.dataclass import dataclass
+from grader.core.projects import Project
 from grader.core.report import BroughtPackage, Environment, Reproduction
 from grader.core.trace import Trace
 
@@ -36,6 +37,7 @@ class Submission:
     digest: str  # `sha256:` and 64 hex digits over relative names and contents of all staged files
     files: Mapping[str, StudentFile] = field(default_factory=dict)  # wanted file name -> the file that was found for it
     notes: tuple[str, ...] = ()  # sentences about the files that readers must know
+    projects: tuple[Project, ...] = ()  # its ROS packages, outermost first
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,9 @@ from dataclasses import field
 from enum import Enum
 from typing import Any, TypeVar
 
+from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
+from grader.core.quantities import seconds
 
 
 class ClockKind(str, Enum):
@@ -171,6 +173,23 @@ class Endpoint:
     liveliness: str = "automatic"  # `automatic` or `manual_by_topic`
 
 
+def unmet_policy(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:
+    """Return the first QoS policy that keeps messages from passing, as offered and as requested; None if none does.
+
+    The rules are those of ROS 2 for "request versus offered" policies, as in the documentation of its QoS settings.
+    """
+    if (publisher.reliability, subscription.reliability) == ("best_effort", "reliable"):
+        return "best_effort reliability", "reliable"
+    if (publisher.durability, subscription.durability) == ("volatile", "transient_local"):
+        return "volatile durability", "transient_local"
+    if subscription.deadline_ns and not 0 < publisher.deadline_ns <= subscription.deadline_ns:
+        offered = f"a deadline of {seconds(publisher.deadline_ns):g} s" if publisher.deadline_ns else "no deadline"
+        return offered, f"{seconds(subscription.deadline_ns):g} s"
+    if (publisher.liveliness, subscription.liveliness) == ("automatic", "manual_by_topic"):
+        return "automatic liveliness", "manual_by_topic"
+    return None
+
+
 @dataclass(frozen=True, slots=True)
 class ServiceEnd:
     """One server or client of a service in the live graph, without those that every node has."""
@@ -265,6 +284,8 @@ class Trace:
     # Sentences that readers must know (entry without a guard, a limit reached, lost messages)
     notes: tuple[str, ...] = ()
     harness_problem: str = ""  # a failure of the grader or the machine that prevents judging; empty if there was none
+    # Whether what the submission does may be why there is a harness problem
+    suspected: bool = False
     starts: tuple[Start, ...] = ()  # how each process was started; empty in traces of earlier versions
     # Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence
     reached: tuple[str, ...] = ()
@@ -274,6 +295,10 @@ class Trace:
     left_out: tuple[str, ...] = ()
     # Whether a wait for the middleware timed out, so that something may be missing: a reason to record again
     incomplete: bool = False
+    # The mistake in a simulation of the rubric's author that prevents judging, as `harness_problem` does; None without
+    author_mistake: AuthorMistake | None = None
+    # In virtual time, whether the work of a node before its pauses may slow it down: a reason to record again
+    may_drift: bool = False
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

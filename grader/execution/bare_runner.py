@@ -24,11 +24,23 @@ PROMPT_NS, IMPORTS_NS = NS_PER_S // 5, NS_PER_S // 2
 FIRST_LOOK_NS = 10_000_000
 
 
+#: The pauses of the loop, longer than with the host: a whole class is checked, and no host waits for an answer. What a
+#: program sends, logs and prints at one moment is taken together, at most 2 ms late, a twentieth of the jitter allowed
+#: on this clock. Arrivals, output and the end of a process end the longest pause; only the graph is found by looking.
+PAUSE_OF_BARE_S, LONGEST_PAUSE_OF_BARE_NS = 0.002, 50_000_000
+#: How rarely to look at a graph that does not change: each look costs a millisecond of a processor, half of the loop.
+RAREST_GRAPH_NS = 200_000_000
+
+
 class BareRunner(WallRunner):
     """Runs one plan on the real clock, with bare processes; see `WallRunner`.
 
     The observer subscribes to the log and to the plan's publishers before the processes start.
     """
+
+    pause_s = PAUSE_OF_BARE_S
+    longest_pause_ns = LONGEST_PAUSE_OF_BARE_NS
+    rarest_graph_ns = RAREST_GRAPH_NS
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)

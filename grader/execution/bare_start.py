@@ -19,14 +19,17 @@ from grader.execution.sandbox.protocol import Command
 from grader.execution.student_process import NodeProcess
 from grader.student_host.packages import ENTRY_POINT, layout_of, never_true, package_folders, start_of
 
-#: A larger file is not parsed but run as a script: nobody writes one by hand.
-MOST_BYTES = 1 << 20
+#: A larger file is not parsed but run as a script: nobody writes one by hand. Parsing takes up to 500 bytes of memory
+#: for each byte, in a process that is trusted.
+MOST_BYTES = 256 << 10
 #: Modules whose functions only prepare the program when a file calls them at the top level.
 _SETTING_UP = frozenset({"sys", "os", "warnings", "random", "logging", "np", "numpy", "signal", "math"})
 _NODES = frozenset({"Node", "LifecycleNode"})
 
 
-def bare_arguments(here: Path, root: str, file: str, given: PlannedStart | None = None) -> tuple[str, ...]:
+def bare_arguments(
+    here: Path, root: str, file: str, given: PlannedStart | None = None, scripts: Sequence[Sequence[str]] = ()
+) -> tuple[str, ...]:
     """Return the Python arguments that run a file as its author would.
 
     A file in a package is started as `ros2 run` starts it. If a file starts nothing by itself, the command calls its
@@ -37,6 +40,7 @@ def bare_arguments(here: Path, root: str, file: str, given: PlannedStart | None 
         root: The path at which the process sees the submission.
         file: The file, relative to `root`.
         given: What it is started with; None for its file alone.
+        scripts: Name, module and function of each console script of its package.
     """
     given = given or PlannedStart(file)
     path = f"{root}/{file}"
@@ -48,7 +52,7 @@ def bare_arguments(here: Path, root: str, file: str, given: PlannedStart | None 
     if tree is None:
         return _by_import(script, [beside], path, setup, plain) if setup else ("-u", path, *plain)
     layout = layout_of(str(here), file)
-    start = start_of(str(here), file, layout, tree, given.executable)
+    start = start_of(str(here), file, layout, tree, given.executable, scripts)
     folders = [f for f in dict.fromkeys((start.base, layout.base, *package_folders(str(here)))) if f]
     seen = [root + folder.removeprefix(str(here)) for folder in folders]
     if layout.module and not layout.base:  # its package is the submission's own folder
@@ -73,9 +77,10 @@ def _help(tree: ast.Module, module: str) -> str:
         return ""
     if any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in tree.body):
         return f"importlib.import_module({module!r}).main()"
-    nodes = [node.name for node in tree.body if isinstance(node, ast.ClassDef) and _is_node(node)]
-    spin = f"import rclpy; rclpy.init(); rclpy.spin(importlib.import_module({module!r}).{''.join(nodes)}())"
-    return spin if len(nodes) == 1 else ""
+    nodes = [node for node in tree.body if isinstance(node, ast.ClassDef) and _is_node(node)]
+    if len(nodes) != 1 or _needs_arguments(nodes[0]):
+        return ""
+    return f"import rclpy; rclpy.init(); rclpy.spin(importlib.import_module({module!r}).{nodes[0].name}())"
 
 
 def _with_parameter_files(given: PlannedStart) -> str:
@@ -127,6 +132,16 @@ def _root(node: ast.expr) -> str:
 
 def _is_node(node: ast.ClassDef) -> bool:
     return any(getattr(base, "id", getattr(base, "attr", "")) in _NODES for base in node.bases)
+
+
+def _needs_arguments(node: ast.ClassDef) -> bool:
+    """Return whether the constructor has a parameter without a default, apart from `self`."""
+    made = next((f for f in node.body if isinstance(f, ast.FunctionDef) and f.name == "__init__"), None)
+    if made is None:
+        return False
+    given = made.args
+    free = len(given.posonlyargs) + len(given.args) - len(given.defaults)
+    return free > 1 or None in given.kw_defaults
 
 
 #: Name of the sandbox process, which starts the student's.

@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 from grader.core.trace import GraphSnapshot
 from grader.execution.exchanges import PlannedCalls, PlannedMessages
 from grader.execution.machine import Patience
 from grader.execution.observer import Observer
+from grader.execution.ros_names import is_name, is_node_name
 from grader.execution.service_ends import BACKGROUND_TYPES
 from grader.execution.service_peers import ServicePeers
 from grader.execution.student_process import NodeProcess
@@ -18,15 +20,9 @@ from grader.execution.trace_recorder import NAME_CHARACTERS, TraceRecorder
 
 #: The most messages that are believed to be sent between two reports.
 COUNT = 1_000_000
-#: Valid ROS names and types; anything else that a process reports as a name is never shown.
-_NAME = re.compile(r"/[A-Za-z0-9_/]{0,299}")
+#: Valid types and parameters; anything else that a process reports as a name is never shown.
 _TYPE = re.compile(r"[A-Za-z0-9_]+(?:/[A-Za-z0-9_]+){1,2}")
-_PARAMETER = re.compile(r"/[A-Za-z0-9_/]{0,150}:[^\s]{1,150}")
-
-
-def is_name(name: Any) -> bool:
-    """Return whether a value is the absolute name of a topic, a service or a node."""
-    return isinstance(name, str) and _NAME.fullmatch(name) is not None
+_PARAMETER = re.compile(r"[^\s]{1,150}")
 
 
 def counts(data: Any) -> dict[str, int]:
@@ -43,8 +39,11 @@ def is_claim(claim: Any) -> bool:
         return False
     kind, name = claim["kind"], claim["name"]
     if kind == "parameter":
-        return _PARAMETER.fullmatch(name) is not None
-    if not is_name(name) or (kind != "node" and _TYPE.fullmatch(claim["type"]) is None):
+        node, _, parameter = name.partition(":")
+        return is_node_name(node) and _PARAMETER.fullmatch(parameter) is not None
+    if not (is_node_name if kind == "node" else is_name)(name) or (
+        kind != "node" and _TYPE.fullmatch(claim["type"]) is None
+    ):
         return False
     ends = kind in ("publisher", "subscription")
     bools = all(isinstance(claim.get(k), bool) for k in ("reliable", "latched", "manual"))
@@ -162,6 +161,8 @@ class Discovery:
             self._strangers = self._strangers + self._surplus(now_ns, claims)
         self.look(now_ns)
         unknown = self._observer.watch(self._recorder.graph.endpoints)
+        if self._observer.crowded:
+            self._recorder.stop(now_ns, self._observer.crowded)
         self._recorder.note(*(f"the type of {name} is not known on this machine" for name in unknown))
         writers = [c for c in claims if c["kind"] == "publisher"]
         self.patience.wait(lambda: all(self._watched(c, writers) for c in writers))
@@ -310,8 +311,9 @@ class Discovery:
         if expected == student.told and not ((student.renewed or student.unmatched) and expected):
             return
         student.told, student.renewed = expected, False
-        student.tell({"match": expected, "gone": gone, "wait_s": self.patience.wait_s})
-        answer = student.report()
+        with nullcontext() if student.workload is None else student.workload.beside():
+            student.tell({"match": expected, "gone": gone, "wait_s": self.patience.wait_s})
+            answer = student.report()
         if answer is None or answer.get("kind") != "matched":
             self._mark_dead(student)
             return

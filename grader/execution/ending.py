@@ -13,6 +13,7 @@ from grader.core.trace import Fault, FaultKind, Mark
 from grader.execution.notes import Places
 from grader.execution.plan import Plan
 from grader.execution.sandbox.start import OUTGROWN
+from grader.student_host.faults import GRADERS
 
 TEXT_CHARACTERS, FRAMES = 500, 20
 #: Processor seconds that a node may use until it first blocks, including its imports, and later between two blocks.
@@ -30,6 +31,8 @@ _HUNG = {
     "waiting": "waits for something outside the ROS graph",
     "timed_event": "waits for a missed deadline or a lost liveliness, which the middleware times in real time",
 }
+#: A module of the host, as a process names it.
+_MODULE = re.compile(r"[a-z_]{1,40}(?:/[a-z_]{1,40})?\.py")
 #: Qualified names of classes and functions as Python writes them; free text does not match.
 _TYPE = re.compile(r"(?=.{1,200}$)[^\W\d]\w*(?:\.(?:<locals>|[^\W\d]\w*))*")
 _FUNCTION = re.compile(r"(?=.{1,100}$)(?:<(?:module|lambda|listcomp|setcomp|dictcomp|genexpr)>|[^\W\d]\w*)")
@@ -60,7 +63,7 @@ def reported_fault(process: str, t_ns: int, data: Any, limits: Limits, places: P
     code = data.get("code")
     hung = _HUNG.get(code) if isinstance(code, str) else None
     kind = FaultKind.SYNTAX_ERROR if code == "syntax_error" else FaultKind.HUNG if hung else FaultKind.EXCEPTION
-    text = hung or _own_words(data)
+    text = hung or graders_fault(process, data) or _own_words(data)
     python = sys.version_info[:2] if kind is FaultKind.SYNTAX_ERROR else None
     if python is not None:
         text += f" (read by Python {python[0]}.{python[1]})"
@@ -76,6 +79,17 @@ def reported_fault(process: str, t_ns: int, data: Any, limits: Limits, places: P
         frames=_frames(data.get("frames"), places),
         python=python,
     )
+
+
+def graders_fault(process: str, data: Any) -> str:
+    """Describe a reported fault of the grader's own code in a process, for a bug report; empty if it is another one."""
+    if not isinstance(data, dict) or data.get("code") != GRADERS:
+        return ""
+    module, line, kind = data.get("module"), data.get("at"), data.get("type")
+    known = isinstance(module, str) and _MODULE.fullmatch(module) and type(line) is int and 0 < line < 10_000
+    where = f", {module} line {line}" if known else ""
+    what = kind if isinstance(kind, str) and _TYPE.fullmatch(kind) else "Exception"
+    return f"the grader's own code failed in the process of {process}: {what}{where}; please report this line"
 
 
 def _own_words(data: Mapping[str, Any]) -> str:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from grader.core.dataclass import dataclass
-from grader.student_host.packages import console_scripts, package_folders, package_name
+from grader.core.projects import Project
+from grader.student_host.packages import package_folders
 
 #: The most files of a package that are searched for a module or a program.
 MOST_FILES = 2_000
@@ -27,53 +29,88 @@ class Executable:
         return f"{self.package}/{self.name}"
 
 
-def executables(root: Path) -> list[Executable]:
+def project_folders(root: Path) -> list[Path]:
+    """Return the folders of all ROS packages in a submission, outermost first."""
+    return [Path(folder) for folder in package_folders(str(root))]
+
+
+def executables(root: Path, projects: Sequence[Project]) -> list[Executable]:
     """Return the entry points of all packages of a submission, in the order of its folders."""
-    found = []
-    for folder in package_folders(str(root)):
-        package = package_name(folder)
-        for name, module, function in console_scripts(folder):
-            path = _file_of(Path(folder), f"{module.replace('.', '/')}.py")
+    found, files = [], _Files(root)
+    for project in projects:
+        for name, module, function in project.scripts:
+            path = files.find(project.folder, f"{module.replace('.', '/')}.py")
             file = None if path is None else path.relative_to(root).as_posix()
-            found.append(Executable(package, name, file, f"{module}:{function}"))
+            found.append(Executable(project.name, name, file, f"{module}:{function}"))
     return found
 
 
-def find_executable(root: Path, package: str, name: str) -> Executable | None:
+def find_executable(root: Path, projects: Sequence[Project], package: str, name: str) -> Executable | None:
     """Return the program that `ros2 run PACKAGE NAME` would start; None if there is none.
 
     Where there is no entry point of the name, a file of the name in the package is taken, as CMake packages install
-    them; where the submission has no such package, a file NAME or NAME.py anywhere in it.
+    them; where the submission has no such package, a file NAME or NAME.py anywhere in it. It is always a file of the
+    submission.
     """
-    named = [one for one in executables(root) if (one.package, one.name) == (package, name)]
+    named = [one for one in executables(root, projects) if (one.package, one.name) == (package, name)]
     if named:
         return named[0]
-    folders = [Path(f) for f in package_folders(str(root)) if package_name(f) == package]
+    folders = [project.folder for project in projects if project.name == package]
     wanted = (name,) if folders else (name, f"{name}.py")
-    for folder in folders or [root]:
-        found = next((path for one in wanted if (path := _file_of(folder, one)) is not None), None)
+    files = _Files(root)
+    for folder in folders or [""]:
+        found = next((path for one in wanted if (path := files.find(folder, one)) is not None), None)
         if found is not None and found.suffix == ".py":
             return Executable(package, name, found.relative_to(root).as_posix())
     return None
 
 
-def has_package(root: Path, name: str) -> bool:
+def has_package(projects: Sequence[Project], name: str) -> bool:
     """Return whether a submission has a ROS package."""
-    return any(package_name(folder) == name for folder in package_folders(str(root)))
+    return any(project.name == name for project in projects)
 
 
-def _file_of(folder: Path, tail: str) -> Path | None:
-    """Return the file nearest the top of a folder whose path ends like this."""
-    if (folder / tail).is_file():
-        return folder / tail
-    if tail.startswith("/") or ".." in tail.split("/"):
-        return None
-    seen = 0
-    for above, folders, names in os.walk(folder):
-        folders.sort()
-        seen += len(names)
-        if seen > MOST_FILES:
+class _Files:
+    """The files of a submission; each folder is listed once, however many names are looked for in it.
+
+    Args:
+        root: The submission.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+        self._listed: dict[str, dict[str, list[Path]]] = {}
+
+    def find(self, within: str, tail: str) -> Path | None:
+        """Return the file nearest the top of a folder whose path ends like this.
+
+        A tail that could lead out of the folder is refused before the file system is asked, and so is a file that a
+        link leads to.
+        """
+        parts = tail.split("/")
+        if "\0" in tail or not {"", ".", ".."}.isdisjoint(parts):
             return None
-        if (Path(above) / tail).is_file():
-            return Path(above) / tail
-    return None
+        if within not in self._listed:
+            self._listed[within] = self._list(self._root / within)
+        near = len((self._root / within).parts)
+        for path in self._listed[within].get(parts[-1], ()):
+            ends_so = path.parts[-len(parts) :] == tuple(parts) and len(path.parts) - len(parts) >= near
+            if ends_so and self._is_inside(path):
+                return path
+        return None
+
+    def _list(self, folder: Path) -> dict[str, list[Path]]:
+        """Return the files below a folder by name, the ones nearest the top first."""
+        found: dict[str, list[Path]] = {}
+        seen = 0
+        for above, folders, names in os.walk(folder):
+            folders.sort()
+            seen += len(names)
+            for name in names:
+                found.setdefault(name, []).append(Path(above, name))
+            if seen > MOST_FILES:
+                break
+        return found
+
+    def _is_inside(self, path: Path) -> bool:
+        return path.is_file() and path.resolve() == self._root.resolve() / path.relative_to(self._root)

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import importlib
+import os
 import re
+import sys
 from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from grader.core.errors import HarnessError
 
 TYPE_NAME = re.compile(r"([a-z][a-z0-9_]*)/(msg|srv|action)/([A-Z][A-Za-z0-9]*)(_[A-Z][A-Za-z]*)?")
+#: Where a prefix lists its packages: a file for each (ament's resource index, REP 122).
+INDEX = "share/ament_index/resource_index/packages"
+#: How far above a folder of modules its prefix may be: `PREFIX/lib/python3.11/site-packages`, `PREFIX/local/lib/...`.
+_DEEPEST = 4
 #: The services and topics of an action, as they are named on the wire.
 ACTION_PARTS = {"_SendGoal": "SendGoalService", "_GetResult": "GetResultService", "_FeedbackMessage": "FeedbackMessage"}
 
@@ -33,11 +41,30 @@ def interface_class(interface: str, kind: str) -> Any:
     asked = kind if part is None else "action"
     if namespace != asked or (part is not None and kind != ("msg" if part == "_FeedbackMessage" else "srv")):
         return None
+    if not is_indexed(package):
+        return None
     try:
         found = getattr(importlib.import_module(f"{package}.{namespace}"), name, None)
     except ImportError:
         return None
     return found if part is None or found is None else getattr(found.Impl, ACTION_PARTS.get(part, ""), None)
+
+
+def is_indexed(package: str) -> bool:
+    """Return whether the index of installed packages has a package; names in a graph must not choose what is imported.
+
+    It is looked for in the prefixes of AMENT_PREFIX_PATH, and in those that hold the folders of `sys.path`.
+    """
+    prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(":")
+    folders = (*(Path(prefix, INDEX) for prefix in prefixes if prefix), *filter(None, map(_index_above, sys.path)))
+    return any((folder / package).is_file() for folder in folders)
+
+
+@cache
+def _index_above(folder: str) -> Path | None:
+    """Return the index in the prefix that a folder of modules is in; None if there is none."""
+    above = list(Path(folder).parents)[:_DEEPEST]
+    return next((prefix / INDEX for prefix in above if (prefix / INDEX).is_dir()), None)
 
 
 def wanted_class(interface: str, kind: str, where: str) -> Any:

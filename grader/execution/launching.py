@@ -6,6 +6,7 @@ submission.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +18,7 @@ from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Fault, FaultKind, LogRecord, Mark, Observation, Offer, OutputLine, Trace
 from grader.execution.ending import START_CPU_S, reported_fault
 from grader.execution.executables import Executable, executables, find_executable, has_package
-from grader.execution.notes import Places
+from grader.execution.notes import Places, left_out_words, quoted
 from grader.execution.plan import Plan, PlannedStart
 from grader.execution.student_process import NodeProcess
 from grader.execution.usage import families, usage
@@ -26,6 +27,8 @@ from grader.execution.usage import families, usage
 LONGEST_S, LOOK_S = 60.0, 0.02
 #: The most nodes, things left out, arguments of a node and characters of a text that are taken from a description.
 NODES, LEFT_OUT, ARGUMENTS, CHARACTERS, FILE_CHARACTERS = 16, 50, 200, 1_000, 1 << 20
+#: What packages and programs are called; anything else that a launch file names is quoted.
+_NAME = re.compile(r"[A-Za-z0-9_.-]{1,100}")
 #: Packages with programs that only show what happens; leaving them out changes nothing for the nodes.
 ONLY_LOOKING = frozenset({"rviz2", "rqt", "rqt_gui", "rqt_graph", "rqt_plot", "rqt_console", "plotjuggler"})
 
@@ -42,6 +45,7 @@ class Launched:
         left_out: Sentences about what the grader cannot do, which may matter.
         notes: Sentences about what it left out and does not matter.
         fault: Why nothing can be started; None if something can.
+        harness_problem: Why that is not the launch file's fault; empty if it is.
     """
 
     processes: tuple[tuple[str, str], ...] = ()
@@ -51,13 +55,15 @@ class Launched:
     left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     fault: Fault | None = None
+    harness_problem: str = ""
 
 
 def evaluated(student: NodeProcess, plan: Plan) -> Launched:
     """Wait until a process has evaluated a launch file, and return what it describes."""
     report, why = _description(student)
     if report is None:
-        return Launched(fault=Fault(0, student.name, FaultKind.HUNG if why else FaultKind.EXITED, why or _ENDED))
+        kind = FaultKind.KILLED if student.stopped else FaultKind.HUNG if why else FaultKind.EXITED
+        return Launched(fault=Fault(0, student.name, kind, why or _ENDED))
     if "fault" in report:
         return Launched(fault=reported_fault(student.name, 0, report["fault"], plan.limits, student.places))
     return _launched(student.name, report, plan, student.places)
@@ -73,7 +79,7 @@ def _description(student: NodeProcess) -> tuple[dict[str, Any] | None, str]:
     while True:
         for report in student.reports():
             if report is None:
-                return None, ""
+                return None, student.stopped
             if report.get("kind") == "launched":
                 return report, ""
         student.drain()
@@ -95,22 +101,24 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
     made = Launched()
     for node in _dicts(report.get("nodes"), NODES):
         package, wanted = _text(node.get("package")), _text(node.get("executable"))
-        found = find_executable(root, package, wanted)
+        found = find_executable(root, plan.projects, package, wanted)
         where = _place(name, node, places)
         if found is None or found.file is None:
-            if has_package(root, package):
-                text = _not_found(package, wanted, found, executables(root))
+            if has_package(plan.projects, package):
+                text = _not_found(package, wanted, found, executables(root, plan.projects))
                 file, _, line = where.rpartition(":")
                 return Launched(
                     fault=Fault(0, name, FaultKind.EXCEPTION, text, file if line else "", int(line or 0)),
                     left_out=tuple(left_out),
                 )
-            sentence = f"{where}: {package}/{wanted} was not started: the submission has no package {package}"
+            sentence = f"{where}: {_program(package, wanted)} was not started: {_lacking(package)}"
             (notes if package in ONLY_LOOKING else left_out).append(sentence)
             continue
-        if not found.target and not has_package(root, package):
-            notes.append(f"{where}: the submission has no package {package}; {found.file} was started")
+        if not found.target and not has_package(plan.projects, package):
+            notes.append(f"{where}: {_lacking(package)}; {found.file} was started")
         made = _added(made, name, node, found, where, known)
+        if problem := made.starts[-1].problem:
+            return Launched(fault=Fault(0, name, FaultKind.KILLED, problem), left_out=tuple(left_out))
     if not made.processes and not left_out:
         text = "describes no node"
         return Launched(fault=Fault(0, name, FaultKind.EXITED, text), notes=tuple(notes))
@@ -146,16 +154,27 @@ def _added(  # noqa: PLR0913  what one node consists of
     )
 
 
+def _program(package: str, wanted: str) -> str:
+    """Return a program as a launch file names it; what no package or program can be called is quoted."""
+    plain = _NAME.fullmatch(wanted) and (not package or _NAME.fullmatch(package))
+    return f"{package}/{wanted}" if plain else f"the program {quoted(f'{package}/{wanted}')}"
+
+
+def _lacking(package: str) -> str:
+    return f"the submission has no package {package if _NAME.fullmatch(package) else quoted(package)}"
+
+
 def _not_found(package: str, wanted: str, found: Executable | None, known: Sequence[Executable]) -> str:
     if found is not None:
         return f"SubstitutionFailure: the entry point {wanted} of {package} is {found.target}, which is not there"
     names = ", ".join(one.name for one in known if one.package == package)
-    text = f"SubstitutionFailure: package '{package}' found, but executable '{wanted}' not found"
+    name = f"'{wanted}'" if _NAME.fullmatch(wanted) else quoted(wanted)
+    text = f"SubstitutionFailure: package '{package}' found, but executable {name} not found"
     return f"{text}; its entry points are {names}" if names else f"{text}; it has no entry points"
 
 
 def _left_out(name: str, one: Mapping[str, Any], places: Places) -> str:
-    return f"{_place(name, one, places)}: {_text(one.get('what'), 200)} is not supported and was left out"
+    return f"{_place(name, one, places)}: {left_out_words(one)} is not supported and was left out"
 
 
 def _place(name: str, one: Mapping[str, Any], places: Places) -> str:

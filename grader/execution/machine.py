@@ -7,6 +7,7 @@ import os
 import platform
 import re
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
@@ -18,6 +19,7 @@ from grader.core.checkup import Fact
 from grader.core.quantities import GIB, MIB
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.properties import confined, install_command, setting_command
+from grader.execution.weaknesses import BUBBLEWRAP, FAST_DDS, LINUX, kernel_version, known, repaired_here, version_of
 from grader.student_host.originals import wait_until
 
 #: How long to wait for an endpoint or a message that was announced.
@@ -96,6 +98,18 @@ def software(ros: RosInstallation | None) -> Iterator[Fact]:
         yield Fact("rclpy", ros.rclpy_version)
         yield Fact("RMW", f"rmw_fastrtps_cpp {_package_version(ros.prefix, 'rmw_fastrtps_cpp')}{_fast_dds(ros)}")
     yield _bubblewrap()
+
+
+def weaknesses(ros: RosInstallation | None) -> Iterator[Fact]:
+    """Yield the known weaknesses of the versions here."""
+    bwrap = shutil.which("bwrap")
+    versions = {
+        FAST_DDS: version_of(_fast_dds(ros)) if ros is not None else (),
+        BUBBLEWRAP: version_of(_said_by(bwrap)) if bwrap else (),
+        LINUX: kernel_version(platform.release(), platform.version()),
+    }
+    setuid = bool(bwrap) and bool(Path(str(bwrap)).stat().st_mode & stat.S_ISUID)
+    yield from known(versions, setuid=setuid, repaired=repaired_here())
 
 
 def system() -> Iterator[Fact]:

@@ -61,6 +61,42 @@ def _without_waiting(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
 
 
+#: What can be said of something that a launch file has and the grader does not evaluate, by its code. Names and texts
+#: are the student's: a name that does not match is not shown, a text is quoted.
+_LEFT_OUT: Mapping[str, tuple[str, re.Pattern[str] | None]] = {
+    "action": ("the action {name}", re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,59}")),
+    "command": ("the command {text}", None),
+    "launch_file": ("the launch file {name}, which is not in Python,", re.compile(r"[A-Za-z0-9_.-]{1,80}")),
+    "node_argument": ("{name}= of a node", re.compile(r"[a-z_]{1,40}")),
+    "nodes": ("a node beyond the first 16", None),
+    "package": ("the package {name}, which is not in the submission,", re.compile(r"[A-Za-z0-9_-]{1,80}")),
+    "parameter_file": ("the parameter file {name}, which is not there,", re.compile(r"[A-Za-z0-9_.-]{1,80}")),
+    "substitution": ("the substitution {name}({text})", re.compile(r"[A-Z][A-Za-z]{0,39}")),
+    "variable": ("the environment variable {name}", re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,79}")),
+}
+_QUOTED_CHARACTERS = 80
+
+
+def quoted(text: str) -> str:
+    """Return a student's text on one line in quotation marks, shortened; it cannot close them."""
+    plain = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * _QUOTED_CHARACTERS]).split())
+    plain = plain.replace('"', "'")
+    return f'"{plain[: _QUOTED_CHARACTERS - 1]}…"' if len(plain) > _QUOTED_CHARACTERS else f'"{plain}"'
+
+
+def left_out_words(data: Mapping[str, Any]) -> str:
+    """Return the words for something of a launch file that is not evaluated.
+
+    Args:
+        data: The report, with `code`, `name` and `text`.
+    """
+    words, known = _LEFT_OUT.get(str(data.get("code")), ("something", None))
+    name, text = (value if isinstance(value, str) else "" for value in (data.get("name"), data.get("text")))
+    if known is not None and not known.fullmatch(name):
+        name = quoted(name)
+    return words.format(name=name, text=quoted(text))
+
+
 _WAYS = {way.value: way for way in StartWay}
 _NAME_CHARACTERS, _HIDDEN = 100, 20
 #: The dotted name of a module. Folder names may contain spaces, parentheses and hyphens.

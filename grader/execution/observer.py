@@ -29,7 +29,8 @@ from grader.core.trace import Endpoint, GraphSnapshot
 from grader.execution.console import TEXT_CHARACTERS, Logged
 from grader.execution.interfaces import message_class, plain_fields
 from grader.execution.padding import without_padding
-from grader.execution.service_ends import BACKGROUND_TYPES, ServiceEnds, looked
+from grader.execution.ros_names import asked, listed
+from grader.execution.service_ends import BACKGROUND_TYPES, ServiceEnds
 from grader.student_host.originals import unread_bytes, wait_until
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
@@ -66,6 +67,10 @@ class Observer:
     Args:
         domain: ROS domain to join.
         limits: Sets the largest message whose content is read.
+
+    Attributes:
+        crowded: Why not every topic can be read, as a phrase: one has more types than nodes could agree on. Empty
+            otherwise.
     """
 
     def __init__(self, domain: int, limits: Limits) -> None:
@@ -82,6 +87,7 @@ class Observer:
         self.services = ServiceEnds(self.node)
         self._broken: Counter[str] = Counter()
         self._large: Counter[str] = Counter()
+        self.crowded = ""
 
     def close(self) -> None:
         """Leave the graph."""
@@ -121,14 +127,19 @@ class Observer:
         names = self._names_in_graph(existing)
         nodes = sorted({_full_name(name, space) for name, space in names})
         offered = self.services.graph(sorted(set(names))) if services else ()
-        ends = []
-        for topic, _ in sorted(self.node.get_topic_names_and_types(no_demangle=False)):
-            if topic in BACKGROUND:
-                continue
-            ends += [self._endpoint("publisher", topic, info) for info in self.node.get_publishers_info_by_topic(topic)]
-            ends += [
-                self._endpoint("subscription", topic, info) for info in self.node.get_subscriptions_info_by_topic(topic)
-            ]
+        looks = {
+            "publisher": self.node.get_publishers_info_by_topic,
+            "subscription": self.node.get_subscriptions_info_by_topic,
+        }
+        topics: list[tuple[str, list[str]]] = listed(self.node.get_topic_names_and_types)
+        nobody: list[Any] = []
+        ends = [
+            self._endpoint(kind, topic, info)
+            for topic, _ in sorted(topics)
+            if topic not in BACKGROUND
+            for kind, look in looks.items()
+            for info in asked(look, topic, nothing=nobody)
+        ]
         students = [e for e in ends if e.participant >= 0 and UNKNOWN_NODE not in e.node]
         return GraphSnapshot(t_ns, tuple(nodes), tuple(sorted(students, key=_endpoint_order)), offered)
 
@@ -172,7 +183,10 @@ class Observer:
                 continue
             reliability = ReliabilityPolicy.RELIABLE if key[2] else ReliabilityPolicy.BEST_EFFORT
             qos = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=DEPTH, reliability=reliability)
-            self._readers[key] = self._make(_subscribing(message, end.topic, qos))
+            try:
+                self._readers[key] = self._make(_subscribing(message, end.topic, qos))
+            except rclpy_implementation.RCLError:
+                self.crowded = f"more than {PARTICIPANTS} types of messages on {end.topic[:NAME_CHARACTERS]}"
         return unknown
 
     def reads(self, topic: str) -> bool:
@@ -198,28 +212,33 @@ class Observer:
         return [_full_name(*pair) for pair in self._names_in_graph(existing)]
 
     def _names_in_graph(self, existing: Collection[str] | None) -> list[tuple[str, str]]:
-        pairs = [p for p in self.node.get_node_names_and_namespaces() if p[0] not in {*self._names, UNKNOWN_NODE}]
+        known: list[tuple[str, str]] = listed(self.node.get_node_names_and_namespaces)
+        pairs = [p for p in known if p[0] not in {*self._names, UNKNOWN_NODE}]
         return [p for p in pairs if existing is None or _full_name(*p) in existing or self._publishes_anything(*p)]
 
     def _publishes_anything(self, name: str, namespace: str) -> bool:
-        return bool(looked(self.node.get_publisher_names_and_types_by_node, name, namespace))
+        return bool(asked(self.node.get_publisher_names_and_types_by_node, name, namespace, nothing=[]))
 
     def ends_of(self, kind: str, service: str) -> int:
         """Return the number of servers (`service`) or clients (`client`) of a service, including the grader's own."""
         count = self.node.count_services if kind == "service" else self.node.count_clients
-        return int(count(service))
+        return int(asked(count, service, nothing=0))
 
     def counts(self) -> dict[str, int]:
         """Count the endpoints and nodes in the graph by name, as any node sees them, including the grader's own."""
-        found = Counter(f"node {_full_name(*pair)}" for pair in self.node.get_node_names_and_namespaces())
-        for topic, _ in self.node.get_topic_names_and_types():
+        node = self.node
+        nodes: list[tuple[str, str]] = listed(node.get_node_names_and_namespaces)
+        topics: list[tuple[str, list[str]]] = listed(node.get_topic_names_and_types)
+        services: list[tuple[str, list[str]]] = listed(node.get_service_names_and_types)
+        found = Counter(f"node {_full_name(*pair)}" for pair in nodes)
+        for topic, _ in topics:
             if topic not in BACKGROUND:
-                found[f"publisher {topic}"] = self.node.count_publishers(topic)
-                found[f"subscription {topic}"] = self.node.count_subscribers(topic)
-        for service, types in self.node.get_service_names_and_types():
+                found[f"publisher {topic}"] = asked(node.count_publishers, topic, nothing=0)
+                found[f"subscription {topic}"] = asked(node.count_subscribers, topic, nothing=0)
+        for service, types in services:
             if not types[0].startswith(BACKGROUND_TYPES):
-                found[f"service {service}"] = self.node.count_services(service)
-                found[f"client {service}"] = self.node.count_clients(service)
+                found[f"service {service}"] = asked(node.count_services, service, nothing=0)
+                found[f"client {service}"] = asked(node.count_clients, service, nothing=0)
         return {name: count for name, count in found.items() if count}
 
     def publishers_matched(self, topic: str, interface: str, *, reliable: bool) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import random
 from collections.abc import Iterable, Iterator, Mapping
 from shlex import quote
@@ -10,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
+from grader.core.projects import Project
+from grader.core.quantities import NS_PER_S
 from grader.core.scenario import (
     ActionGoal,
     Between,
@@ -44,10 +47,15 @@ from grader.execution.exchanges import (
     plan_server,
     plan_simulation,
 )
+from grader.student_host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
+from grader.student_host.packages import layout_of
 
 if TYPE_CHECKING:
     from grader.core.submission import Submission
 
+#: The most characters of what a process is started with, as JSON. It is handed over as one argument of a program, for
+#: which Linux allows 128 KiB (MAX_ARG_STRLEN, execve(2)); a large parameter file of a course has 10.
+MOST_START_CHARACTERS = 64 << 10
 #: A number to publish, or the limit it lies just above (1) or just below (-1) in the student's own type.
 PlannedNumber = tuple[float, int]
 
@@ -108,6 +116,14 @@ class PlannedStart:
         ros = [*map(quote, self.ros_arguments), *files]
         return " ".join([*map(quote, self.arguments), *(["--ros-args", *ros] if ros else [])])
 
+    @property
+    def problem(self) -> str:
+        """Why no process can be started with this, as a phrase; empty if one can."""
+        given = (self.arguments, self.ros_arguments, self.parameter_files)
+        most = f"{MOST_START_CHARACTERS >> 10} KiB"
+        long = len(json.dumps(given)) > MOST_START_CHARACTERS
+        return f"stopped: its arguments and parameter files have more than {most}" if long else ""
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -125,6 +141,7 @@ class Plan:
         recordings: Recordings to play.
         clock: `virtual` or `wall`.
         limits: How much the processes may use, and how much is recorded.
+        charged: Whether time passes on the virtual clock while a program works.
         stop_when_unfit: Whether a run on the virtual clock may end as soon as virtual time is known to be unsuitable.
         messages: Message streams.
         servers: Service servers.
@@ -141,8 +158,12 @@ class Plan:
         publishers: The publishers that bare processes are expected to create; the grader subscribes before they do.
         interfaces: Folders of modules of interface packages that are not installed, for the nodes and the grader alike;
             each is in the folder of what was built with it.
+        epoch_ns: When virtual time starts, in nanoseconds since 1970.
+        uptime_ns: What monotonic clocks show then.
+        hash_seed: The PYTHONHASHSEED of the processes; only with 0 they can be forks of one process.
         prefixes: The AMENT_PREFIX_PATH of the nodes, first the folder of what the submission's packages share; empty if
             it has none.
+        projects: The ROS packages of the submission, outermost first.
     """
 
     scenario: str
@@ -170,15 +191,32 @@ class Plan:
     publishers: tuple[Endpoint, ...] = ()
     interfaces: tuple[str, ...] = ()
     prefixes: tuple[str, ...] = ()
+    epoch_ns: int = EPOCH_NS
+    uptime_ns: int = UPTIME_NS
+    hash_seed: int = 0
     starts: tuple[PlannedStart, ...] = ()
+    projects: tuple[Project, ...] = ()
+    charged: bool = False
 
     def start_of(self, process: str) -> PlannedStart:
         """Return what a process is started with."""
         return next((start for start in self.starts if start.process == process), PlannedStart(process))
 
+    def scripts_of(self, file: str) -> tuple[tuple[str, str, str], ...]:
+        """Return the console scripts of the package that a file is in; none if it is in none."""
+        package = layout_of(self.root, file).package
+        return next((project.scripts for project in self.projects if project.folder == package), ())
+
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage
-    exercise: str, scenario: Scenario, submission: Submission, *, seed: int, odometry: Odometry | None, clock: str
+    exercise: str,
+    scenario: Scenario,
+    submission: Submission,
+    *,
+    seed: int,
+    odometry: Odometry | None,
+    clock: str,
+    own_hashes: bool = False,
 ) -> Plan:
     """Plan a scenario by drawing every random value in it.
 
@@ -189,6 +227,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         seed: Determines every drawn value, together with the exercise and the scenario.
         odometry: The recording, if the scenario plays one.
         clock: `virtual` or `wall`.
+        own_hashes: Whether the hashes of texts in the processes are drawn too, because the order of a set may matter.
     """
     purposes = ("stimuli", exercise, scenario.id)
     # each stimulus has its own source of randomness: adding one does not change the others
@@ -214,6 +253,9 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         numbers=numbers,
         recordings=recordings,
         clock=clock,
+        epoch_ns=EPOCH_NS + _drawn(EPOCH_SPAN_S, seed, "epoch") * NS_PER_S,
+        uptime_ns=UPTIME_NS + _drawn(UPTIME_SPAN_S, seed, "uptime") * NS_PER_S,
+        hash_seed=1 + _drawn(_HASH_SEEDS, seed, "hashes", exercise, scenario.id) if own_hashes else 0,
         limits=scenario.limits,
         messages=tuple(plan_messages(s, source) for s, source in drawn if isinstance(s, MessageStream)),
         servers=tuple(plan_server(s, source) for s, source in drawn if isinstance(s, ServiceServer)),
@@ -224,6 +266,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         may_exit=scenario.may_exit,
         shutdown_ns=scenario.shutdown_ns,
         starts=tuple(start for name in scenario.processes if (start := _start(name, scenario, submission)) is not None),
+        projects=submission.projects,
     )
 
 
@@ -284,6 +327,14 @@ def derive(seed: int, *purpose: str) -> str:
     """Derive 64 hex digits from a seed and a purpose; neither can be recovered from them."""
     text = "/".join((str(seed), *purpose))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+#: PYTHONHASHSEED is at most this; 0 would give every process the same hashes.
+_HASH_SEEDS = 2**32 - 1
+
+
+def _drawn(below: int, seed: int, *purpose: str) -> int:
+    return int(derive(seed, *purpose)[:16], 16) % below
 
 
 def _numbers(stream: NumberStream, draw: random.Random, own: random.Random, until_ns: int) -> PlannedNumbers:

@@ -23,11 +23,12 @@ class RealTimeBudget:
 
     Args:
         seconds: Size of the budget.
+        spent_s: How much of it was spent before.
     """
 
-    def __init__(self, seconds: float = FOREVER_S) -> None:
+    def __init__(self, seconds: float = FOREVER_S, *, spent_s: float = 0.0) -> None:
         self._total_ns = round(seconds * NS_PER_S)
-        self._started_ns = time.monotonic_ns()
+        self._started_ns = time.monotonic_ns() - round(spent_s * NS_PER_S)
         self._real_ns = self._starved_ns = 0
         self._lock = threading.Lock()
 

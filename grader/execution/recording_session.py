@@ -15,7 +15,8 @@ from grader.core.dataclass import dataclass
 from grader.core.trace import Trace
 from grader.execution.byte_code import compile_own
 from grader.execution.domains import private_domains, shared_domains
-from grader.execution.real_time_budget import FOREVER_S, RealTimeBudget
+from grader.execution.pace import keeps_pace
+from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.choose import choose_isolation
 from grader.execution.sandbox.protocol import Isolation
@@ -31,6 +32,14 @@ MORE_ALONE, MORE_IN_CLASS = 3, 1
 MOST_WORKERS = 6
 #: The values of `--clock`: `auto` is virtual time, with the wall clock where virtual time is unsuitable.
 VIRTUAL, WALL, AUTO = "virtual", "wall", "auto"
+
+#: The reason for the wall clock where a node is slower than it seems in virtual time.
+DRIFTS = "the node pauses after its work, so that virtual time would hide how slow it is"
+#: What readers are told where the machine was too busy to tell that on the wall clock.
+CHARGED_NOTE = "the machine was too busy for the wall clock: the measured time of the nodes' work was counted instead"
+#: Nodes that waited for a processor for more than this share of the time are slower than on an idle machine, on which
+#: they wait for less than 1 %.
+HELD_UP_SHARE = 0.03
 
 Key = TypeVar("Key", bound=Hashable)
 
@@ -60,42 +69,67 @@ class RecordingSession:
         progress: Callable[[str], None],
         finished: Callable[[Key, Trace], None] | None = None,
         *,
-        budget_s: float = FOREVER_S,
+        budget: RealTimeBudget | None = None,
         under_way: Callable[[], None] = lambda: None,
     ) -> dict[Key, Trace]:
         """Record jobs and return their traces, in the same order.
 
         With `auto`, a job that virtual time does not suit is recorded again on the wall clock. These jobs run one at a
-        time, because parallel ones would disturb each other.
+        time, because parallel ones would disturb each other. Where the work of a node may slow it down, a recording in
+        virtual time that counts this work decides whether the wall clock is needed, and takes its place if the machine
+        is too busy for it.
 
         Args:
             jobs: Planned on the virtual clock, or on the wall clock for `wall`.
             clock: `virtual`, `wall` or `auto`.
             progress: Called with the title of each job that starts.
             finished: Called with each trace once it is final, while others are still being recorded.
-            budget_s: Real time that all jobs may take together.
+            budget: Real time that all jobs may take together; None for any.
             under_way: Called once while jobs are being recorded, for work that need not wait for them.
         """
         from grader.execution.unrunnable import trace_without_run  # noqa: PLC0415 - after a worker has been started
 
-        budget = RealTimeBudget(budget_s)
+        budget = budget or RealTimeBudget()
         known = {key: trace for key, job in jobs.items() if (trace := trace_without_run(job.plan)) is not None}
         to_run = {key: job for key, job in jobs.items() if key not in known}
         first = [Job(job.title, replace(job.plan, stop_when_unfit=clock == AUTO), budget) for job in to_run.values()]
         traces: dict[Key, Trace] = {}
         recorded = zip(to_run, self.recorder.each(first, progress), strict=True)
         under_way()
+
+        def tell(key: Key, trace: Trace) -> None:
+            traces[key] = trace
+            if finished is not None:
+                finished(key, trace)
+
         for key, trace in chain(known.items(), recorded):
             traces[key] = trace
-            if finished is not None and not _unfit(trace, clock):
-                finished(key, trace)
+            if not (_unfit(trace, clock) or _doubtful(trace, clock)):
+                tell(key, trace)
+        doubtful = {key: jobs[key] for key, trace in traces.items() if _doubtful(trace, clock)}
+        charged = self._charged(doubtful, budget, progress)
+        for key, trace in charged.items():
+            if keeps_pace(traces[key], trace):
+                tell(key, traces[key])
+            else:
+                traces[key] = replace(traces[key], clock_reason=DRIFTS)
         for key in [key for key, trace in traces.items() if _unfit(trace, clock)]:
             again = Job(f"{jobs[key].title}, on the wall clock", replace(jobs[key].plan, clock=WALL), budget)
-            repeated = self.recorder.record([again], progress)[0]
-            traces[key] = replace(repeated, clock_reason=traces[key].clock_reason)
-            if finished is not None:
-                finished(key, traces[key])
+            repeated = replace(self.recorder.record([again], progress)[0], clock_reason=traces[key].clock_reason)
+            if traces[key].may_drift and _was_held_up(repeated):
+                charged.update(self._charged({key: jobs[key]} if key not in charged else {}, budget, progress))
+                if not (charged[key].clock_reason or charged[key].harness_problem):
+                    repeated = replace(charged[key], notes=(*charged[key].notes, CHARGED_NOTE))
+            tell(key, repeated)
         return {key: traces[key] for key in jobs}
+
+    def _charged(
+        self, jobs: Mapping[Key, Job], budget: RealTimeBudget, progress: Callable[[str], None]
+    ) -> dict[Key, Trace]:
+        """Record jobs once more in virtual time, in which time now passes while nodes work."""
+        plans = {key: replace(job.plan, charged=True, stop_when_unfit=True) for key, job in jobs.items()}
+        again = [Job(f"{jobs[key].title}, with the time of its work", plan, budget) for key, plan in plans.items()]
+        return dict(zip(plans, self.recorder.record(again, progress), strict=True)) if again else {}
 
 
 def workers_for(processors: int, more: int = MORE_ALONE) -> int:
@@ -104,8 +138,23 @@ def workers_for(processors: int, more: int = MORE_ALONE) -> int:
 
 
 def _unfit(trace: Trace, clock: str) -> bool:
-    """Return whether a first recording has to be repeated on the wall clock."""
-    return clock == AUTO and bool(trace.clock_reason) and not trace.harness_problem
+    """Return whether a first recording has to be repeated on the wall clock.
+
+    A failure of the grader's own code that makes virtual time unsuitable is not one of the wall clock, where little of
+    that code runs.
+    """
+    failed = trace.harness_problem not in ("", trace.clock_reason)
+    return clock == AUTO and bool(trace.clock_reason) and not failed
+
+
+def _doubtful(trace: Trace, clock: str) -> bool:
+    """Return whether only another recording can tell that virtual time suits the nodes."""
+    return clock == AUTO and trace.may_drift and not trace.clock_reason and not trace.harness_problem
+
+
+def _was_held_up(trace: Trace) -> bool:
+    """Return whether a recording on the wall clock shows how busy the machine was, more than how fast the nodes are."""
+    return bool(trace.harness_problem) or trace.most_starved_ns > HELD_UP_SHARE * trace.stop_ns
 
 
 @contextmanager

@@ -1,7 +1,8 @@
 """Monitors, in the worker, what students' processes use; kills a process that reaches a limit and names the limit.
 
 The kernel's own limits apply to the address space and processor time of single processes. They miss the sum of several
-processes, and they count memory that is only mapped. The monitor adds up real usage. It notices a limit with a delay of
+processes and the kernel's memory in sockets and pipes, and they count memory that is only mapped. The monitor adds up
+real usage. It notices a limit with a delay of
 one polling interval; the kernel's limits remain as a second line of defence.
 """
 
@@ -17,8 +18,18 @@ from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.quantities import MIB, size
 from grader.core.trace import ClockKind, Trace
+from grader.execution.socket_memory import MANY_DESCRIPTORS, Held, SocketMemory, descriptors
 from grader.execution.student_process import NodeProcess
-from grader.execution.usage import Usage, families, scratch_names, threads_starved_ns, usage
+from grader.execution.usage import (
+    FULL_BYTES,
+    FULL_CODE,
+    Usage,
+    families,
+    last_pid,
+    scratch_names,
+    threads_starved_ns,
+    usage,
+)
 
 #: The polling interval, and the number of polls between two searches for new child processes.
 LOOK_S = 0.025
@@ -28,8 +39,15 @@ SEARCH_EVERY = 10
 WRAPPERS = 16
 #: The most files and folders in one scratch folder; an ordinary node creates about a dozen.
 MOST_NAMES = 10_000
-#: How much memory the worker may use beyond its size at the start: received messages that were not yet taken.
-UNREAD_BYTES = 512 * MIB
+#: The most sockets and pipes of a node, which has 12 of both usually: four nodes together stay below the number of
+#: pipes that are full-sized for an ordinary user (`fs.pipe-user-pages-soft`). The most memory in them: the kernel takes
+#: it from what all programs of the machine may have (`net.ipv4.udp_mem`, `tcp_mem`).
+MOST_SOCKETS, MOST_PIPES, IN_SOCKETS_BYTES = 500, 250, 128 * MIB
+#: The number of polls between two looks at connections of TCP, if there are any.
+TCP_EVERY = 4
+#: How much memory the worker may use beyond its size at the start: what it has recorded, which takes 160 MiB at most,
+#: and received messages that were not yet taken.
+UNREAD_BYTES = 224 * MIB
 #: If real time runs out after the nodes spent more than STARVED_SHARE of it waiting for a processor, the machine was
 #: too busy; but not if the nodes themselves used more than OWN_SHARE of all processor time.
 STARVED_SHARE, OWN_SHARE = 0.25, 0.5
@@ -47,6 +65,10 @@ class Budget:
     left_ns: int
     words: str
 
+    def after(self, started_ns: int) -> Budget:
+        """Return what is left of it if it has been in use since a reading of `time.monotonic_ns`."""
+        return replace(self, left_ns=self.left_ns - (time.monotonic_ns() - started_ns))
+
 
 class ResourceMonitor:
     """A context manager with a thread that polls the usage of processes, next to the runner's thread.
@@ -55,13 +77,24 @@ class ResourceMonitor:
         students: The processes to monitor.
         limits: Limits of each process.
         budget: Real time that is left for the submission, if it is limited.
+        shares_network: Whether other programs of the machine use the network of the processes.
     """
 
-    def __init__(self, students: Sequence[NodeProcess], limits: Limits, budget: Budget | None = None) -> None:
+    def __init__(
+        self,
+        students: Sequence[NodeProcess],
+        limits: Limits,
+        budget: Budget | None = None,
+        *,
+        shares_network: bool = False,
+    ) -> None:
         self._students = students
         self._limits = limits
         self._budget = budget
         self._families: dict[int, set[int]] = {}
+        self._sockets = SocketMemory(shared=shares_network)
+        self._held: dict[int, Held] = {}
+        self._last_pid = ""
         self._started_ns = time.monotonic_ns()
         self._own_bytes = usage([os.getpid()]).memory_bytes
         self._own_ns = time.process_time_ns()
@@ -84,10 +117,13 @@ class ResourceMonitor:
         if trace.clock is ClockKind.WALL:
             self._look_for_waiting()
             trace = replace(trace, most_starved_ns=self._most_starved_ns if self.starved_ns else 0)
-        if not self._starved or trace.harness_problem:
-            return trace
-        problem = "the machine was too busy: the nodes waited for a processor until their time was over"
-        return replace(trace, harness_problem=problem)
+        return replace(trace, harness_problem=trace.harness_problem or self.problem)
+
+    @property
+    def problem(self) -> str:
+        """Why the end of the time is not the nodes' fault; empty if it is, or if there is time left."""
+        busy = "the machine was too busy: the nodes waited for a processor until their time was over"
+        return busy if self._starved else ""
 
     @property
     def real_ns(self) -> int:
@@ -105,18 +141,38 @@ class ResourceMonitor:
         looks = 0
         while not self._over.wait(LOOK_S):
             if looks % SEARCH_EVERY == 0:
-                found = families([root for s in self._students for root in s.roots])
-                self._families = {
-                    s.process.pid: set().union(*(found[root] for root in s.roots)) for s in self._students
-                }
+                self._look_for_children()
                 self._look_for_names()
                 self._look_for_waiting()
+            self._look_at_sockets(looks)
             looks += 1
             self._look()
 
+    def _look_at_sockets(self, looks: int) -> None:
+        """Find out what the processes hold in sockets and pipes, if it may be much."""
+        many, connections = self._sockets.may_be_much()
+        tcp = connections and looks % TCP_EVERY == 0
+        pids = [pid for family in self._families.values() for pid in family]
+        if many or tcp or (looks % SEARCH_EVERY == 0 and descriptors(pids) > MANY_DESCRIPTORS):
+            found = self._sockets.look(self._families.values(), tcp=connections)
+            self._held = dict(zip(self._families, found, strict=True))
+        elif not connections:
+            self._held = {}
+
+    def _look_for_children(self) -> None:
+        """Find the families of processes; they are as before if nothing has been started since."""
+        last = last_pid()  # before the search, which may miss what is started meanwhile
+        if not last or last != self._last_pid:
+            found = families([root for s in self._students for root in s.roots])
+            self._families = {s.process.pid: set().union(*(found[root] for root in s.roots)) for s in self._students}
+            self._last_pid = last
+
     def _look(self) -> None:
         for student in self._students:
+            held = self._held.get(student.process.pid, Held())
             used = usage(self._families.get(student.process.pid, ()))
+            used = replace(used, memory_bytes=used.memory_bytes + held.memory_bytes)
+            self._hold(student, _held_too_much(held))
             student.most_threads = max(student.most_threads, used.threads)
             student.most_bytes = max(student.most_bytes, used.memory_bytes)
             student.used_ns = max(student.used_ns, used.processor_ns)
@@ -126,7 +182,10 @@ class ResourceMonitor:
 
     def _look_at_itself(self) -> None:
         """Stop all processes at a limit of the worker itself, which only the nodes' messages can cause."""
-        filled_bytes = usage([os.getpid()]).memory_bytes - self._own_bytes
+        own_bytes = usage([os.getpid()]).memory_bytes
+        if own_bytes > FULL_BYTES:
+            os._exit(FULL_CODE)  # the middleware may go on filling it when the nodes have ended
+        filled_bytes = own_bytes - self._own_bytes
         if filled_bytes > UNREAD_BYTES:
             self._hold_all(f"stopped at {size(UNREAD_BYTES)} of messages that were under way at once")
         if time.process_time_ns() - self._own_ns > self._limits.processor_ns:
@@ -144,7 +203,7 @@ class ResourceMonitor:
     def _look_for_waiting(self) -> None:
         pids = [pid for family in self._families.values() for pid in family]
         self._used_ns = max(self._used_ns, usage(pids).processor_ns)
-        waited_ns = threads_starved_ns(pids)
+        waited_ns = threads_starved_ns(pids).values()
         self._waited_ns = max(self._waited_ns, sum(waited_ns))
         self._most_starved_ns = max(self._most_starved_ns, max(waited_ns, default=0))
 
@@ -180,3 +239,14 @@ class ResourceMonitor:
     def _hold(self, student: NodeProcess, why: str) -> None:
         if why and not student.stopped:
             student.stop(why, self._families.get(student.process.pid, set()))
+
+
+def _held_too_much(held: Held) -> str:
+    """Describe the limit that sockets and pipes have reached; empty if they reached none."""
+    if held.memory_bytes > IN_SOCKETS_BYTES:
+        return f"stopped at {size(IN_SOCKETS_BYTES)} of memory in sockets and pipes"
+    if held.sockets > MOST_SOCKETS:
+        return f"stopped at {MOST_SOCKETS} open sockets"
+    if held.pipes > MOST_PIPES:
+        return f"stopped at {MOST_PIPES} open pipes"
+    return ""

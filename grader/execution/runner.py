@@ -82,8 +82,9 @@ class Runner(ABC):
             observations=self._observations(),
             notes=self._recorder.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
             starts=tuple(s.start_told for s in self._students if s.start_told is not None),
-            harness_problem=self._harness_problem(),
+            harness_problem=self._graders_fault() or self._harness_problem(),
             incomplete=self._is_incomplete(),
+            may_drift=self._may_drift(),
         )
 
     @abstractmethod
@@ -117,6 +118,14 @@ class Runner(ABC):
     def _unfit(self) -> str:
         """Return why this clock is not suitable for the nodes; empty if it is."""
         return ""
+
+    def _may_drift(self) -> bool:
+        """Return whether the work of a node may slow it down on the real clock, which this one may hide."""
+        return False
+
+    def _graders_fault(self) -> str:
+        """Return what failed in the grader's own code in the processes; empty if nothing did."""
+        return next((student.grader_failed for student in self._students if student.grader_failed), "")
 
     def _harness_problem(self) -> str:
         """Return why the recording cannot be judged; empty if it can."""

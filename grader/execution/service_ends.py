@@ -10,6 +10,7 @@ from typing import Any
 from grader.core.dataclass import dataclass
 from grader.core.trace import ServiceEnd
 from grader.execution.interfaces import interface_class
+from grader.execution.ros_names import asked
 
 #: Prefixes of the types of services that every node has.
 BACKGROUND_TYPES = ("rcl_interfaces/", "type_description_interfaces/")
@@ -122,11 +123,12 @@ class ServiceEnds:
             ("service", self._node.get_service_names_and_types_by_node),
             ("client", self._node.get_client_names_and_types_by_node),
         )
+        nothing: list[tuple[str, list[str]]] = []
         for name, space in nodes:
             for kind, look in looks:
                 found += [
                     ServiceEnd(kind, service, interface, f"{space.rstrip('/')}/{name}")
-                    for service, interfaces in looked(look, name, space)
+                    for service, interfaces in asked(look, name, space, nothing=nothing)
                     for interface in interfaces
                     if kind == "client" or not interface.startswith(BACKGROUND_TYPES)
                 ]
@@ -145,15 +147,6 @@ def _taken(take: Any, kind: Any) -> Any:
         if type(error) is not RuntimeError:
             raise
         return None
-
-
-def looked(look: Any, name: str, space: str) -> list[tuple[str, list[str]]]:
-    """Return the names and types that a query by node finds; nothing if the node is gone."""
-    try:
-        found: list[tuple[str, list[str]]] = look(name, space)
-    except Exception:  # the node is gone; rclpy's exception for that is in different modules in different releases
-        return []
-    return found
 
 
 def _nothing(request: object, response: object) -> object:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
 from itertools import islice
 from typing import Any, TypeVar
 
+from grader.core.author_files import AuthorMistake
 from grader.core.errors import HarnessError
 from grader.core.quantities import NS_PER_MS
 from grader.execution.exchanges import PlannedMessages, PlannedServer, PlannedSimulation
@@ -17,7 +19,7 @@ from grader.execution.interfaces import built, wanted_class
 from grader.execution.observer import Taken
 from grader.execution.plan import Plan
 from grader.execution.stimuli import AddServer, Advertise, Event, PublishFields, Step
-from grader.simulation.loading import guarded, made
+from grader.simulation.loading import SimulationError, begin_of, guarded, made
 from grader.simulation.participant import Moment, Output
 
 Result = TypeVar("Result")
@@ -35,7 +37,8 @@ class Simulations:
         plan: Names them, with their parameters.
 
     Raises:
-        HarnessError: A simulation cannot be made, or names a type that is unknown on this machine.
+        SimulationError: A simulation of the rubric's author cannot be made, or names a type that is unknown here.
+        HarnessError: The same of a built-in one.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -49,7 +52,10 @@ class Simulations:
     def step(self, step: Step, now: Moment) -> tuple[Event, ...]:
         """Let time pass for one simulation; return what it publishes, and its next step."""
         one = self._all[step.number]
-        return (*one.publish(one.simulation.step, self._after(now)), replace(step, t_ns=step.t_ns + one.period_ns))
+        return (
+            *one.publish("step", one.simulation.step, self._after(now)),
+            replace(step, t_ns=step.t_ns + one.period_ns),
+        )
 
     def hear(self, taken: Taken, now: Moment) -> list[Event]:
         """Hand a message of a student's node to the simulations that listen to its topic; return what they publish."""
@@ -75,18 +81,20 @@ class _Running:
         self._left = most
         self.simulation = made(planned.name, planned.path, planned.content, planned.parameters)
         self.period_ns = max(SHORTEST_NS, self.simulation.period)
-        self.hears = dict(self._call(self.simulation.hears))
-        self.serves = dict(self._call(self.simulation.serves))
+        self.hears = self._call(lambda: dict(self.simulation.hears()), "hears")
+        self.serves = self._call(lambda: dict(self.simulation.serves()), "serves")
         self._streams = {
             topic: PlannedMessages(topic, type_, 0, 0, self.period_ns, 0, best_effort=False, latched=False, values=())
-            for topic, type_ in self._call(self.simulation.publishes).items()
+            for topic, type_ in self._call(lambda: dict(self.simulation.publishes()), "publishes").items()
         }
-        for stream in self._streams.values():
-            wanted_class(stream.type, "msg", f"simulation {planned.name}, {stream.topic}")
-        for service, type_ in self.serves.items():
-            wanted_class(type_, "srv", f"simulation {planned.name}, {service}")
+        with self._blamed("publishes"):
+            for stream in self._streams.values():
+                wanted_class(stream.type, "msg", stream.topic)
+        with self._blamed("serves"):
+            for service, type_ in self.serves.items():
+                wanted_class(type_, "srv", service)
         # reproducible, and nobody can know it who does not know the seed
-        self._call(partial(self.simulation.begin, random.Random(planned.seed)))  # noqa: S311
+        self._call(partial(self.simulation.begin, random.Random(planned.seed)), "begin")  # noqa: S311
 
     def appearances(self) -> Iterator[Event]:
         for stream in self._streams.values():
@@ -95,20 +103,21 @@ class _Running:
             server = PlannedServer(service, type_, 0, 0, 0, cycle=False, answers=0, responses=())
             yield AddServer(0, server)
 
-    def publish(self, work: Callable[[Moment], Iterable[Output]], now: Moment) -> list[Event]:
-        outputs = self._call(lambda: list(islice(work(now), OUTPUTS + 1)))
-        if len(outputs) > OUTPUTS:
-            raise self._wrong(f"expected at most {OUTPUTS} messages at once, found more")
-        return [self._published(output, now) for output in outputs]
+    def publish(self, method: str, work: Callable[[Moment], Iterable[Output]], now: Moment) -> list[Event]:
+        outputs = self._call(lambda: list(islice(work(now), OUTPUTS + 1)), method)
+        with self._blamed(method):
+            if len(outputs) > OUTPUTS:
+                raise HarnessError(f"expected at most {OUTPUTS} messages at once, found more")
+            return [self._published(output, now) for output in outputs]
 
     def hear(self, taken: Taken, now: Moment) -> list[Event]:
         heard = deepcopy(taken.value)  # the trace holds the original
-        return self.publish(lambda at: self.simulation.on_message(at, taken.topic, heard), now)
+        return self.publish("on_message", lambda at: self.simulation.on_message(at, taken.topic, heard), now)
 
     def answer(self, service: str, request: Mapping[str, Any], now: Moment) -> Mapping[str, Any]:
-        fields = self._call(lambda: dict(self.simulation.on_request(now, service, request)))
-        where = f"simulation {self._planned.name}, {service}"
-        built(wanted_class(self.serves[service], "srv", where).Response, fields, where)
+        fields = self._call(lambda: dict(self.simulation.on_request(now, service, request)), "on_request")
+        with self._blamed("on_request"):
+            built(wanted_class(self.serves[service], "srv", service).Response, fields, service)
         return fields
 
     def _published(self, output: Output, now: Moment) -> PublishFields:
@@ -117,16 +126,28 @@ class _Running:
             stream = self._streams[topic]
         except (TypeError, ValueError, KeyError):
             text = f"a topic that it publishes on ({', '.join(self._streams) or 'none'}) with the fields of a message"
-            raise self._wrong(f"expected {text}, found {str(output)[:80]!r}") from None
+            raise HarnessError(f"expected {text}, found {str(output)[:80]!r}") from None
         self._left -= 1
         if self._left < 0:
-            raise self._wrong("expected fewer messages in one recording")
+            raise HarnessError("expected fewer messages in one recording")
         if not isinstance(fields, Mapping):
-            raise self._wrong(f"expected a mapping of fields for {topic}, found {str(fields)[:80]!r}")
+            raise HarnessError(f"expected a mapping of fields for {topic}, found {str(fields)[:80]!r}")
+        built(wanted_class(stream.type, "msg", topic), fields, topic)  # now, while it is known which method gave them
         return PublishFields(now.t_ns, topic, stream, fields)
 
-    def _wrong(self, text: str) -> HarnessError:
-        return HarnessError(f"simulation {self._planned.name}: {text}")
+    @contextmanager
+    def _blamed(self, method: str) -> Iterator[None]:
+        """Raise what is wrong with the values of a method as a mistake of the author, at the line where it begins."""
+        name, path = self._planned.name, self._planned.path
+        try:
+            yield
+        except HarnessError as error:
+            if not path:
+                raise HarnessError(f"simulation {name}: {error.message}") from error
+            line = begin_of(self.simulation, method, path)
+            text = f"the simulation `{name}` failed in {method}(): {error.message}"
+            raise SimulationError(AuthorMistake(path, line, text)) from error
 
-    def _call(self, work: Callable[[], Result]) -> Result:
-        return guarded(self._planned.name, self._planned.path, work)
+    def _call(self, work: Callable[[], Result], method: str) -> Result:
+        path = self._planned.path
+        return guarded(self._planned.name, path, work, begin_of(self.simulation, method, path))

@@ -19,7 +19,7 @@ from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.quantities import size
 from grader.core.trace import Fault, FaultKind, LogRecord, OutputLine, Start
-from grader.execution.ending import ended_by, exited, limit_behind
+from grader.execution.ending import ended_by, exited, graders_fault, limit_behind
 from grader.execution.notes import Places, hidden_notes, note_of, start_of
 from grader.execution.sandbox.protocol import Command
 from grader.execution.sandbox.starter import StartedProcess
@@ -42,6 +42,8 @@ REPORTS_AT_ONCE, READS_AT_ONCE = 1000, 256
 NOTES, NOTE_CHARACTERS = 100, 500
 #: The most audit events that the host reports of its program, and the maximum length of their names.
 REACHED, NAME_CHARACTERS = 20, 60
+#: Where a process with a view of files of its own has its home and its temporary files.
+OWN_FOLDER = "/tmp"  # noqa: S108
 #: How much one read takes at most, and milliseconds after which a wait for a report looks at the time.
 READ_BYTES, LOOK_MS = 1 << 16, 1000
 #: How much of the end of standard error is kept to find out why a process ended.
@@ -86,7 +88,9 @@ class NodeProcess:
         launched_by: The launch file that it comes from, with its line; empty if it comes from none.
         places: The files of the submission.
         prefix: The folder below which its packages are installed; empty if it has none.
+        own_folder: The folder of its home and its temporary files; empty if it has none.
         start_told: How its file is started, as it reported before it ran any of the student's code.
+        grader_failed: What failed in the grader's own code in the process, as it reports; empty if nothing did.
         reached: Names of audit events that its program raised, as it reports.
     """
 
@@ -120,7 +124,9 @@ class NodeProcess:
     launched_by: str = ""
     places: Places = field(default_factory=lambda: Places(None))
     prefix: str = ""
+    own_folder: str = ""
     start_told: Start | None = None
+    grader_failed: str = ""
     reached: list[str] = field(default_factory=list)
     _pending: bytes = b""
     _streams: dict[str, bytearray] = field(default_factory=lambda: {"stdout": bytearray(), "stderr": bytearray()})
@@ -245,7 +251,10 @@ class NodeProcess:
             data = json.loads(line.decode())
         except (ValueError, RecursionError):
             return None
-        return data if isinstance(data, dict) else None
+        if not isinstance(data, dict):
+            return None
+        self.grader_failed = self.grader_failed or graders_fault(self.name, data.get("fault"))
+        return data
 
     def reports(self) -> list[dict[str, Any] | None]:
         """Return the reports that have arrived, without waiting; the last one is None if the process has ended."""
@@ -351,9 +360,13 @@ class NodeProcess:
         ]
 
     def _anywhere(self, text: str) -> str:
-        """Remove the folders of the submission and of its prefix from a text, because they differ from run to run."""
+        """Remove the folders of the submission and of its prefix from a text, because they differ from run to run.
+
+        The process's own folder becomes that of the strongest tiers.
+        """
         text = text.replace(f"{self.prefix}/", "") if self.prefix else text
-        return text.replace(f"{self.root}/", "")
+        text = text.replace(f"{self.root}/", "")
+        return text.replace(self.own_folder, OWN_FOLDER) if self.own_folder else text
 
     def death(self, t_ns: int) -> Fault:
         """End a process that died or stopped reporting, and return its fault."""

@@ -24,12 +24,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.limits import Limits
-from grader.core.quantities import MIB, NS_PER_S, size
+from grader.core.quantities import NS_PER_S, size
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
 from grader.execution.codec import to_json
 from grader.execution.real_time_budget import RealTimeBudget
@@ -38,7 +39,7 @@ from grader.execution.sandbox.environment import worker_environment
 from grader.execution.sandbox.exposure import worker_view
 from grader.execution.sandbox.protocol import Isolation
 from grader.execution.sandbox.starter import starter_command
-from grader.execution.usage import families, usage
+from grader.execution.usage import FULL_BYTES, FULL_CODE, families, usage
 
 if TYPE_CHECKING:
     from grader.execution.plan import Plan
@@ -48,15 +49,28 @@ if TYPE_CHECKING:
 MARGIN_S = 60.0
 #: How long to wait for the exit code of a worker that has ended.
 END_S = 5.0
-#: A worker that uses more memory is killed, and the interval of the check. Its resource monitor should prevent this,
-#: but cannot run while the middleware deserializes a message.
-FULL_BYTES, LOOK_S = 768 * MIB, 0.1
+#: The interval at which the memory of a worker is looked at. Its resource monitor ends it at the same limit, but cannot
+#: run while the middleware deserializes a message.
+LOOK_S = 0.05
 #: The largest valid answer: this size, or this multiple of the size of the messages that may be in it.
 ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
 TRIES = 2
 MODULE = b"grader.execution.worker_main"
 #: pid, user and group of the sender of a message (`struct ucred`, unix(7)).
 _CREDENTIALS = struct.Struct("3i")
+
+
+class WorkerFailedError(HarnessError):
+    """A worker reported a failure of its own.
+
+    Args:
+        message: Description of the failure.
+        has_started: Whether any of the submission's code had started by then.
+    """
+
+    def __init__(self, message: str, *, has_started: bool) -> None:
+        super().__init__(message)
+        self.has_started = has_started
 
 
 class WorkerLostError(HarnessError):
@@ -130,14 +144,19 @@ class Worker(ABC):
             raise WorkerLostError(f"{expected} (it had filled {what})", limit=what) from error
         except EOFError as error:
             end = self._end()
-            limit = plan.limits.processor_words() if end == "SIGXCPU" else ""
+            limits = {"SIGXCPU": plan.limits.processor_words(), f"code {FULL_CODE}": f"{size(FULL_BYTES)} of memory"}
+            limit = limits.get(end, "")
             raise WorkerLostError(f"{expected} (ended by {end})", limit=limit) from error
         except (OSError, ValueError, RecursionError) as error:
             raise HarnessError(f"{expected} ({error})") from error
+        if isinstance(answer, dict) and "author_mistake" in answer:
+            self.worn = True  # the recording ended in its middle
+            return _without_recording(plan, answer["author_mistake"])
         if not isinstance(answer, dict) or "trace" not in answer:
             problem = str(answer.get("problem", "")) if isinstance(answer, dict) else ""
             lines = problem.strip().splitlines()
-            raise HarnessError(f"worker: {lines[-1] if lines else 'expected a trace, found none'}"[:600])
+            what = f"worker: {lines[-1] if lines else 'expected a trace, found none'}"[:600]
+            raise WorkerFailedError(what, has_started=isinstance(answer, dict) and answer.get("has_started") is True)
         self.worn = answer.get("worn") is True
         real_ns, starved_ns = (answer.get(name) for name in ("real_ns", "starved_ns"))
         if isinstance(real_ns, int) and isinstance(starved_ns, int):
@@ -192,6 +211,17 @@ class Worker(ABC):
     @abstractmethod
     def close(self) -> None:
         """Kill the worker and everything that it started."""
+
+
+def _without_recording(plan: Plan, mistake: Any) -> Trace:
+    """Return an empty trace with the mistake of the rubric's author; raises HarnessError if it is none."""
+    import msgspec  # noqa: PLC0415 - takes as long as the import of what reads traces
+
+    try:
+        found = msgspec.convert(mistake, AuthorMistake)
+    except msgspec.ValidationError as error:
+        raise HarnessError(f"worker: expected a mistake with file, line and text, found {error}") from error
+    return Trace(plan.scenario, ClockKind(plan.clock), stop_ns=0, observations=(), author_mistake=found)
 
 
 class ExecutedWorker(Worker):
@@ -438,6 +468,7 @@ class Recorder:
     def _recorded(self, job: Job) -> Trace:
         problem = ""
         limits: list[str] = []
+        with_submission = 0  # failures after its code had started, as far as that is known
         tries = 0
         while tries < TRIES:
             if not job.budget.left_ns:
@@ -462,6 +493,8 @@ class Recorder:
                 self._discard(worker)
                 limit, late = (error.limit, error.late) if isinstance(error, WorkerLostError) else ("", False)
                 limits += [limit] if limit else []
+                started = isinstance(error, WorkerFailedError) and error.has_started
+                with_submission += started or (isinstance(error, WorkerLostError) and not late)
                 tries += worker is None or not worker.shares or bool(limit)  # a replacement does not share its sandbox
                 if late or self._closed:
                     break
@@ -480,7 +513,10 @@ class Recorder:
                 for name, _ in job.plan.processes
             )
             return Trace(job.plan.scenario, clock, stop_ns=job.plan.duration_ns, observations=faults)
-        return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
+        suspected = with_submission >= TRIES
+        if suspected:
+            problem += f" ({with_submission} times, each time in another worker, while this submission was recorded)"
+        return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem, suspected=suspected)
 
     def _drops_place(self) -> bool:
         """Return whether a worker is not replaced until none is busy: the others go on, and a start takes long."""

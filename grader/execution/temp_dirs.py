@@ -24,6 +24,12 @@ SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - no file is created there
 TRACER_FILES = "lttng-ust-wait-*"
 
 
+#: The builds of submissions' interface packages, and how much of them is kept: a course has a few of some hundred KiB,
+#: a hostile submission makes up to 64 MiB.
+BUILDS, KEPT_BYTES = "submitted-*", 500 << 20
+#: What a file or folder takes on a disk beside its content.
+BLOCK_BYTES = 4096
+
 #: The folder of the grader in folders that are a user's own.
 OWN = "rclpy-grader"
 
@@ -52,6 +58,37 @@ def kept_interfaces() -> Path | None:
     with contextlib.suppress(OSError):
         place.mkdir(mode=0o755, exist_ok=True)
     return place if place.is_dir() else None
+
+
+def make_room(place: Path, *, keep: Path) -> list[str]:
+    """Remove the oldest builds of submissions' interface packages beyond `KEPT_BYTES`, and return their names.
+
+    Only folders that `BUILDS` matches are removed; what a run uses, it has copied.
+
+    Args:
+        place: The folder that keeps what was built.
+        keep: The build that was just made.
+    """
+    found = [(path.lstat().st_mtime, size_on_disk(path), path) for path in place.glob(BUILDS) if path != keep]
+    left = KEPT_BYTES - (size_on_disk(keep) if keep.is_dir() else 0)
+    removed = []
+    for _, used, path in sorted(found, reverse=True):
+        left -= used
+        if left < 0:
+            _remove(path)
+            removed.append(path.name)
+    return removed
+
+
+def size_on_disk(folder: Path) -> int:
+    """Return the size of all files in a folder, with one block for each file and folder; in bytes."""
+    total = 0
+    for here, _, files in os.walk(folder):
+        total += BLOCK_BYTES
+        for file in files:
+            with contextlib.suppress(OSError):
+                total += BLOCK_BYTES + Path(here, file).lstat().st_size
+    return total
 
 
 @contextmanager

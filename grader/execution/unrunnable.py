@@ -1,11 +1,11 @@
-"""Finds scenarios that need no run, because Python can compile none of their files or there is nothing in them."""
+"""Finds scenarios that need no run: Python can compile none of their files, they are empty, or given too much."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from grader.core.scenario import is_launch_file
-from grader.core.trace import ClockKind, Fault, GraphSnapshot, Mark, Start, StartWay, Trace
+from grader.core.trace import ClockKind, Fault, FaultKind, GraphSnapshot, Mark, Start, StartWay, Trace
 from grader.execution.ending import ending, reported_fault
 from grader.execution.inert import is_inert, read
 from grader.execution.notes import Places
@@ -17,6 +17,10 @@ def trace_without_run(plan: Plan) -> Trace | None:
     """Return what a run of the plan would record of its processes; None if any of them has to be run."""
     places = Places(Path(plan.root))
     starts_ns = dict(plan.starts_ns)
+    long = [(name, problem) for name, _ in plan.processes if (problem := plan.start_of(name).problem)]
+    if long:
+        faults = tuple(Fault(starts_ns.get(name, 0), name, FaultKind.KILLED, problem) for name, problem in long)
+        return Trace(plan.scenario, ClockKind(plan.clock), plan.duration_ns, faults)
     ends: list[Fault | Mark] = []
     starts: list[Start] = []
     for name, file in plan.processes:

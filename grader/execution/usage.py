@@ -6,8 +6,11 @@ import os
 from collections.abc import Collection, Iterable
 
 from grader.core.dataclass import dataclass
-from grader.core.quantities import NS_PER_S
+from grader.core.quantities import MIB, NS_PER_S
 
+#: A worker that uses more memory, without pages mapped from files, is ended, and the exit code that says so. The most
+#: that is recorded takes 200 MiB; a gap of millions of messages makes Fast DDS fill 400 MiB a second.
+FULL_BYTES, FULL_CODE = 300 * MIB, 77
 #: The writable folders of a sandbox that has its own file systems.
 FOLDERS = ("tmp", "dev/shm")
 
@@ -87,15 +90,23 @@ def families(roots: Collection[int]) -> dict[int, set[int]]:
     return found
 
 
+def last_pid() -> str:
+    """Return the pid that the kernel gave last, to a process or a thread; empty if it does not say.
+
+    As long as it stays the same, no process has been started that this process could see: proc_loadavg(5).
+    """
+    return _read("/proc/loadavg").rpartition(b" ")[2].strip().decode("ascii")
+
+
 def innermost(root: int) -> int:
     """Return the last process in a chain of wrapper processes, each of which has one child."""
     pids = {pid: int(fields[PARENT]) for pid in families([root])[root] if (fields := _stat(pid))}
     return next((pid for pid in pids if pid not in pids.values()), root)
 
 
-def threads_starved_ns(pids: Iterable[int]) -> list[int]:
+def threads_starved_ns(pids: Iterable[int]) -> dict[str, int]:
     """Return how long each thread of processes was ready to run but waited for a processor, in nanoseconds."""
-    return [thread_starved_ns(pid, thread) for pid in pids for thread in _names(f"/proc/{pid}/task")]
+    return {thread: thread_starved_ns(pid, thread) for pid in pids for thread in _names(f"/proc/{pid}/task")}
 
 
 def thread_starved_ns(pid: int, thread: int | str) -> int:

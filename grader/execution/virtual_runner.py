@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Observation, Offer
 from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, readers_of
 from grader.execution.ending import ending
@@ -24,14 +25,13 @@ from grader.execution.topic_peers import VirtualTopicPeers
 from grader.execution.trace_recorder import NAME_CHARACTERS, OFFERS
 from grader.execution.workload import Workload
 
-#: Start of the hosts' virtual time: 2026-01-01 00:00:00 UTC, the same as in `grader/student_host/clock.py`.
-EPOCH_NS = 1_767_225_600_000_000_000
-#: The most steps of one scenario; more end it.
-STEPS = 400_000
+#: The most steps at once, and how many more may come with each second of virtual time; more end the scenario. Nodes
+#: that rest need far fewer: ten with timers of 100 Hz that hear each other take some thousand a second.
+STEPS, STEPS_HZ = 400_000, 10_000
 #: The host never sends more reports before it waits or ends, and never reports more endpoints and parameters.
 MOST_REPORTS, CLAIMS = 10_000, 1_000
-#: Nodes may take messages so often without resting in between. After HOPS, each time also takes as long as a message
-#: needs between two processes; after MOST_HOPS they answer each other without end, and the run is over.
+#: Nodes may take messages so often while none of them lets time pass. After HOPS, each time also takes as long as a
+#: message needs between two processes; after MOST_HOPS they answer each other without end, and the run is over.
 HOPS, HOP_NS, MOST_HOPS = 200, 250_000, 4_000
 #: Reasons for recording on the wall clock.
 THREADS = "the node's threads wait for each other without blocking"
@@ -60,7 +60,7 @@ class VirtualRunner(Runner):
         return self._now_ns
 
     def _clock_ns(self, now_ns: int) -> int:
-        return EPOCH_NS + now_ns
+        return self._plan.epoch_ns + now_ns
 
     def _begin(self) -> None:
         self._play(phase="before")
@@ -75,7 +75,13 @@ class VirtualRunner(Runner):
         return self._now_ns
 
     def _unfit(self) -> str:
-        return unfit(self._students, self._recorder.observations, full=bool(self._recorder.full))
+        return self._graders_fault() or unfit(
+            self._students, self._recorder.observations, full=bool(self._recorder.full)
+        )
+
+    def _may_drift(self) -> bool:
+        drifting = any(s.workload is not None and s.workload.delay.may_drift for s in self._students)
+        return drifting and not self._recorder.full
 
     def _is_incomplete(self) -> bool:
         return self._discovery.patience.has_lost or self._has_lost
@@ -134,10 +140,10 @@ class VirtualRunner(Runner):
         if self._starts_ns.pop(student.name, 0):
             self._recorder.add(Mark(self._now_ns, "process_starts", student.name))
         self._free_until_ns = self._quiet_until(student)
-        free_ns = EPOCH_NS + self._free_until_ns
-        answer = {"now_ns": EPOCH_NS + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals}
+        free_ns = self._plan.epoch_ns + self._free_until_ns
+        answer = {"now_ns": self._plan.epoch_ns + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals}
         workload = student.measured(self._now_ns)
-        workload.begin(self._now_ns)
+        workload.begin(self._now_ns, arrivals=bool(arrivals))
         student.tell({**answer, "interrupt": True} if student.stop_signalled and not student.stopping else answer)
         student.stopping = student.stop_signalled
         self._hear(student, workload)
@@ -146,8 +152,9 @@ class VirtualRunner(Runner):
         # A flood is wrong on every clock. It runs until its limit, which is the same on every machine.
         if self._plan.stop_when_unfit and hopeless([student]) and self._unfit() and not self._floods():
             self._end_ns = self._now_ns
-        if self._steps >= STEPS:
-            self._recorder.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
+        most = STEPS + STEPS_HZ * self._now_ns // NS_PER_S
+        if self._steps >= most:
+            self._recorder.stop(self._now_ns, f"more than {most:,} wake-ups")
         self._end_if_full(self._now_ns)
 
     def _floods(self) -> bool:
@@ -174,11 +181,13 @@ class VirtualRunner(Runner):
     def _catch_up(self, report: Mapping[str, Any]) -> None:
         """Adopt the time that a process has reached on its own."""
         now_ns = report.get("now_ns")
-        if isinstance(now_ns, int):
-            self._now_ns = max(self._now_ns, min(now_ns - EPOCH_NS, self._free_until_ns))
+        if isinstance(now_ns, int) and min(now_ns - self._plan.epoch_ns, self._free_until_ns) > self._now_ns:
+            self._now_ns = min(now_ns - self._plan.epoch_ns, self._free_until_ns)
+            self._hops = 0  # it has rested
 
     def _hear(self, student: NodeProcess, workload: Workload) -> None:
         """Handle reports until a process has nothing left to do at this instant, or has ended."""
+        began_ns = self._now_ns
         for _ in range(MOST_REPORTS):
             report = student.report()
             kind = None if report is None else report.get("kind")
@@ -196,7 +205,7 @@ class VirtualRunner(Runner):
             if kind == "fault":
                 self._report_fault(student, report, self._now_ns)
                 continue
-            workload.end(counted=bool(report.get("counted")), moved=report.get("moved"))
+            workload.end(report, self._now_ns - began_ns)
             self._account(student, report)
             if kind == "exited":
                 student.unsettled = str(report.get("unsettled", ""))
@@ -208,7 +217,7 @@ class VirtualRunner(Runner):
             if report.get("leaving"):
                 self._hand_over()
             wake_ns = report.get("wake_ns")
-            student.wake_ns = wake_ns - EPOCH_NS if isinstance(wake_ns, int) else None
+            student.wake_ns = wake_ns - self._plan.epoch_ns if isinstance(wake_ns, int) else None
             return
         self._mark_dead(student)
 
@@ -306,9 +315,10 @@ class VirtualRunner(Runner):
         """Make every process wait for the messages on their way to it, because their sender is about to leave."""
         for student in self._students:
             if student.arrivals and not student.ended and student.workload is not None:
-                student.tell({"expect": student.arrivals})
-                student.arrivals, student.nudged = {}, True
-                answer = student.report()
+                expected, student.arrivals, student.nudged = student.arrivals, {}, True
+                with student.workload.beside():
+                    student.tell({"expect": expected})
+                    answer = student.report()
                 if answer is None or answer.get("kind") != "arrived":
                     self._mark_dead(student)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from typing import ClassVar
 
 from grader.core.quantities import NS_PER_MS
 from grader.core.trace import ClockKind, Mark
@@ -38,6 +39,11 @@ class WallRunner(Runner):
 
     clock = ClockKind.WALL
     clock_reason = "it was asked for"
+    #: See `PAUSE_S` and `LONGEST_PAUSE_NS`.
+    pause_s: ClassVar[float] = PAUSE_S
+    longest_pause_ns: ClassVar[int] = LONGEST_PAUSE_NS
+    #: How long after a look at the graph the next one is at the latest.
+    rarest_graph_ns: ClassVar[int] = GRAPH_EVERY_NS
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
@@ -45,6 +51,7 @@ class WallRunner(Runner):
         self._due = sorted(early, key=lambda e: e.t_ns)
         self._topics: WallTopicPeers = WallTopicPeers(observer, self._recorder)
         self._next_graph_ns = 0
+        self._graph_every_ns = GRAPH_EVERY_NS
         self._started = 0
         self.held_up_ns = 0
 
@@ -72,9 +79,9 @@ class WallRunner(Runner):
 
     def _pause(self) -> None:
         """Wait until something has arrived or is due, but not for long: many things are only noticed by looking."""
-        time.sleep(PAUSE_S)
+        time.sleep(self.pause_s)
         moments = [self._end_ns, *self._starts_ns.values(), *(event.t_ns for event in self._due[:1])]
-        left_ns = min(LONGEST_PAUSE_NS, min(moments) - self._time_ns())
+        left_ns = min(self.longest_pause_ns, min(moments) - self._time_ns())
         if left_ns > 0:
             self._observer.await_arrival(left_ns)
 
@@ -113,8 +120,9 @@ class WallRunner(Runner):
             self._record(now_ns, taken)
             self._end_if_full(now_ns)
         if now_ns >= self._next_graph_ns:
-            self._look_at_graph(now_ns)
-            self._next_graph_ns = now_ns + GRAPH_EVERY_NS
+            changed = self._look_at_graph(now_ns)
+            self._graph_every_ns = GRAPH_EVERY_NS if changed else min(2 * self._graph_every_ns, self.rarest_graph_ns)
+            self._next_graph_ns = now_ns + self._graph_every_ns
 
     def _hear(self, student: NodeProcess, now_ns: int) -> None:
         reports = [] if student.ended else student.reports()
@@ -134,13 +142,17 @@ class WallRunner(Runner):
                 student.ended = True
         self._recorder.add(*student.output(now_ns))
 
-    def _look_at_graph(self, now_ns: int) -> None:
+    def _look_at_graph(self, now_ns: int) -> bool:
+        """Record the graph, subscribe to what is new, and return whether it has changed."""
         changed = self._recorder.look(self._observer.graph(now_ns, services=True), self._observer.participants())
         self._end_if_full(now_ns)
-        if not changed:
-            return
-        self._observer.watch(self._recorder.graph.endpoints)
-        self._topics.follow_types()
+        if changed:
+            self._observer.watch(self._recorder.graph.endpoints)
+            if self._observer.crowded:
+                self._recorder.stop(now_ns, self._observer.crowded)
+                self._end_if_full(now_ns)
+            self._topics.follow_types()
+        return changed
 
     def _announce_exchange(self, kind: str, service: str, count: int) -> None:
         """Do nothing: on the real clock, processes receive messages by themselves."""

@@ -13,9 +13,9 @@ import socket
 import sys
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +27,7 @@ from grader.core.trace import ClockKind, FaultKind, Mark, Trace
 from grader.execution import late_numpy
 from grader.execution.bare_start import BareProcess, bare_arguments
 from grader.execution.beside import files_beside
-from grader.execution.codec import from_json, trace_to_json
+from grader.execution.codec import from_json, observation_to_json, trace_to_json
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.execution.launching import Launched, evaluated, expanded, renamed, unstarted
 from grader.execution.notes import Places
@@ -40,9 +40,11 @@ from grader.execution.sandbox.protocol import Isolation, StudentProcess
 from grader.execution.sandbox.start import die_with
 from grader.execution.sandbox.starter import HASH_SEED, Starter
 from grader.execution.sandbox.starter_process import StarterProcess
-from grader.execution.sandbox.tiers import isolation_from_name
+from grader.execution.sandbox.tiers import IN_PLACE, isolation_from_name
 from grader.execution.student_process import LOG_FORMAT, NodeProcess
 from grader.execution.usage import usage
+from grader.simulation.loading import SimulationError
+from grader.student_host import machine
 from grader.student_host.starter import CONNECTED
 
 if TYPE_CHECKING:
@@ -55,6 +57,8 @@ WALL_TRIES = 3
 ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 30
 #: A worker that uses more memory after a scenario is replaced; ordinary scenarios leave 30 to 50 MiB.
 WORN_BYTES = 128 * MIB
+#: What a bare process sees of the grader: the module that makes the machine look the same.
+MACHINE = Path(machine.__file__).resolve().parent
 #: In sockstat: the TCP sockets in use, and those that only wait for their port to be free again (`tw`).
 _CONNECTIONS = re.compile(r"\bTCP6?: inuse (\d+)|\btw (\d+)")
 
@@ -67,19 +71,23 @@ class Worker:
         runtime: Interpreter and ROS.
         executed: The starter for virtual time, which imports rclpy while the first plan is made; None if the tier needs
             none.
+
+    Attributes:
+        has_started: Whether the submission's code has started since the last plan came.
     """
 
     def __init__(self, isolation: Isolation, runtime: PythonRuntime, executed: StarterProcess | None) -> None:
         self._isolation = isolation
         self._runtime = runtime
         self._real_ns = self._starved_ns = 0
+        self.has_started = False
         self._starters: dict[str, Starter] = {}
         if executed is not None:
             clock = ClockKind.VIRTUAL.value
             self._starters[clock] = Starter(clock, runtime, isolation.host_seen_at, executed)
 
     def run(self, plan: Plan, domain: int, left_ns: int, budget_words: str) -> dict[str, Any]:
-        """Run one plan and return the answer.
+        """Run one plan and return the answer, with the trace as a value.
 
         Args:
             plan: The scenario.
@@ -87,6 +95,7 @@ class Worker:
             left_ns: Real time that is left for the submission.
             budget_words: The reason to give when that is used up.
         """
+        self.has_started = False
         if self._remembers_connections():
             raise HarnessError("worker: its network remembers connections of nodes that it recorded before")
         self._real_ns = self._starved_ns = 0
@@ -98,35 +107,46 @@ class Worker:
             trace = self._record(plan, domain, Budget(left_ns - spent_ns, budget_words))
             if not trace.harness_problem or time.monotonic_ns() - started_ns > min(plan.limits.wall_ns, left_ns):
                 break
-        # not in trace_to_json, because the format of evidence does not include it
-        beside = {"reached": list(trace.reached), "incomplete": trace.incomplete}
         cost = {"real_ns": self._real_ns, "starved_ns": self._starved_ns}
-        worn = is_worn(trace) or self._remembers_connections()
-        return {"trace": {**trace_to_json(trace), **beside}, **cost, "worn": worn}
+        return {"trace": trace, **cost, "worn": is_worn(trace) or self._remembers_connections()}
 
     def _remembers_connections(self) -> bool:
         """Return whether nodes have left TCP connections in the worker's own network; the grader uses none."""
         return not self._isolation.shares_network and has_connections()
 
     def _record(self, plan: Plan, domain: int, budget: Budget) -> Trace:
-        launched = {
-            name: self._evaluate(plan, name, file, domain) for name, file in plan.processes if is_launch_file(name)
-        }
+        launched: dict[str, Launched] = {}
+        started_ns = time.monotonic_ns()
+        for name, file in plan.processes:
+            if is_launch_file(name):
+                launched[name] = self._evaluate(plan, name, file, domain, budget.after(started_ns))
+        if any(made.harness_problem for made in launched.values()):
+            problem = next(made.harness_problem for made in launched.values() if made.harness_problem)
+            return Trace(plan.scenario, ClockKind(plan.clock), stop_ns=0, observations=(), harness_problem=problem)
         if any(made.fault is not None or not made.processes for made in launched.values()):
             return unstarted(plan, launched)
-        return renamed(self._record_processes(expanded(plan, launched), domain, budget), launched)
+        recorded = self._record_processes(expanded(plan, launched), domain, budget.after(started_ns))
+        return renamed(recorded, launched)
 
-    def _evaluate(self, plan: Plan, name: str, file: str, domain: int) -> Launched:
+    def _evaluate(self, plan: Plan, name: str, file: str, domain: int, budget: Budget) -> Launched:
         """Return what a launch file describes, which a process in a sandbox of its own evaluates."""
         start = plan.start_of(name)
-        told = {"launch": {"arguments": start.launch_arguments, "provided": start.provided}}
+        packages = [(project.name, project.folder) for project in plan.projects]
+        told = {
+            "launch": {"arguments": start.launch_arguments, "provided": start.provided, "packages": packages},
+        }
         students: list[NodeProcess] = []
         with ExitStack() as stack:
             stack.callback(stop, students)
             students.append(self._execute(plan, name, file, domain, told))
-            stack.enter_context(ResourceMonitor(students, plan.limits))
+            monitor = stack.enter_context(
+                ResourceMonitor(students, plan.limits, budget, shares_network=self._isolation.shares_network)
+            )
+            stack.callback(self._account, monitor)
             _await_ready(students[0])
-            return evaluated(students[0], plan)
+            self.has_started = True
+            made = evaluated(students[0], plan)
+            return made if made.fault is None else replace(made, harness_problem=monitor.problem)
 
     def _record_processes(self, plan: Plan, domain: int, budget: Budget) -> Trace:
         students: list[NodeProcess] = []
@@ -145,12 +165,15 @@ class Worker:
             for name, file in plan.processes:
                 start = self._start_bare if plan.bare else self._start
                 students.append(start(plan, name, file, domain))
-            monitor = stack.enter_context(ResourceMonitor(students, plan.limits, budget))
+            monitor = stack.enter_context(
+                ResourceMonitor(students, plan.limits, budget, shares_network=self._isolation.shares_network)
+            )
             stack.callback(self._account, monitor)
             runner = _import_runners()["bare" if plan.bare else plan.clock]
             if not plan.bare:
                 for student in students:
                     _await_ready(student)
+            self.has_started = True
             if plan.clock == ClockKind.WALL.value:
                 stack.enter_context(OutputWatch(students, observer.wake))
             trace = monitor.reviewed(runner(plan, students, observer).run())
@@ -175,8 +198,11 @@ class Worker:
             "arguments": start.arguments,
             "ros_arguments": start.ros_arguments,
             "parameter_files": start.parameter_files,
+            "scripts": plan.scripts_of(file),
             "seed": plan.host_seed,
             "clock": plan.clock,
+            "charged": plan.charged,
+            "steady_ns": plan.epoch_ns - plan.uptime_ns,
             "log_format": LOG_FORMAT,
             "python_paths": [str(p) for p in self._runtime.python_paths],
             "interfaces": plan.interfaces,
@@ -194,18 +220,21 @@ class Worker:
                 "ROS_DOMAIN_ID": str(domain),
                 "RCUTILS_COLORIZED_OUTPUT": "0",
                 **quick_discovery(self._isolation.host_seen_at, self._runtime),
-                "PYTHONHASHSEED": HASH_SEED,
+                "PYTHONHASHSEED": str(plan.hash_seed),
             },
             pass_fds=(theirs.fileno(),),
             beside=Path(plan.root, file).parent,
             copied=files_beside(Path(plan.root), file),
         )
         try:
-            if told or not self._isolation.can_fork:  # a fork of the starter has imported rclpy, which takes no part
+            # a fork of the starter has imported rclpy, which takes no part, and has the hashes of the starter
+            if told or not self._isolation.can_fork or str(plan.hash_seed) != HASH_SEED:
                 command = self._isolation.student_command(process, plan.limits)
+                environment = command.environment
                 student = NodeProcess.start(name, root, command, ours, plan.limits)
             else:
                 sandbox = self._isolation.prepared_sandbox(process, plan.limits)
+                environment = sandbox.environment
                 executed = (str(self._runtime.executable), *arguments[:-1], json.dumps({**request, "fd": CONNECTED}))
                 started = self._starter(plan.clock).start(sandbox, request, executed, theirs)
                 student = NodeProcess.started(name, root, started, ours, plan.limits)
@@ -215,6 +244,7 @@ class Worker:
         finally:
             theirs.close()
         student.file, student.places, student.arguments = file, Places(Path(plan.root)), start.words
+        student.own_folder = _own_folder(environment)
         student.launched_by, student.prefix = start.launched_by, next(iter(plan.prefixes), "")
         return student
 
@@ -227,14 +257,16 @@ class Worker:
         """Start a file without the grader's code in its process."""
         root = self._isolation.submission_seen_at or plan.root
         runtime = _with_packages(self._runtime, plan)
+        own = MACHINE if self._isolation.submission_seen_at == IN_PLACE else Path(self._isolation.host_seen_at)
+        # nothing in its process could add to sys.path, so these folders come before the installed packages
+        searched = (*runtime.python_paths, *plan.interfaces, own)
         command = self._isolation.student_command(
             StudentProcess(
-                # nothing in its process could add to sys.path, so these folders come before the installed packages
-                runtime=replace(runtime, python_paths=(*runtime.python_paths, *map(Path, plan.interfaces))),
-                host_folder=None,
+                runtime=runtime,
+                host_folder=MACHINE,  # nothing else of the grader
                 submission=Path(plan.root),
-                arguments=bare_arguments(Path(plan.root), root, file, plan.start_of(name)),
-                environment={"ROS_DOMAIN_ID": str(domain)},
+                arguments=bare_arguments(Path(plan.root), root, file, plan.start_of(name), plan.scripts_of(file)),
+                environment={"ROS_DOMAIN_ID": str(domain), "PYTHONPATH": os.pathsep.join(map(str, searched))},
                 pass_fds=(),
                 beside=Path(plan.root, file).parent,
                 copied=files_beside(Path(plan.root), file),
@@ -242,9 +274,15 @@ class Worker:
             plan.limits,
         )
         student = BareProcess.begin(name, root, command, plan.limits)
+        student.own_folder = _own_folder(command.environment)
         student.file, student.places = file, Places(Path(plan.root))
         student.prefix = next(iter(plan.prefixes), "")
         return student
+
+
+def _own_folder(environment: Mapping[str, str]) -> str:
+    """Return the folder that an environment names for temporary files; empty if it names none."""
+    return environment.get("TMPDIR", "")
 
 
 def _with_packages(runtime: PythonRuntime, plan: Plan) -> PythonRuntime:
@@ -351,12 +389,31 @@ def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
         try:
             plan: Plan = from_json(Plan, data["plan"])
             answer: dict[str, Any] = worker.run(plan, data["domain"], data["left_ns"], data["budget"])
+        except SimulationError as error:
+            answer = {"problem": error.message, "author_mistake": asdict(error.mistake)}
         except HarnessError as error:
-            answer = {"problem": error.message}
+            answer = {"problem": error.message, "has_started": worker.has_started}
         except Exception:
-            answer = {"problem": traceback.format_exc()[-4000:]}
-        answers.write(json.dumps(answer) + "\n")
+            answer = {"problem": traceback.format_exc()[-4000:], "has_started": worker.has_started}
+        answers.writelines(written(answer))
         answers.flush()
+
+
+def written(answer: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the parts of the JSON line of an answer; a large trace would take several times its memory as a whole."""
+    trace = answer.get("trace")
+    if trace is None:
+        yield json.dumps(answer) + "\n"
+        return
+    # not in trace_to_json, because the format of evidence does not include it
+    beside = {"reached": list(trace.reached), "incomplete": trace.incomplete, "may_drift": trace.may_drift}
+    head = {**trace_to_json(replace(trace, observations=())), **beside}
+    del head["observations"]
+    yield json.dumps({name: value for name, value in answer.items() if name != "trace"})[:-1]
+    yield f', "trace": {json.dumps(head)[:-1]}, "observations": ['
+    for number, observation in enumerate(trace.observations):
+        yield (", " if number else "") + json.dumps(observation_to_json(observation))
+    yield "]}}\n"
 
 
 def _own_line(lines: Sequence[int]) -> socket.socket:

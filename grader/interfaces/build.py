@@ -6,6 +6,7 @@ import importlib.util
 import json
 import os
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -19,6 +20,8 @@ from grader.interfaces.definitions import KINDS, DefinitionError, InterfacePacka
 
 _PROCESSOR_S = 120
 _MEMORY = 2 * 1024**3
+#: Exit codes of a process that the kernel ended at a limit, or for lack of memory.
+_AT_A_LIMIT = (-signal.SIGXCPU, -signal.SIGKILL, -signal.SIGXFSZ)
 _RUNTIME = Path(__file__).with_name("runtime")
 _SOURCES = (*sorted(_RUNTIME.glob("*.py")), Path(__file__).with_name("generate.py"))
 
@@ -155,6 +158,9 @@ def _generate(prefix: Path, share: Sequence[Path]) -> None:
     )
     if done.returncode == 0 and done.stdout:
         raise DefinitionError(*json.loads(done.stdout))
+    if done.returncode in _AT_A_LIMIT or done.stderr.rstrip().endswith("MemoryError"):
+        problem = "building all definitions takes too much memory or processor time"
+        raise DefinitionError("interfaces", "", 0, problem, "define fewer and smaller types")
     if done.returncode:
         last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
         raise EnvironmentFault(f"building interfaces: expected ROS's generators to work, found {last}", "grade doctor")

@@ -1,5 +1,7 @@
-"""Compares two recordings of the same plan, in virtual time and on the wall clock; pure.
+"""Compares what two recordings of a plan hold besides what checks judge, in virtual time and on the wall clock; pure.
 
+Values, rates and texts that a rubric asks for are judged by its checks: see `grader.judging.beginnings`. What is
+compared here is whatever the programs do, whether a criterion asks for it or not.
 The recording on the wall clock is shorter, misses messages sent before discovery, and comes from a shared machine.
 Differences that this, chance or the time of day can explain are ignored: rates and counts have wide bands, varying
 numbers are not compared, and events near an edge of the window are left out.
@@ -42,6 +44,7 @@ FIELDS = 64
 class Aspect(str, Enum):
     """The aspect in which two recordings differ."""
 
+    CRITERION = "criterion"
     SILENT = "silent"
     RATE = "rate"
     VALUE = "value"
@@ -58,7 +61,7 @@ class Difference:
     """A difference between what a program did on two clocks: a rate in Hz, a number, a count or a word on each.
 
     Attributes:
-        name: Topic, field, service or file.
+        name: Topic, field, service or file, or the title of a criterion.
         virtual: Result in virtual time: a rate in Hz, a number, a count, a word.
         wall: Result on the wall clock.
     """
@@ -92,11 +95,17 @@ def differences(virtual: Trace, wall: Trace, first_message_on: str = "") -> tupl
         wall: The beginning of the same plan on the wall clock, from a machine that kept up.
         first_message_on: Topic whose first message starts the observation; empty if it starts at once.
     """
-    span_ns = wall.stop_ns - _start(wall, first_message_on)
-    windows = [_Window(t, start, start + span_ns) for t in (virtual, wall) for start in [_start(t, first_message_on)]]
+    span_ns = wall.stop_ns - start_of(wall, first_message_on)
+    windows = [_Window(t, start, start + span_ns) for t in (virtual, wall) for start in [start_of(t, first_message_on)]]
     pair = (windows[0], windows[1])
     ends = tuple(_ends(*pair))
     return (*_traffic(*pair), *_answers(*pair), *_exchanges(*pair), *_logs(*pair), *_endpoints(*pair), *ends)
+
+
+def start_of(trace: Trace, first_message_on: str) -> int:
+    """Return when the observation starts: with the first message on a topic, or at once if there is none."""
+    messages = trace.messages(first_message_on) if first_message_on else ()
+    return messages[0].t_ns if messages else 0
 
 
 def sentence(difference: Difference, clock: ClockKind) -> str:
@@ -106,7 +115,9 @@ def sentence(difference: Difference, clock: ClockKind) -> str:
     where = ("in virtual time", "on the wall clock")
     if clock is ClockKind.WALL:
         where = ("beside the grader's own code", "without it")
-    if difference.aspect is Aspect.CONSTANT:
+    if difference.aspect is Aspect.CRITERION:
+        what = f'"{name}" was {first} {where[0]} and {second} {where[1]}'
+    elif difference.aspect is Aspect.CONSTANT:
         what = f"{name} varied {where[0]} and was always {second} {where[1]}"
     else:
         what = f"{name} {_WORDS[difference.aspect][0]}{first} {where[0]} and {second} {where[1]}"
@@ -116,6 +127,7 @@ def sentence(difference: Difference, clock: ClockKind) -> str:
 
 #: Text between the name of what differs and the two results, and the unit of a result.
 _WORDS = {
+    Aspect.CRITERION: ("", ""),
     Aspect.SILENT: ("had ", " messages"),
     Aspect.RATE: ("had ", " Hz"),
     Aspect.VALUE: ("was ", ""),
@@ -133,11 +145,6 @@ def _shown(value: float | str, aspect: Aspect) -> str:
         return value
     digits = ".1f" if aspect is Aspect.RATE else ".6g"
     return f"{value:{digits}}{_WORDS[aspect][1]}"
-
-
-def _start(trace: Trace, first_message_on: str) -> int:
-    messages = trace.messages(first_message_on) if first_message_on else ()
-    return messages[0].t_ns if messages else 0
 
 
 # --- topics ---

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 
+import msgspec
+
+from grader.core.author_files import AuthorMistake
 from grader.core.chart import (
     Chart,
     Excerpt,
@@ -23,6 +26,7 @@ from grader.core.report import ExerciseReport
 from grader.core.scenario import Scenario
 from grader.core.submission import Submission
 from grader.core.trace import GraphSnapshot, Request, Response, Trace
+from grader.judging.authored import is_authored, mistake_of
 from grader.judging.charts import Lanes, marked_moments, time_chart
 from grader.judging.findings import fault_sentence
 from grader.judging.output import printed_lines
@@ -41,24 +45,40 @@ def illustrated(
 ) -> ExerciseReport:
     """Return the report with figures, the source, the lines of it that matter, and the expected results."""
     files = {name: submission.files[name] for name in exercise.files if name in submission.files}
+    mistakes: list[AuthorMistake] = []
     return replace(
         report,
-        figures=figures_of(exercise, traces),
+        figures=figures_of(exercise, traces, mistakes),
         excerpts=excerpts_for(report, submission, sources),
         sources=tuple(_whole(f.found, sources[name]) for name, f in files.items() if f.found and name in sources),
-        expected={c.id: phrase for c in exercise.criteria if (phrase := expectation(c.check))},
+        expected={c.id: phrase for c in exercise.criteria if (phrase := expectation(c, mistakes))},
+        notes=(*report.notes, *(f"the rubric has a mistake: {mistake}" for mistake in dict.fromkeys(mistakes))),
     )
 
 
-def expectation(check: Check) -> str:
-    """Return the phrase for a check's expectation, without a full stop; empty if it has none."""
-    own = getattr(check, "expected", "")
+def expectation(criterion: Criterion, mistakes: list[AuthorMistake]) -> str:
+    """Return the phrase for what a check expects, without a full stop; empty if it has none.
+
+    A mistake in a check of an author's is appended to `mistakes`.
+    """
+    try:
+        own = getattr(criterion.check, "expected", "")
+    except Exception as error:
+        if not is_authored(criterion.check):
+            raise
+        mistakes.append(mistake_of(criterion.check, error))
+        return ""
     return own if isinstance(own, str) else ""
 
 
-def figures_of(exercise: Exercise, traces: Mapping[str, Trace]) -> tuple[Figure, ...]:
-    """Return the charts of an exercise in rubric order, the graph if a criterion shows it, then each recording."""
-    drawn = [chart for c in exercise.criteria for chart in _drawn(c, traces)]
+def figures_of(
+    exercise: Exercise, traces: Mapping[str, Trace], mistakes: list[AuthorMistake] | None = None
+) -> tuple[Figure, ...]:
+    """Return the charts of an exercise in rubric order, the graph if a criterion shows it, then each recording.
+
+    Mistakes in the charts of an author's checks are appended to `mistakes`.
+    """
+    drawn = [chart for c in exercise.criteria for chart in _drawn(c, traces, [] if mistakes is None else mistakes)]
     figures: list[Figure] = list(_merged(drawn))
     graph = graph_figure(exercise, traces)
     graphs = tuple(c.id for c in exercise.criteria if _shows_graph(c.check))
@@ -69,14 +89,18 @@ def figures_of(exercise: Exercise, traces: Mapping[str, Trace]) -> tuple[Figure,
     return tuple(replace(f, id=f"{exercise.id}-{number}") for number, f in enumerate(figures, 1))
 
 
-def _drawn(criterion: Criterion, traces: Mapping[str, Trace]) -> Iterable[Chart]:
+def _drawn(criterion: Criterion, traces: Mapping[str, Trace], mistakes: list[AuthorMistake]) -> Iterable[Chart]:
     trace = traces.get(criterion.scenario)
     if trace is None:
         return
     try:
         chart = chart_for(criterion.check, trace)
-    except Exception:  # a failing chart must not cost the report
+        if chart is not None and is_authored(criterion.check):
+            chart = msgspec.convert(msgspec.to_builtins(chart), Chart)  # raises for values of a wrong type
+    except Exception as error:  # a failing chart must not cost the report
         chart = None
+        if is_authored(criterion.check):
+            mistakes.append(mistake_of(criterion.check, error))
     if isinstance(chart, Chart):
         yield replace(chart, scenario=criterion.scenario, criteria=(criterion.id,))
 

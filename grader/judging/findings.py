@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Finding, Location, Problem, ProblemKind
+from grader.core.exercise import Finding, Location, Problem, ProblemKind, exact_share
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace
 from grader.judging.values import HIDDEN_TOPICS, student_endpoints
@@ -34,16 +34,17 @@ def met(reason: str, evidence: Mapping[str, object] | None = None) -> Finding:
     return Finding(Fraction(1), reason, evidence or {})
 
 
-def partly(
+def partly(  # noqa: PLR0913  each is a field of the finding
     reason: str,
     evidence: Mapping[str, object] | None = None,
     *,
+    credit: Fraction | float = HALF,
     hint: str = "",
     problem: Problem | ProblemKind | None = None,
     brief: str = "",
 ) -> Finding:
-    """Return a finding with half credit."""
-    return Finding(HALF, reason, evidence or {}, hint=hint, problem=_as_problem(problem), brief=brief)
+    """Return a finding with half credit, or with the given share of the points, from 0 to 1."""
+    return Finding(exact_share(credit), reason, evidence or {}, hint=hint, problem=_as_problem(problem), brief=brief)
 
 
 def only_printed(reason: str, evidence: Mapping[str, object] | None, hint: str) -> Finding:

@@ -13,7 +13,7 @@ from grader.judging.source import read, words
 #: Python packages that come with a desktop installation of ROS 2 and not with the wheels of rclpy.
 ROS_PACKAGES = frozenset(
     words(
-        "action_tutorials_interfaces angles catkin_pkg composition_interfaces cv_bridge domain_coordinator "
+        "action_tutorials_interfaces angles catkin_pkg composition_interfaces cv2 cv_bridge domain_coordinator "
         "image_geometry interactive_markers joint_state_publisher laser_geometry launch launch_ros "
         "launch_testing launch_testing_ros launch_xml launch_yaml logging_demo map_msgs message_filters "
         "osrf_pycommon pcl_msgs pendulum_msgs PyKDL python_qt_binding qt_gui resource_retriever robot_state_publisher "
@@ -21,6 +21,15 @@ ROS_PACKAGES = frozenset(
         "ros2pkg ros2run ros2service ros2topic rosbag2_interfaces rosbag2_py rosidl_runtime_py rqt_gui rqt_gui_py "
         "sensor_msgs_py sros2 statistics_msgs tf2_geometry_msgs tf2_kdl tf2_py tf2_ros tf2_sensor_msgs "
         "tf2_tools topic_monitor"
+    )
+) | frozenset(
+    # Not of the desktop, but released for it: programs that import them are right wherever they are installed.
+    words(
+        "ackermann_msgs apriltag_msgs control_msgs controller_manager controller_manager_msgs gazebo_msgs "
+        "geographic_msgs irobot_create_msgs launch_param_builder mavros_msgs moveit moveit_configs_utils moveit_msgs "
+        "nav2_common nav2_msgs nav2_simple_commander nav_2d_msgs octomap_msgs robot_localization ros_gz_interfaces "
+        "simple_launch slam_toolbox tf2_eigen turtlebot3_msgs turtlebot4_msgs ur_msgs vision_msgs webots_ros2_driver "
+        "xacro"
     )
 )
 

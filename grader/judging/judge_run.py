@@ -1,26 +1,30 @@
-"""Judges a run: turns findings into verdicts and a report; also summarises a trace without judging it."""
+"""Judges a run: turns findings into verdicts and a report."""
 
 from __future__ import annotations
 
-import itertools
-import math
-import statistics
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import asdict, field, replace
 from fractions import Fraction
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
-from grader.core.quantities import NS_PER_S, seconds
-from grader.core.report import NOT_JUDGED, ExerciseReport, Pace, Report, ReportedFault, Summary, TopicSummary, Verdict
+from grader.core.report import (
+    AUTHOR_MISTAKE,
+    NOT_JUDGED,
+    SUBMISSION_SUSPECTED,
+    ExerciseReport,
+    Report,
+    ReportedFault,
+    Verdict,
+)
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import EXPORT_NOTEBOOK, Run, Submission, is_notebook
-from grader.core.trace import ClockKind, Fault, GraphSnapshot, Message, Offer, StartWay, Trace, same_node_name
+from grader.core.trace import ClockKind, Fault, GraphSnapshot, StartWay, Trace, same_node_name
 from grader.judging.diagnosis import diagnose, placed
 from grader.judging.figures import excerpts_for, illustrated
 from grader.judging.findings import FAULT_KEY, fault_evidence
 from grader.judging.run_check import Answer, check_name, run_check
-from grader.judging.values import leaves, on_student_topic
+from grader.judging.values import on_student_topic
 from grader.judging.wording import listed, quote
 
 
@@ -183,7 +187,9 @@ class VerdictBuilder:
             return self._blocked(criterion, needed, self._outcome(needed))
         if answer.finding is None:
             evidence: dict[str, object] = {"error": answer.error} if answer.error else {}
+            evidence |= {AUTHOR_MISTAKE: asdict(answer.mistake)} if answer.mistake is not None else {}
             evidence |= {FAULT_KEY: fault_evidence(answer.fault)} if answer.fault is not None else {}
+            evidence |= {SUBMISSION_SUSPECTED: True} if answer.suspected else {}
             problem, hint = answer.problem, answer.hint
             return _without_points(criterion, Outcome.UNDECIDED, problem, hint=hint, evidence=evidence)
         return self._found(criterion, answer.finding)
@@ -330,59 +336,3 @@ def not_graded_yet(exercise: Exercise) -> ExerciseReport:
         notes=variant_notes(exercise.variant),
         variant=exercise.variant,
     )
-
-
-def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary:
-    """Return a summary of what the nodes of a trace did."""
-    graphs = trace.graphs()
-    names = {e.topic for g in graphs for e in g.endpoints}
-    return Summary(
-        processes=tuple(processes),
-        clock=trace.clock,
-        clock_reason=trace.clock_reason,
-        duration_s=seconds(trace.stop_ns),
-        nodes=tuple(sorted({node for g in graphs for node in g.nodes})),
-        topics=tuple(_topic(trace, name) for name in sorted(names)),
-        offers=tuple(o for o in trace.observations if isinstance(o, Offer)),
-        records=trace.records(),
-        lines=trace.lines(),
-        faults=trace.faults(),
-        notes=(*started(trace), *trace.notes),
-        starts=trace.starts,
-        graph=max(graphs, key=lambda g: len(g.endpoints), default=None),
-        isolation=isolation,
-    )
-
-
-def _topic(trace: Trace, name: str) -> TopicSummary:
-    messages = trace.messages(name)
-    publishers, subscriptions = trace.endpoints("publisher", name), trace.endpoints("subscription", name)
-    return TopicSummary(
-        name=name,
-        types=tuple(dict.fromkeys(e.type for e in (*publishers, *subscriptions))),
-        publishers=publishers,
-        subscriptions=subscriptions,
-        messages=len(messages),
-        first_s=seconds(messages[0].t_ns) if messages else None,
-        pace=_pace(messages),
-        ranges=_ranges(messages),
-    )
-
-
-def _pace(messages: Sequence[Message]) -> Pace | None:
-    times = [m.t_ns for m in messages]
-    if len(times) < 2 or times[-1] == times[0]:
-        return None
-    gaps = [(later - earlier) / NS_PER_S for earlier, later in itertools.pairwise(times)]
-    # n - 1 gaps, not n: counting messages overstates a short window
-    return Pace(len(gaps) * NS_PER_S / (times[-1] - times[0]), min(gaps), max(gaps), statistics.pstdev(gaps))
-
-
-def _ranges(messages: Sequence[Message]) -> dict[str, tuple[float, float]]:
-    ranges: dict[str, tuple[float, float]] = {}
-    for message in messages:
-        for name, value in leaves(message.value).items():
-            if math.isfinite(value):
-                low, high = ranges.get(name, (value, value))
-                ranges[name] = (min(low, value), max(high, value))
-    return ranges

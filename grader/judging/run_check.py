@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from fractions import Fraction
 
+from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Check, Criterion, Exercise, Finding, Location, Problem, reads_sources
+from grader.core.exercise import Check, Criterion, Exercise, Finding, of_beginning, reads_sources
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import Submission
 from grader.core.trace import Fault, FaultKind, Request, Response, Trace
+from grader.judging.authored import breach, is_authored, mistake_in, mistake_of
 from grader.judging.checks import CHECKS
 from grader.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
 from grader.judging.installation import INTERFACES, lacking_package
@@ -36,18 +36,22 @@ class Answer:
     Attributes:
         finding: The check's finding.
         missing: Files of the scenario that the submission lacks.
-        problem: Why there is no finding: a failure of the grader or the machine.
-        error: Class and text of an exception in a check, for its author; set together with `problem`.
+        problem: Why there is no finding: a failure of the grader or the machine, or a mistake of the rubric's author.
+        error: Class and text of an exception in a built-in check; set together with `problem`.
+        mistake: The mistake of the rubric's author; set together with `problem`.
         hint: One thing to do about the problem; empty if nothing is very likely right.
         fault: The fault that shows the problem; None if none does.
+        suspected: Whether what the submission does may be why there is a problem.
     """
 
     finding: Finding | None = None
     missing: tuple[str, ...] = ()
     problem: str = ""
     error: str = ""
+    mistake: AuthorMistake | None = None
     hint: str = ""
     fault: Fault | None = None
+    suspected: bool = False
 
 
 def check_name(criterion: Criterion) -> str:
@@ -69,10 +73,8 @@ def run_check(
     if missing:
         return Answer(missing=missing)
     trace = traces.get(scenario.id)
-    if trace is None:
-        return Answer(problem=f"the scenario {scenario.id} was not recorded")
-    if trace.harness_problem:
-        return Answer(problem=trace.harness_problem)
+    if trace is None or trace.author_mistake is not None or trace.harness_problem:
+        return _unrecorded(scenario, trace)
     answer = _judged(criterion, scenario, trace, sources)
     if answer.finding is not None and answer.finding.credit < 1:
         faster = (
@@ -89,6 +91,24 @@ def run_check(
     return answer if answer.finding is None else replace(answer, finding=_placed(answer.finding, submission))
 
 
+def _unrecorded(scenario: Scenario, trace: Trace | None) -> Answer:
+    """Return why there is no recording that could be judged."""
+    if trace is None:
+        return Answer(problem=f"the scenario {scenario.id} was not recorded")
+    if trace.author_mistake is not None:
+        return _author_mistake(trace.author_mistake)
+    return Answer(problem=trace.harness_problem, suspected=trace.suspected)
+
+
+def for_beginning(criterion: Criterion) -> Criterion | None:
+    """Return a criterion that judges the beginning of a recording; None if its check says that none can."""
+    try:
+        check = of_beginning(criterion.check)
+    except Exception:  # a check of a rubric's own that fails here is not compared, and costs no points
+        return None
+    return None if check is None else replace(criterion, check=check, check_name=check_name(criterion))
+
+
 def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
     """Return the answer; no answer if points are lost where this installation lacks a package of ROS.
 
@@ -96,7 +116,8 @@ def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sourc
     """
     lost = answer.finding is not None and answer.finding.credit < 1
     if lost and trace.left_out:
-        return Answer(problem=f"{trace.left_out[0]}, which can be why this is not met", hint=_LEFT_OUT_HINT)
+        problem = f"{trace.left_out[0]}, which can be why this is not met"
+        return Answer(problem=problem, hint=_LEFT_OUT_HINT, suspected=True)
     lack = lacking_package(trace, scenario.processes, sources) if lost else None
     if lack is None:
         return answer
@@ -133,30 +154,27 @@ def _put(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Findi
 
 def _judged(criterion: Criterion, scenario: Scenario, trace: Trace, sources: Mapping[str, str] | None) -> Answer:
     name = check_name(criterion)
+    authored = bool(criterion.check_name) and is_authored(criterion.check)
     try:
         finding = _put(criterion.check, trace, sources)
     except HarnessError as error:
         return Answer(problem=f"{name} cannot be judged: {error.message}")
-    except (Exception, SystemExit) as error:  # a failing check must cost no points and must not end the report
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a failing check must cost no points and must not end the report
+        if authored:
+            return _author_mistake(mistake_of(criterion.check, error))
         problem = f"the check {name} failed on this recording through no fault of the submission"
-        text = f"{type(error).__name__}: {quote(str(error))}"
-        if not criterion.check_name or name in CHECKS:
-            return Answer(problem=problem, error=text)
-        text = f"{_place(error)}{text}"
-        return Answer(problem=problem, error=text, hint=f"fix the check that the rubric brings: {text}")
-    if name in CHECKS and 0 <= finding.credit <= 1:
-        return Answer(finding=_start_failure_first(finding, scenario, trace))
-    wrong = breach(finding)
-    if wrong:
-        return Answer(problem=f"the check {name} {wrong}", hint="fix the check that the rubric brings")
-    finding = replace(finding, credit=Fraction(finding.credit))
+        return Answer(problem=problem, error=f"{type(error).__name__}: {quote(str(error))}")
+    if authored and (wrong := breach(finding)):
+        method = "judge_sources" if sources is not None and reads_sources(criterion.check) else "judge"
+        return _author_mistake(mistake_in(criterion.check, method, f"the check {name} {wrong}"))
     return Answer(finding=_start_failure_first(finding, scenario, trace))
 
 
-def _place(error: BaseException) -> str:
-    """Return where an error arose, as `file:line: ` without the folder, for the author of the check."""
-    frames = traceback.extract_tb(error.__traceback__)
-    return f"{frames[-1].filename.rsplit('/', 1)[-1]}:{frames[-1].lineno}: " if frames else ""
+def _author_mistake(mistake: AuthorMistake) -> Answer:
+    hint = f"for the author of the rubric: correct {mistake.file} and grade again"
+    return Answer(problem=f"the rubric has a mistake: {mistake}", error=str(mistake), mistake=mistake, hint=hint)
 
 
 def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> Finding:
@@ -191,34 +209,3 @@ def _started(trace: Trace) -> int:
     known = len({e.participant for e in endpoints}) + len(only_services)
     calls: tuple[Request | Response, ...] = (*trace.of(Request), *trace.of(Response))
     return known or int(bool(trace.messages()) or any(r.sender == "student" for r in calls))
-
-
-#: Deepest nesting of evidence.
-_DEEPEST = 12
-
-
-def breach(finding: object) -> str:
-    """Describe what is wrong with a check's return value, as the end of a sentence; empty if it is a valid finding."""
-    if not isinstance(finding, Finding):
-        return f"returned a {type(finding).__name__}, expected a Finding"
-    if isinstance(finding.credit, bool) or not isinstance(finding.credit, (int, Fraction)):
-        return f"gave a credit of type {type(finding.credit).__name__}, expected a Fraction"
-    if not 0 <= finding.credit <= 1:
-        return f"gave a credit of {finding.credit}, expected 0 to 1"
-    texts = (finding.reason, finding.hint, finding.blocked_by or "", finding.brief)
-    if not all(isinstance(text, str) for text in texts) or not isinstance(finding.location, (Location, type(None))):
-        return "gave a reason, hint or location of another type than a Finding has"
-    if not isinstance(finding.problem, (Problem, type(None))):
-        return f"gave a problem of type {type(finding.problem).__name__}, expected a Problem"
-    plain = isinstance(finding.evidence, Mapping) and _is_plain(finding.evidence, _DEEPEST)
-    return "" if plain else "gave evidence that holds more than plain JSON values"
-
-
-def _is_plain(value: object, depth: int) -> bool:
-    if value is None or isinstance(value, (bool, int, float, str)):
-        return True
-    if depth == 0:
-        return False
-    if isinstance(value, Mapping):
-        return all(isinstance(key, str) and _is_plain(inner, depth - 1) for key, inner in value.items())
-    return isinstance(value, (list, tuple)) and all(_is_plain(inner, depth - 1) for inner in value)

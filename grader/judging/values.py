@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache, wraps
 from types import MappingProxyType
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from grader.core.dataclass import dataclass
+from grader.core.exercise import Check
 from grader.core.quantities import NS_PER_MS, SLACK, FieldNumber, Pattern, within
 from grader.core.trace import ClockKind, Delivery, Endpoint, Message, Trace
 from grader.judging.wording import number, quote
@@ -23,6 +25,10 @@ JITTER_NS = {ClockKind.VIRTUAL: 0, ClockKind.WALL: 50 * NS_PER_MS}
 _NUMERIC_TYPE = re.compile(
     r"(std_msgs|example_interfaces)/msg/(Float(32|64)|U?Int(8|16|32|64)|Char)|sensor_msgs/msg/Temperature"
 )
+
+
+#: How many messages or responses are enough to judge the beginning of a recording.
+FEW = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +46,18 @@ class Held:
     start_ns: int
     stop_ns: int
     value: float
+
+
+class FewSuffice:
+    """A check of every message or response on its own, whose number only a whole recording shows."""
+
+    __slots__ = ()
+
+    def of_beginning(self) -> Check:
+        """Return the check for a beginning: see `grader.core.exercise.BeginningCheck`."""
+        own: Any = self
+        fewer: Check = replace(own, at_least=min(own.at_least, FEW))
+        return fewer
 
 
 def per_trace(find: Callable[Concatenate[Trace, P], T]) -> Callable[Concatenate[Trace, P], T]:

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
+from grader.core.quantities import counted as counted  # noqa: PLC0414 - one of the words of all that judges
 from grader.core.quantities import seconds
 
 #: Longest quotation of a student's text inside a sentence, in characters.
@@ -33,11 +34,6 @@ def number(value: float) -> str:
 def numbers(values: Iterable[float]) -> str:
     """Return numbers as `1, 2.5, 3`."""
     return ", ".join(number(v) for v in values)
-
-
-def counted(count: int, noun: str) -> str:
-    """Return `1 message` or `3 messages`."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def quote(text: str, length: int = QUOTE_LENGTH) -> str:

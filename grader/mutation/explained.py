@@ -30,7 +30,7 @@ class Explanation:
     """An author's note on some mutants or variants."""
 
     pattern: str
-    because: str = ""  # the explanation; empty if the note names criteria
+    because: str = ""  # the explanation; empty if it is still to be filled in, or the note names criteria
     criteria: tuple[str, ...] = ()  # criteria that should detect such a mutant; empty if the note has an explanation
     where: str = ""  # position in the file, for messages
 
@@ -41,7 +41,7 @@ class Explanation:
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """All notes of an author; `criteria` tells for a criterion's id why it detects no mutant."""
+    """All notes of an author; `criteria` tells for a criterion's id why it detects no mutant, empty if not yet."""
 
     reference: Path | None = None
     template: Path | None = None
@@ -58,7 +58,7 @@ class _Shape(BaseModel):
 
 class _Survivor(_Shape):
     mutants: _Text
-    because: _Line
+    because: _Line | None  # null until its author has filled it in
 
 
 class _Expected(_Shape):
@@ -68,12 +68,12 @@ class _Expected(_Shape):
 
 class _Variant(_Shape):
     variants: _Text
-    because: _Line
+    because: _Line | None
 
 
 class _Criterion(_Shape):
     criterion: _Text
-    because: _Line
+    because: _Line | None
 
 
 class _File(_Shape):
@@ -109,17 +109,19 @@ def read_explained(path: Path, exercise: Exercise) -> Explained:
         place = tree.values[at]
         return f"{shown(str(path), 500)}:{place.line}:{place.column}"
 
-    survivors = (Explanation(s.mutants, s.because, (), where("survivors", n)) for n, s in enumerate(read.survivors))
+    def reasons(key: str, notes: Sequence[tuple[str, str | None]]) -> Iterator[Explanation]:
+        for n, (pattern, because) in enumerate(notes):
+            yield Explanation(pattern, because or "", (), where(key, n))
+
     expected = (Explanation(e.mutants, "", e.killed_by, where("expected", n)) for n, e in enumerate(read.expected))
-    variants = (Explanation(v.variants, v.because, (), where("variants", n)) for n, v in enumerate(read.variants))
     return Explained(
         reference=None if read.reference is None else path.parent / read.reference,
         template=None if read.template is None else path.parent / read.template,
         template_score=None if read.template_score is None else Fraction(str(read.template_score)),
-        survivors=tuple(survivors),
+        survivors=tuple(reasons("survivors", [(s.mutants, s.because) for s in read.survivors])),
         expected=tuple(expected),
-        variants=tuple(variants),
-        criteria={one.criterion: one.because for one in read.criteria},
+        variants=tuple(reasons("variants", [(v.variants, v.because) for v in read.variants])),
+        criteria={one.criterion: one.because or "" for one in read.criteria},
     )
 
 

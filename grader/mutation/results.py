@@ -68,10 +68,11 @@ class Trial:
     id: str  # stable, readable id: `FILE:LINE:operator:detail`, or `FILE:variant` for a variant
     file: str
     operator: str
-    change: str
+    change: str  # the difference to the reference in one line
     result: TrialResult
     expected: tuple[str, ...] = ()  # criteria one of which should detect it, according to the notes; empty if not given
     because: str = ""  # the explanation in the notes of why a mutant survives or a variant loses points
+    diff: str = ""  # the difference to the reference, as a unified diff without the names of the files
 
     @property
     def fate(self) -> Fate:
@@ -134,6 +135,16 @@ class SelftestResult:
         """Whether the test found no hole in the rubric."""
         faults = (self.survivors, self.marked_down, self.never_turned)
         return self.reference.full and self.template_fits and not any(faults)
+
+
+#: Unchanged lines around a change.
+_CONTEXT = 1
+
+
+def unified_change(before: str, after: str) -> str:
+    """Describe the difference of two sources as a unified diff, without the names of the files."""
+    lines = difflib.unified_diff(before.splitlines(), after.splitlines(), n=_CONTEXT, lineterm="")
+    return "\n".join(list(lines)[2:])
 
 
 def one_line_change(before: str, after: str) -> str:

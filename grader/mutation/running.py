@@ -31,7 +31,7 @@ from grader.mutation.explained import Explained, Explanation, beside, read_expla
 from grader.mutation.operators import mutants_of
 from grader.mutation.operators.program import Candidate, Program
 from grader.mutation.operators.variants import variants_of
-from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change, result_of
+from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change, result_of, unified_change
 from grader.submissions.collected import shown
 from grader.submissions.sources import read_sources
 from grader.submissions.submission import stage_submission
@@ -164,7 +164,7 @@ def _bench(  # noqa: PLR0913  each comes from a different stage
         reference=reference,
         sources=_sources(reference, exercise),
         progress=progress,
-        interfaces=provide(session, [exercise], (), reference.root).folders,
+        interfaces=provide(session, [exercise], (), reference).folders,
         workers=options.jobs or 1,
     )
 
@@ -211,8 +211,8 @@ def _tested(path: Path, bench: TrialRunner, explained: Explained, options: Selft
         mutants=tried,
         variants=correct,
         whole=whole,
-        idle=_idle(explained, tried, correct) if whole else (),
-        unturned=explained.criteria,
+        idle=(*_unfilled(explained), *(_idle(explained, tried, correct) if whole else ())),
+        unturned={id_: because for id_, because in explained.criteria.items() if because},
         recordings=bench.recordings,
         duration_s=time.perf_counter() - started,
     )
@@ -222,7 +222,7 @@ def _mutants(bench: TrialRunner, explained: Explained, options: SelftestOptions)
     """Run the selected mutants."""
     made = (mutant for name in bench.exercise.files for mutant in mutants_of(bench.sources[name], name))
     for trial in _trials(bench, made, "mutant", options, options.sample):
-        because = _first(explained.survivors, trial.id).because if trial.fate is Fate.SURVIVED else ""
+        because = _reason(explained.survivors, trial.id) if trial.fate is Fate.SURVIVED else ""
         yield replace(trial, because=because, expected=_first(explained.expected, trial.id).criteria)
 
 
@@ -231,7 +231,7 @@ def _variants(bench: TrialRunner, explained: Explained, options: SelftestOptions
     made = (variant for name in bench.exercise.files for variant in variants_of(bench.sources[name], name))
     most = None if options.sample is None else -(-options.sample // _MUTANTS_A_VARIANT)
     for trial in _trials(bench, made, "variant", options, most):
-        because = _first(explained.variants, trial.id).because if trial.fate is Fate.KILLED else ""
+        because = _reason(explained.variants, trial.id) if trial.fate is Fate.KILLED else ""
         yield replace(trial, because=because)
 
 
@@ -243,7 +243,8 @@ def _trials(
     chosen = _sampled(wanted, most, options.seed or 0)
     for candidate, result in bench.grade_changed(chosen, f"{bench.exercise.id}: {word}"):
         change = one_line_change(bench.sources[candidate.file], candidate.source)
-        yield Trial(candidate.id, candidate.file, candidate.operator, change, result)
+        diff = unified_change(bench.sources[candidate.file], candidate.source)
+        yield Trial(candidate.id, candidate.file, candidate.operator, change, result, diff=diff)
 
 
 def _sampled(candidates: Sequence[Candidate], most: int | None, seed: int) -> list[Candidate]:
@@ -260,9 +261,24 @@ def _sampled(candidates: Sequence[Candidate], most: int | None, seed: int) -> li
     return [candidate for candidate in candidates if candidate.id in kept]
 
 
+def _reason(explanations: Iterable[Explanation], id_: str) -> str:
+    """Return the reason in the first note that fits and has one; empty if none has."""
+    return _first((one for one in explanations if one.because), id_).because
+
+
 def _first(explanations: Iterable[Explanation], id_: str) -> Explanation:
     """Return the first note that fits; an empty one if none does."""
     return next((explanation for explanation in explanations if explanation.fits(id_)), Explanation(""))
+
+
+def _unfilled(explained: Explained) -> Iterator[str]:
+    """Yield the notes whose reason is still to be filled in."""
+    for note in (*explained.survivors, *explained.variants):
+        if not note.because:
+            yield f"{note.where}: `{shown(note.pattern)}` needs a reason after `because:`"
+    for id_, because in explained.criteria.items():
+        if not because:
+            yield f"{id_}: the note needs a reason after `because:`"
 
 
 def _idle(explained: Explained, mutants: Sequence[Trial], variants: Sequence[Trial]) -> tuple[str, ...]:
@@ -275,6 +291,10 @@ def _idle(explained: Explained, mutants: Sequence[Trial], variants: Sequence[Tri
     unused = (note for notes, ids in concerned for note in notes if not any(map(note.fits, ids)))
     turned = {id_ for trial in mutants for id_ in trial.result.turned}
     return (
-        *(f"{note.where}: `{shown(note.pattern)}` explains nothing" for note in unused),
-        *(f"{id_}: the notes say why no mutant turns it, but some do" for id_ in explained.criteria if id_ in turned),
+        *(f"{note.where}: nothing fits `{shown(note.pattern)}`" for note in unused),
+        *(
+            f"{id_}: the notes say why it detects no mutant, but it detects some"
+            for id_ in explained.criteria
+            if id_ in turned
+        ),
     )

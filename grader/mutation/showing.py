@@ -19,6 +19,8 @@ from grader.reporting.escape import shown, valid_unicode
 
 SCHEMA = "grader/selftest/v1"
 _NARROWEST = 80
+#: Most lines of a change that are shown.
+_MOST_LINES = 30
 _GOOD, _BAD, _QUIET = "green", "bold red", "dim"
 
 
@@ -54,22 +56,22 @@ def _result(console: Console, result: SelftestResult) -> None:
         return
     console.print(f"  mutants    {_count(result)}")
     lost = len(result.marked_down)
-    variants = f"{len(result.variants)} correct ones, {lost or 'none'} marked down"
+    variants = f"{len(result.variants)} correct programs, {lost or 'none'} of them lost points"
     console.print(f"  variants   {variants}", style=_BAD if lost else "")
     console.print(f"  recorded   {result.recordings} scenarios in {result.duration_s:.0f} s")
     console.print()
     console.print(_operators(result))
     console.print()
     console.print(_criteria(result))
-    _listed(console, "Survivors: nobody noticed", result.survivors, _BAD)
-    _listed(console, "Correct variants that lose points", result.marked_down, _BAD)
-    _listed(console, "Undecided: the grader or the machine failed, it says nothing", result.undecided, "yellow")
+    _listed(console, "Survivors, which no criterion detected", result.survivors, _BAD)
+    _listed(console, "Correct variants that lost points", result.marked_down, _BAD)
+    _listed(console, "Undecided, because the grader or the machine failed", result.undecided, "yellow")
     others = [t for t in result.mutants if t.fate is Fate.KILLED and not t.as_expected]
-    _listed(console, "Noticed by another criterion than expected", others, "yellow")
+    _listed(console, "Detected by another criterion than expected", others, "yellow")
     _listed(console, "Explained survivors", [t for t in result.mutants if t.because], _QUIET)
     _listed(console, "Explained variants", [t for t in result.variants if t.because], _QUIET)
     for id_, because in result.unturned.items():
-        _put(console, 2, f"{id_} is turned by no mutant because {shown(because, limit=600)}", _QUIET)
+        _put(console, 2, f"{id_} detects no mutant because {shown(because, limit=600)}", _QUIET)
     for line in result.idle:
         _put(console, 2, line, "yellow")
 
@@ -77,15 +79,16 @@ def _result(console: Console, result: SelftestResult) -> None:
 def _count(result: SelftestResult) -> str:
     fates = [trial.fate for trial in result.mutants]
     explained = sum(bool(trial.because) for trial in result.mutants)
-    counts = f"{len(fates)} tried, {fates.count(Fate.KILLED)} killed, {len(result.survivors)} survived"
+    counts = f"{len(fates)} tried, {fates.count(Fate.KILLED)} detected, {len(result.survivors)} survived"
     undecided = f", {fates.count(Fate.UNDECIDED)} undecided" if Fate.UNDECIDED in fates else ""
-    partial = "" if result.whole else " (not all that there are)"
-    return f"{counts}, {explained} survived for a reason{undecided}{partial}"
+    partial = "" if result.whole else " (a part of all)"
+    return f"{counts}, {explained} more survived for a reason in the notes{undecided}{partial}"
 
 
 def _operators(result: SelftestResult) -> Table:
-    """Build the table with a row for each operator."""
-    table = _table("operator", "made", "killed", "as said", "by other", "excused", "undecided", "SURVIVED")
+    """Build the table with a row for each operator; a column in which nothing stands is left out."""
+    names = ("tried", "detected", "as expected", "by others", "explained", "undecided", "SURVIVED")
+    rows: dict[str, tuple[int, ...]] = {}
     for name in dict.fromkeys(trial.operator for trial in result.mutants):
         own = [trial for trial in result.mutants if trial.operator == name]
         killed = [trial for trial in own if trial.fate is Fate.KILLED]
@@ -94,19 +97,22 @@ def _operators(result: SelftestResult) -> Table:
         survived = sum(trial.fate is Fate.SURVIVED and not trial.because for trial in own)
         excused = sum(bool(trial.because) for trial in own)
         undecided = sum(trial.fate is Fate.UNDECIDED for trial in own)
-        row = (len(own), len(killed), right, len(predicted) - right, excused, undecided, survived)
-        table.add_row(name, *(str(number or "") for number in row), style=_BAD if survived else "")
+        rows[name] = (len(own), len(killed), right, len(predicted) - right, excused, undecided, survived)
+    shown_ = [column for column in range(len(names)) if column < 2 or any(row[column] for row in rows.values())]
+    table = _table("mistake", *(names[column] for column in shown_))
+    for name, row in rows.items():
+        table.add_row(name, *(str(row[column] or "") for column in shown_), style=_BAD if row[-1] else "")
     return table
 
 
 def _criteria(result: SelftestResult) -> Table:
     """Build the table with a row for each criterion."""
-    table = _table("criterion", "turned by", "alone", "expected", "of these turned", "")
+    table = _table("criterion", "detected", "only by this", "expected", "of these detected", "")
     for id_ in result.criteria:
         turned = [trial for trial in result.mutants if id_ in trial.result.turned]
         alone = sum(trial.result.turned == (id_,) for trial in turned)
         meant = [trial for trial in result.mutants if id_ in trial.expected]
-        never = "NEVER TURNED" if id_ in result.never_turned else ""
+        never = "DETECTED NOTHING" if id_ in result.never_turned else ""
         row = (len(turned), alone, len(meant), sum(id_ in trial.result.turned for trial in meant))
         table.add_row(id_, *(str(number or "") for number in row), never, style=_BAD if never else "")
     return table
@@ -128,13 +134,24 @@ def _listed(console: Console, title: str, trials: Iterable[Trial], style: str) -
     console.print(f"{title} ({len(found)})", style=style)
     for trial in found:
         _put(console, 2, shown(trial.id, limit=200), "bold" if style == _BAD else "")
-        _put(console, 4, shown(trial.change, limit=400), _QUIET)
+        if not trial.because:
+            _change(console, trial)
         if trial.because:
             _put(console, 4, f"because {shown(trial.because, limit=600)}")
         elif trial.fate is not Fate.SURVIVED:
             _reasons(console, trial.result)
         if trial.expected and not trial.as_expected:
             _put(console, 4, f"expected {' or '.join(trial.expected)}")
+
+
+def _change(console: Console, trial: Trial) -> None:
+    """Write the change as a diff, long ones in part; in one line if there is no diff."""
+    lines = trial.diff.splitlines() or [trial.change]
+    for line in lines[:_MOST_LINES]:
+        style = _GOOD if line.startswith("+") else "red" if line.startswith("-") else _QUIET
+        console.print(Padding(Text(shown(line, limit=400), style=style), (0, 0, 0, 4), expand=False))
+    if len(lines) > _MOST_LINES:
+        _put(console, 4, f"... and {len(lines) - _MOST_LINES} more lines", _QUIET)
 
 
 def _reasons(console: Console, result: TrialResult) -> None:
@@ -189,6 +206,7 @@ def _trial_data(trial: Trial) -> JsonObject:
         "file": valid_unicode(trial.file),
         "operator": trial.operator,
         "change": valid_unicode(trial.change),
+        "diff": valid_unicode(trial.diff),
         "fate": trial.fate.value,
         "killed_by": list(trial.result.turned),
         "expected": list(trial.expected),

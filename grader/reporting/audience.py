@@ -6,73 +6,118 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 from grader.core.chart import Chart, Excerpt, Figure
 from grader.core.dataclass import dataclass
-from grader.core.exercise import DUE_DATE, OPEN, PUBLISHED, Audience, Location, Outcome, Shows, strictest, variant_notes
+from grader.core.exercise import (
+    DUE_DATE,
+    OPEN,
+    PUBLISHED,
+    Audience,
+    Location,
+    Outcome,
+    ProblemKind,
+    Shows,
+    strictest,
+    variant_notes,
+)
 from grader.core.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.reporting.wording import points
 
-#: Unit after a number -> word that replaces both.
-_UNITS = {
-    "Hz": "a rate",
-    "s": "a time",
-    "ms": "a time",
-    "m/s": "a speed",
-    "rad/s": "an angular speed",
-    "m": "a distance",
-    "rad": "an angle",
-    "°C": "a temperature",
-    "%": "a share",
-}
-_NUMBER = "a number"
 # Bit counts are part of a type's name; a student's program might have chosen any other digits.
 _KEPT = re.compile(r"\b[a-z_]+/(?:msg|srv|action)/[A-Za-z]+(?:8|16|32|64)?(?:MultiArray)?(?!\w)")
 _LINE = re.compile(r"(\.py):[0-9]+")
-# Separators of words.
-_WORD = re.compile(r"[^\s(),;:=\[\]{}<>|\"'`/±*\u00d7\u2018-\u201f]+")
-_SIGNS = "+-\N{MINUS SIGN}"
+_WORD = re.compile(r"[^\W_]+")
 _WORDS_FOR_VALUES = ("nan", "inf", "infinity")
-_ONE = rf"(?:{_NUMBER}|{'|'.join(sorted(set(_UNITS.values()), key=len, reverse=True))})"
-_ROW = re.compile(rf"{_ONE}(?:(?: ?[±/*,\u00d7] ?|:| to | and | or ){_ONE})+")
-_WITH_UNIT = re.compile(rf"{_NUMBER} ?({'|'.join(sorted(map(re.escape, _UNITS), key=len, reverse=True))})(?![\w/])")
+#: What a problem is called where its numbers are withheld, as a whole sentence.
+_SAID: Mapping[ProblemKind, str] = {
+    ProblemKind.ABSENT: "what is asked for is not in the ROS graph",
+    ProblemKind.OTHER_NAME: "there is one, but under another name",
+    ProblemKind.OTHER_TYPE: "the type is not the one asked for",
+    ProblemKind.SILENT: "it is there, but nothing is sent",
+    ProblemKind.TOO_FEW: "there are fewer than asked for",
+    ProblemKind.TOO_MANY: "there are more than asked for",
+    ProblemKind.TOO_LATE: "what is asked for comes too late",
+    ProblemKind.WRONG_RATE: "the rate is not the one asked for",
+    ProblemKind.RATE_CHANGES: "the rate is right on average, but it changes",
+    ProblemKind.BURSTS: "several come at once, then none for a while",
+    ProblemKind.STOPPED: "it stopped before the end",
+    ProblemKind.NO_MESSAGE: "no message came",
+    ProblemKind.NO_FIELD: "the message type has no such field",
+    ProblemKind.NO_NUMBER: "the messages hold no number",
+    ProblemKind.WRONG_VALUE: "a value is not the one asked for",
+    ProblemKind.NOT_RANDOM: "the values are not random: they follow a pattern",
+    ProblemKind.CONSTANT: "the values are not random: they are all the same",
+    ProblemKind.NEVER_CHANGES: "the answer never changes, because the input stays on one side of the threshold",
+    ProblemKind.WRONG_ANSWER: "an answer does not fit its input",
+    ProblemKind.NO_ANSWER: "something is never answered",
+    ProblemKind.REFUSED: "what is asked for is refused",
+    ProblemKind.BEHIND: "each answer fits an earlier input",
+    ProblemKind.CONTRADICTION: "two different answers come at the same time",
+    ProblemKind.KEPT_APART: "types or QoS of publisher and subscription do not match",
+    ProblemKind.NO_EDGE: "the two programs are not connected",
+    ProblemKind.COUNT_START: "the count does not start at the number asked for",
+    ProblemKind.ONE_PER_MESSAGE: "every message is logged",
+    ProblemKind.NO_NODE: "the program has no node",
+    ProblemKind.NOT_LOGGED: "not everything that is asked for is logged",
+    ProblemKind.PRINTED: "what is asked for is printed, not logged",
+    ProblemKind.AMONG_OTHERS: "the right values are logged among so many others that they show nothing",
+    ProblemKind.ERRORS_LOGGED: "errors are logged",
+    ProblemKind.ENDED: "a program ends too early",
+    ProblemKind.STILL_RUNNING: "a program does not end when it is stopped",
+}
+_NOT_AS_ASKED = "what was found is not what is asked for"
+_HAPPENED = {
+    "syntax_error": "cannot be compiled",
+    "exception": "raised an exception",
+    "exited": "ended by itself",
+    "hung": "did not return",
+    "killed": "was killed",
+}
+#: Keys of evidence that say where something was found.
+_PLACES = ("topic", "service", "node", "process")
 
 
-def without_numbers(text: str) -> str:
-    """Return a sentence in which words replace the numbers.
+def numberless(text: str) -> str:
+    """Return a text without the lines of Python files, if no other number is in it; empty if there is one.
 
-    Names of message types stay whole, and places in Python files lose their line. Any other word with digits is cut
-    before the first digit.
+    Digits in the names of message types are no numbers; digits of every script, and words for values, are.
     """
     text = _LINE.sub(r"\1", text)
-    parts, end = [], 0
-    for kept in _KEPT.finditer(text):
-        parts += [_worded(text[end : kept.start()]), kept.group()]
-        end = kept.end()
-    return "".join([*parts, _worded(text[end:])])
+    rest = _KEPT.sub("", text)
+    values = any(word.casefold() in _WORDS_FOR_VALUES for word in _WORD.findall(rest))
+    return "" if values or any(sign.isnumeric() for sign in rest) else text
 
 
-def _worded(text: str) -> str:
-    plain = _WORD.sub(lambda match: _word(match.group()), text)
-    return _ROW.sub(_row, _WITH_UNIT.sub(lambda match: _UNITS[match[1]], plain))
+def _said(verdict: Verdict) -> str:
+    """Return a verdict's reason if it has no numbers, else a sentence that says what kind of problem it is."""
+    if plain := numberless(verdict.reason):
+        return plain
+    fault = verdict.evidence.get("fault")
+    if isinstance(fault, Mapping):
+        return _fault_said(fault)
+    said = _NOT_AS_ASKED if verdict.problem is None else _SAID[verdict.problem.kind]
+    if verdict.problem is not None and verdict.problem.kind is ProblemKind.WRONG_VALUE:
+        said = _wrong_fields(verdict.evidence) or said
+    places = (str(verdict.evidence.get(key) or "") for key in _PLACES)
+    where = next((plain for place in places if (plain := numberless(place))), "")
+    return f"{where}: {said}" if where else said
 
 
-def _row(match: re.Match[str]) -> str:
-    """Return the replacement for several numbers in a row: that of the last one, if it has a unit."""
-    last = next((word for word in _UNITS.values() if match.group().endswith(f" {word}")), "")
-    return last or "numbers"
+def _wrong_fields(evidence: Mapping[str, Any]) -> str:
+    """Return which fields are wrong; empty if the evidence does not tell."""
+    found = evidence.get("found")
+    names = list(found) if isinstance(found, Mapping) else [str(evidence.get("field") or "")]
+    fields = [plain for name in names if (plain := numberless(name))]
+    return f"{' and '.join(fields)} {'is' if len(fields) == 1 else 'are'} not what is asked for" if fields else ""
 
 
-def _word(word: str) -> str:
-    """Return a word unchanged if it has no digit of any script."""
-    if word.strip(f"{_SIGNS}.").casefold() in _WORDS_FOR_VALUES:
-        return _NUMBER
-    first = next((n for n, sign in enumerate(word) if sign.isnumeric()), -1)
-    if first < 0:
-        return word
-    before = word[:first].strip(f"{_SIGNS}±~≈.#")
-    after = "." if word.endswith(".") else ""
-    return f"{before}…{after}" if before else f"{_NUMBER}{after}"
+def _fault_said(fault: Mapping[str, Any]) -> str:
+    where = numberless(str(fault.get("file") or fault.get("process") or "")) or "the program"
+    what = _HAPPENED.get(str(fault.get("kind")), "failed")
+    text = numberless(str(fault.get("text") or ""))
+    return f"{where} {what}: {text}" if text else f"{where} {what}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +145,8 @@ ANYBODY = Readers()
 _WHEN = {DUE_DATE: " before the due date", PUBLISHED: " before grades are published"}
 _HIDDEN = "a criterion that is not shown"
 _NO_REASON = "the reason is not shown"
-_LEFT_OUT = "pictures, the graph and whatever else would show more than the criteria do are left out"
+_NO_MESSAGE = "the message is not shown, because it holds numbers"
+_LEFT_OUT = "charts, the graph and other details are left out, because they would show what is withheld"
 
 
 def told(report: Report, readers: Readers) -> Report:
@@ -188,8 +234,8 @@ def _verdict(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
     if shown[verdict.id] is Shows.ALL:
         return verdict
     # The text of a verdict that was not judged has no numbers of its own, and the ids in it must not change.
-    said = verdict.reason if verdict.outcome is Outcome.BLOCKED else without_numbers(verdict.reason)
-    brief = without_numbers(verdict.brief)
+    said = verdict.reason if verdict.outcome is Outcome.BLOCKED else _said(verdict)
+    brief = numberless(verdict.brief)
     return replace(verdict, reason=said, hint=_hint(verdict.hint), evidence={}, problem=None, brief=brief)
 
 
@@ -205,20 +251,20 @@ def _without_hidden(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
 
 def _hint(hint: str) -> str:
     """Return the parts of a hint without numbers: most others would give the answer away."""
-    return "; ".join(part for part in hint.split("; ") if without_numbers(part) == part)
+    return "; ".join(part for part in hint.split("; ") if numberless(part) == part)
 
 
 def _clock_reason(exercise: ExerciseReport, worst: Shows) -> str:
     """Return why the wall clock was used, as visible as the exercise's most restricted criterion."""
     if worst is Shows.WITHOUT_NUMBERS or not exercise.clock_reason:
-        return without_numbers(exercise.clock_reason)
+        return numberless(exercise.clock_reason) or (_NO_REASON if exercise.clock_reason else "")
     return _NO_REASON
 
 
 def _notes(exercise: ExerciseReport, worst: Shows) -> list[str]:
     """Return the notes of the run; the variant is not secret, because the student's task sheet has it."""
     notes = [note for note in exercise.notes if note not in variant_notes(exercise.variant)]
-    return [without_numbers(note) for note in notes] if worst is Shows.WITHOUT_NUMBERS else []
+    return [plain for note in notes if (plain := numberless(note))] if worst is Shows.WITHOUT_NUMBERS else []
 
 
 def _unshown(exercise: ExerciseReport, day: str) -> list[str]:
@@ -246,7 +292,7 @@ def _faults(exercise: ExerciseReport, shown: Mapping[str, Shows]) -> tuple[Repor
         if worst is Shows.ALL:
             kept.append(fault)
         elif worst is Shows.WITHOUT_NUMBERS:
-            kept.append(replace(fault, text=without_numbers(fault.text), t_ns=0))
+            kept.append(replace(fault, text=numberless(fault.text) or _NO_MESSAGE, t_ns=0))
     return tuple(kept)
 
 

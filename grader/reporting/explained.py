@@ -44,6 +44,20 @@ def list_checks(found: Sequence[CriterionExplanation | CheckExplanation], *, wid
     return "\n".join(lines) + "\n"
 
 
+def list_all(found: Sequence[CriterionExplanation | CheckExplanation], *, width: int) -> str:
+    """Return the criteria by exercise, each with its title, and then the checks with their purpose."""
+    criteria = [e for e in found if isinstance(e, CriterionExplanation)]
+    column = max((len(e.id) for e in criteria), default=0) + 4
+    lines: list[str] = []
+    for exercise in dict.fromkeys(e.exercise for e in criteria):
+        lines += ["", shown(exercise)]
+        for e in criteria:
+            if e.exercise == exercise:
+                lines += _wrapped(f"  {e.id:<{column - 2}}", shown(e.title), width, after=column)
+    checks = textwrap.indent(list_checks(found, width=width - 2), "  ")
+    return "\n".join([*lines[1:], "", "Checks that rubrics can use", checks, "`grade explain NAME` explains one.\n"])
+
+
 def _criterion(e: CriterionExplanation, width: int) -> Iterator[str]:
     yield f"{e.id}: {shown(e.title)}"
     yield from _row("exercise", e.exercise, width)

@@ -6,13 +6,16 @@ from collections.abc import Iterator
 
 from rich.cells import cell_len
 
-from grader.core.trace import GraphSnapshot
+from grader.core.dataclass import dataclass
+from grader.core.trace import Endpoint, GraphSnapshot, unmet_policy
 from grader.reporting.escape import mermaid_label, shown
 
 #: Topics that every node has.
 _EVERYWHERE = frozenset({"/rosout", "/parameter_events"})
 #: Stands for a side of a topic without nodes.
 NOBODY = "(nobody)"
+#: The service of an action by which a client sends its goal.
+_GOAL_SERVICE = "/_action/send_goal"
 #: More edges than this are counted, not drawn.
 MOST_EDGES = 40
 _NAME_LIMIT = 100
@@ -23,40 +26,60 @@ Edge = tuple[str, str, str, str]
 def draw_graph(graph: GraphSnapshot, *, width: int) -> list[str]:
     """Return the lines of the drawing; an edge takes one line, or two if it is wider than `width` columns.
 
-    A topic with only one side leads from or to `(nobody)`. A topic whose two sides have different types is marked,
-    because no message passes.
+    A topic, service or action with only one side leads from or to `(nobody)`. A topic whose two sides have different
+    types or incompatible QoS is marked, because no message passes.
     """
     edges = graph_edges(graph)
     lines = [line for edge in edges[:MOST_EDGES] for line in _drawn(edge, width)]
-    if len(edges) > MOST_EDGES:
-        lines.append(f"and {len(edges) - MOST_EDGES} more")
-    calls = service_edges(graph)
-    lines += [_called(*edge) for edge in calls[:MOST_EDGES]]
-    joined = {name for client, _, server in calls for name in (client, server)}
-    lonely = [node for node in isolated_nodes(graph) if node not in joined]
-    return lines + [f"{shown(node, limit=_NAME_LIMIT)} (no topics)" for node in lonely]
+    calls = call_edges(graph)
+    lines += [_called(call) for call in calls[:MOST_EDGES]]
+    left_out = max(0, len(edges) - MOST_EDGES) + max(0, len(calls) - MOST_EDGES)
+    if left_out:
+        lines.append(f"and {left_out} more")
+    return lines + [f"{shown(node, limit=_NAME_LIMIT)} (no topics)" for node in isolated_nodes(graph)]
 
 
-def service_edges(graph: GraphSnapshot) -> list[tuple[str, str, str]]:
-    """Return every client with each server that it may call or with nobody, without the parts of actions."""
-    ends = [end for end in graph.services if not _hidden(end.service)]
-    clients = [end for end in ends if end.kind == "client"]
-    servers = [end for end in ends if end.kind == "service"]
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A client, and a server that it may call; either is `(nobody)` if there is none."""
+
+    kind: str  # `service` or `action`
+    client: str
+    name: str
+    server: str
+
+
+def call_edges(graph: GraphSnapshot) -> list[Call]:
+    """Return every client of a service or action with each server that it may call or with nobody."""
+    ends = [(kind, name, end) for end in graph.services for kind, name in _offered(end.service)]
+    clients = [(kind, name, end) for kind, name, end in ends if end.kind == "client"]
+    servers = [(kind, name, end) for kind, name, end in ends if end.kind == "service"]
     found = [
-        (client.node, client.service, server.node)
-        for client in clients
-        for server in servers
+        Call(kind, client.node, name, server.node)
+        for kind, name, client in clients
+        for _, _, server in servers
         if (client.service, client.type) == (server.service, server.type)
     ]
-    called, calling = {(e[1], e[2]) for e in found}, {(e[0], e[1]) for e in found}
-    found += [(c.node, c.service, NOBODY) for c in clients if (c.node, c.service) not in calling]
-    found += [(NOBODY, s.service, s.node) for s in servers if (s.service, s.node) not in called]
-    return found
+    called, calling = {(c.name, c.server) for c in found}, {(c.client, c.name) for c in found}
+    found += [Call(kind, c.node, name, NOBODY) for kind, name, c in clients if (c.node, name) not in calling]
+    found += [Call(kind, NOBODY, name, s.node) for kind, name, s in servers if (name, s.node) not in called]
+    return list(dict.fromkeys(found))
 
 
-def _called(client: str, service: str, server: str) -> str:
-    names = (shown(part, limit=_NAME_LIMIT) for part in (client, service, server))
-    return "{} ┄┄{}┄┄▶ {}".format(*names)
+def _offered(service: str) -> Iterator[tuple[str, str]]:
+    """Yield kind and name of what a service stands for: an action has five, of which one is enough to know it."""
+    if service.endswith(_GOAL_SERVICE):
+        yield "action", service.removesuffix(_GOAL_SERVICE)
+    elif not _hidden(service):
+        yield "service", service
+
+
+_ARROWS = {"service": "{} ┄┄{}┄┄▶ {}", "action": "{} ══{}══▶ {}"}
+
+
+def _called(call: Call) -> str:
+    names = (shown(part, limit=_NAME_LIMIT) for part in (call.client, call.name, call.server))
+    return _ARROWS[call.kind].format(*names)
 
 
 def graph_edges(graph: GraphSnapshot) -> list[Edge]:
@@ -67,6 +90,7 @@ def graph_edges(graph: GraphSnapshot) -> list[Edge]:
 def isolated_nodes(graph: GraphSnapshot) -> list[str]:
     """Return the nodes without edges."""
     joined = {name for source, _, target, _ in graph_edges(graph) for name in (source, target)}
+    joined |= {name for call in call_edges(graph) for name in (call.client, call.server)}
     return [node for node in graph.nodes if node not in joined]
 
 
@@ -77,14 +101,21 @@ def _edges(graph: GraphSnapshot) -> Iterator[Edge]:
     for publisher in publishers:
         takers = [s for s in subscriptions if s.topic == publisher.topic]
         for taker in takers:
-            quarrel = "" if publisher.type == taker.type else f"types differ: {publisher.type}, {taker.type}"
-            yield publisher.node, publisher.topic, taker.node, quarrel
+            yield publisher.node, publisher.topic, taker.node, _quarrel(publisher, taker)
         if not takers:
             yield publisher.node, publisher.topic, NOBODY, ""
     served = {p.topic for p in publishers}
     for subscription in subscriptions:
         if subscription.topic not in served:
             yield NOBODY, subscription.topic, subscription.node, ""
+
+
+def _quarrel(publisher: Endpoint, subscription: Endpoint) -> str:
+    """Return what keeps messages from passing; empty if nothing does."""
+    if publisher.type != subscription.type:
+        return f"types differ: {publisher.type}, {subscription.type}"
+    policy = unmet_policy(publisher, subscription)
+    return f"incompatible QoS: {policy[0]} offered, {policy[1]} requested" if policy else ""
 
 
 def _hidden(topic: str) -> bool:
@@ -103,11 +134,13 @@ _MERMAID_NAME_LIMIT = 100
 
 
 def draw_mermaid(graph: GraphSnapshot) -> str:
-    """Return the lines of a flowchart; an edge without messages, because the types differ, is dotted."""
-    edges = graph_edges(graph)
-    kept, left_out = edges[:MOST_EDGES], len(edges) - MOST_EDGES
+    """Return the lines of a flowchart; an edge without messages, because types or QoS do not fit, is dotted."""
+    edges, calls = graph_edges(graph), call_edges(graph)
+    left_out = max(0, len(edges) - MOST_EDGES) + max(0, len(calls) - MOST_EDGES)
     drawing = _Drawing()
-    lines = list(dict.fromkeys(line for edge in kept for line in drawing.edge(edge)))
+    drawn = [line for edge in edges[:MOST_EDGES] for line in drawing.edge(edge)]
+    drawn += [line for call in calls[:MOST_EDGES] for line in drawing.call(call)]
+    lines = list(dict.fromkeys(drawn))
     lonely = [drawing.node(name) for name in isolated_nodes(graph)[:MOST_EDGES]]
     more = [f'more["and {left_out} more"]'] if left_out > 0 else []
     return (
@@ -137,6 +170,14 @@ class _Drawing:
         if target != NOBODY:
             arrow = f'-. "{mermaid_label(quarrel)}" .->' if quarrel else "-->"
             yield f"{topic} {arrow} {self.node(target)}"
+
+    def call(self, call: Call) -> Iterator[str]:
+        """Yield the arrows from the client to the service or action and on to the server."""
+        box = self._box(call.kind, call.name, '{{"', '"}}')
+        if call.client != NOBODY:
+            yield f"{self.node(call.client)} --> {box}"
+        if call.server != NOBODY:
+            yield f"{box} --> {self.node(call.server)}"
 
     def _box(self, kind: str, name: str, opening: str, closing: str) -> str:
         key = (kind, name)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 
-from grader.core.quantities import seconds
+from grader.core.quantities import counted, seconds
 from grader.core.report import JsonObject, Pace, Summary, TopicSummary
 from grader.core.trace import Endpoint, Fault, LogRecord, Offer, OutputLine
 from grader.reporting.escape import json_value, shown
@@ -16,7 +16,11 @@ from grader.reporting.json_report import start_values
 SCHEMA = "grader/observation/v1"
 #: Lines of one kind that the text shows; the rest are counted.
 SHOWN_LINES = 12
-SHOWN_RANGES = 8
+SHOWN_FIELDS = 8
+#: The different texts of a field that are shown, and the characters of each.
+SHOWN_TEXTS, TEXT_LIMIT = 3, 60
+#: Whole numbers below this are shown in full.
+WHOLE = 1e15
 WIDTH = 100
 
 
@@ -64,16 +68,32 @@ def _topic(topic: TopicSummary) -> Iterator[str]:
     yield from (f"  subscribed by {_end(e)}" for e in topic.subscriptions)
     if topic.publishers:
         yield f"  {_traffic(topic)}"
-    ranges = list(topic.ranges.items())
-    yield from (f"  {shown(name)}: {_range(*limits)}" for name, limits in ranges[:SHOWN_RANGES])
-    if len(ranges) > SHOWN_RANGES:
-        yield f"  and {len(ranges) - SHOWN_RANGES} more fields (--json shows them)"
+    fields = list(_contents(topic))
+    yield from (f"  {line}" for line in fields[:SHOWN_FIELDS])
+    if len(fields) > SHOWN_FIELDS:
+        yield f"  and {counted(len(fields) - SHOWN_FIELDS, 'more field')} (--json shows them)"
+
+
+def _contents(topic: TopicSummary) -> Iterator[str]:
+    """Yield a line for each field: texts first, then arrays and numbers, and last what is empty or always 0."""
+    for name, (values, count) in topic.texts.items():
+        if values != ("",):
+            some = ", ".join(f'"{shown(value, limit=TEXT_LIMIT)}"' for value in values[:SHOWN_TEXTS])
+            yield f"{shown(name)}: {some}{f' and {count - SHOWN_TEXTS} more' if count > SHOWN_TEXTS else ''}"
+    rest = {name: limits for name, limits in topic.ranges.items() if name.removesuffix("[]") not in topic.lengths}
+    for empty in (False, True):
+        for name, (least, most) in topic.lengths.items():
+            if (most == 0) is empty:
+                limits = topic.ranges.get(f"{name}[]")
+                size = counted(most, "element") if least == most else f"{least} to {counted(most, 'element')}"
+                yield f"{shown(name)}: {size}{f', {_range(*limits)}' if limits else ''}"
+        yield from (f"{shown(n)}: {_range(*limits)}" for n, limits in rest.items() if (limits == (0, 0)) is empty)
 
 
 def _traffic(topic: TopicSummary) -> str:
     if topic.first_s is None:
         return "no message"
-    text = f"{topic.messages} messages, the first at t = {topic.first_s:.3f} s"
+    text = f"{counted(topic.messages, 'message')}, the first at t = {topic.first_s:.3f} s"
     pace = topic.pace
     if pace is None:
         return text
@@ -88,7 +108,12 @@ def _end(end: Endpoint) -> str:
 
 
 def _range(low: float, high: float) -> str:
-    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    return _number(low) if low == high else f"{_number(low)} to {_number(high)}"
+
+
+def _number(value: float) -> str:
+    """Format a number; whole ones in full, such as the seconds of a time."""
+    return f"{value:.0f}" if value == int(value) and abs(value) < WHOLE else f"{value:g}"
 
 
 def _cut(lines: Iterator[str]) -> list[str]:
@@ -149,6 +174,8 @@ def _topic_json(topic: TopicSummary) -> Mapping[str, object]:
         "first_s": topic.first_s,
         **pace,
         "ranges": topic.ranges,
+        "texts": {name: {"values": values, "different": count} for name, (values, count) in topic.texts.items()},
+        "lengths": topic.lengths,
     }
 
 

@@ -163,6 +163,8 @@ def _share(score: float, max_score: float) -> float:
 
 SCHEMA = "grader/rejudged/v1"
 _OUTCOMES = {"not_met": "not met"}
+#: Most names in one line.
+_MOST_NAMES = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +195,10 @@ def render_changes(results: Sequence[RejudgedResult]) -> str:
     changes = dropped_first([r.change for r in judged if r.change is not None])
     compared = [r.change for r in judged if r.change is not None]
     lines = change_summary(compared) if changes else []
-    lines += [line for change in changes for line in _change(change)]
+    # Of a single submission everything is told, of a class only what changes a score.
+    told = [change for change in changes if _score_changed(change) or len(judged) == 1]
+    lines += [line for change in told for line in _change(change)]
+    lines += _same_score([change for change in changes if change not in told])
     incomparable = [f"{_name(r.name)}: no first report to compare with" for r in judged if r.change is None]
     same = len(judged) - len(changes) - len(incomparable)
     return "\n".join([*lines, *incomparable, *_refused(results), f"unchanged: {same} of {len(judged)}"]) + "\n"
@@ -230,7 +235,7 @@ def _of_all(row: CriterionSummary) -> str:
     """Return how a criterion changed in a class, e.g. `rate: 10 -> 5 points; 57 changed, mean 8.2 -> 4.1`."""
     name = f"{shown(row.exercise)}/{shown(row.criterion)}"
     if row.max_after is None:
-        return f"{name}: asked no more, it had {_points(row.max_before or 0)} points; {row.changed} changed"
+        return f"{name}: no longer asked, it had {_points(row.max_before or 0)} points; {row.changed} changed"
     if row.max_before is None:
         return f"{name}: new, with {_points(row.max_after)} points; {row.changed} changed, mean {row.mean_after:.1f}"
     of = _points(row.max_before)
@@ -294,9 +299,23 @@ def _change(change: ReportChange) -> Iterator[str]:
         yield f"    {shown(row.exercise)}/{shown(row.criterion)}: {_row(row)}"
 
 
+def _score_changed(change: ReportChange) -> bool:
+    return (change.before, change.before_max) != (change.after, change.after_max)
+
+
+def _same_score(changes: Sequence[ReportChange]) -> list[str]:
+    """Return one line about the submissions of which only the points of criteria changed, not their sum."""
+    if not changes:
+        return []
+    names = ", ".join(_name(change.name) for change in changes[:_MOST_NAMES])
+    more = f" and {len(changes) - _MOST_NAMES} more" if len(changes) > _MOST_NAMES else ""
+    keeps = "1 keeps its score" if len(changes) == 1 else f"{len(changes)} keep their score"
+    return [f"{keeps}, but criteria changed: {names}{more}"]
+
+
 def _row(row: CriterionChange) -> str:
     if row.after is None:
-        return f"was {_standing(row.before)}, is asked no more"
+        return f"was {_standing(row.before)}, is no longer asked"
     before = "was not asked" if row.before is None else f"was {_standing(row.before)}"
     return f"{before}, is {_standing(row.after)}: {shown(row.after.reason, limit=200)}"
 

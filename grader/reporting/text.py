@@ -24,7 +24,6 @@ _STYLES = {
     Outcome.BLOCKED: "dim",
     Outcome.UNDECIDED: "bold magenta",
 }
-_LOST = (Outcome.NOT_MET, Outcome.PARTLY)
 _WORD_WIDTH = max(len(word) for word in OUTCOME_WORDS.values())
 _DETAIL = " " * 6
 # Ends a line of a command that continues on the next one.
@@ -38,7 +37,7 @@ def render_text(report: Report, *, width: int, colour: bool, verbose: bool = Fal
     the calls that led to faults, the ROS graph, and how to reproduce the report.
     """
     page = Page(width=width, colour=colour)
-    first = _first_to_fix(report)
+    first = wording.first_to_fix(report)
     _head(page, report, verbose=verbose)
     if first is not None:
         _fix_first(page, *first)
@@ -79,27 +78,6 @@ def _head(page: Page, report: Report, *, verbose: bool) -> None:
         page.put(warning, style="bold magenta")
     if verbose:
         page.put(wording.summary(report))
-
-
-def _first_to_fix(report: Report) -> tuple[ExerciseReport, Verdict] | None:
-    """Return the criterion that a student should look at first: one on a file that exists, or that has another name.
-
-    An exercise that nothing was handed in for comes first only if there is no other.
-    """
-    begun = [e for e in report.exercises if not all(map(_needs_absent, e.verdicts))] or report.exercises
-    lost = [(e, v) for e in begun for v in e.verdicts if v.outcome in _LOST and not v.same_cause_as]
-    return next((found for found in lost if not _is_absent(found[1])), lost[0] if lost else None)
-
-
-def _needs_absent(verdict: Verdict) -> bool:
-    """Return whether a verdict says only that a file is missing."""
-    return bool(verdict.missing_file) or _is_absent(verdict)
-
-
-def _is_absent(verdict: Verdict) -> bool:
-    """Return whether a file is missing, without another that may be meant."""
-    known = verdict.evidence
-    return bool(known.get("missing")) and not (known.get("similar") or known.get("likely"))
 
 
 def _fix_first(page: Page, exercise: ExerciseReport, verdict: Verdict) -> None:

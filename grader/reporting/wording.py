@@ -30,6 +30,7 @@ OUTCOME_WORDS = {
     Outcome.BLOCKED: "blocked",
     Outcome.UNDECIDED: "undecided",
 }
+_LOST = (Outcome.NOT_MET, Outcome.PARTLY)
 _WHAT_HAPPENED = {
     "syntax_error": "could not be compiled",
     "exception": "raised an exception",
@@ -68,18 +69,57 @@ def warnings(report: Report) -> list[str]:
     lines = [_partial(report)] if report.pending else []
     judged = [verdict for e in report.exercises if e.id not in report.pending for verdict in e.verdicts]
     undecided = [verdict for verdict in judged if verdict.outcome is Outcome.UNDECIDED]
-    if undecided:
-        lines.append(_not_final(undecided))
-    return lines
+    causes = {verdict.id: _author_mistake(verdict, judged) for verdict in undecided}
+    lines += [
+        _rubric_wrong(mistake, [verdict for verdict in undecided if causes[verdict.id] == mistake])
+        for mistake in dict.fromkeys(filter(None, causes.values()))
+    ]
+    others = [verdict for verdict in undecided if not causes[verdict.id]]
+    return [*lines, *([_not_final(others)] if others else [])]
+
+
+def author_mistakes(report: Report) -> list[str]:
+    """Return the mistakes of the rubrics' authors that leave criteria undecided, each once, with its place."""
+    found = (verdict.author_mistake for exercise in report.exercises for verdict in exercise.verdicts)
+    return list(dict.fromkeys(filter(None, found)))
 
 
 def summary(report: Report) -> str:
     """Return how many criteria have each outcome."""
-    verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
-    counts = Counter(verdict.outcome for verdict in verdicts)
+    return summary_of([verdict.outcome for e in report.exercises for verdict in e.verdicts], final=report.final)
+
+
+def summary_of(outcomes: Sequence[Outcome], *, final: bool) -> str:
+    """Return how many criteria have each outcome, given the outcome of each, as a sentence."""
+    return f"{'Final' if final else 'So far'}: {outcome_counts(outcomes)}."
+
+
+def outcome_counts(outcomes: Sequence[Outcome]) -> str:
+    """Return how many criteria have each outcome, as a phrase."""
+    counts = Counter(outcomes)
     parts = [f"{counts[outcome]} {word}" for outcome, word in OUTCOME_WORDS.items() if counts[outcome]]
-    judged = [f"{counts[Outcome.MET]} of {len(verdicts)} criteria met", *parts[bool(counts[Outcome.MET]) :]]
-    return f"{'Final' if report.final else 'So far'}: {', '.join(judged)}."
+    return ", ".join([f"{counts[Outcome.MET]} of {len(outcomes)} criteria met", *parts[bool(counts[Outcome.MET]) :]])
+
+
+def first_to_fix(report: Report) -> tuple[ExerciseReport, Verdict] | None:
+    """Return the criterion that a student should look at first: one on a file that exists, or that has another name.
+
+    An exercise that nothing was handed in for comes first only if there is no other.
+    """
+    begun = [e for e in report.exercises if not all(map(_needs_absent, e.verdicts))] or report.exercises
+    lost = [(e, v) for e in begun for v in e.verdicts if v.outcome in _LOST and not v.same_cause_as]
+    return next((found for found in lost if not _is_absent(found[1])), lost[0] if lost else None)
+
+
+def _needs_absent(verdict: Verdict) -> bool:
+    """Return whether a verdict says only that a file is missing."""
+    return bool(verdict.missing_file) or _is_absent(verdict)
+
+
+def _is_absent(verdict: Verdict) -> bool:
+    """Return whether a file is missing, without another that may be meant."""
+    known = verdict.evidence
+    return bool(known.get("missing")) and not (known.get("similar") or known.get("likely"))
 
 
 def reason(verdict: Verdict) -> str:
@@ -262,13 +302,42 @@ def _partial(report: Report) -> str:
 
 
 def _not_final(undecided: Sequence[Verdict]) -> str:
-    count = len(undecided)
-    criteria = "1 criterion is" if count == 1 else f"{count} criteria are"
-    open_points = points(sum((v.max_score for v in undecided), Fraction(0)))
+    criteria, open_points = _open(undecided)
+    suspected = [verdict for verdict in undecided if verdict.suspected]
+    if suspected:
+        some = "" if len(suspected) == len(undecided) else "some of them "
+        return (
+            f"This score is not final: {criteria} undecided, {some}perhaps because of what the submission does; "
+            f"{open_points} points are still open. The reasons say more."
+        )
     return (
         f"This score is not final: {criteria} undecided through no fault of the student, "
         f"{open_points} points are still open. Grade again."
     )
+
+
+def _rubric_wrong(mistake: str, undecided: Sequence[Verdict]) -> str:
+    criteria, open_points = _open(undecided)
+    return (
+        f"This score is not final: the rubric has a mistake, {shown(mistake)}. Because of it, {criteria} undecided and "
+        f"{open_points} points are still open."
+    )
+
+
+def _open(undecided: Sequence[Verdict]) -> tuple[str, str]:
+    """Return how many criteria are undecided, as the beginning of a clause, and how many points they have."""
+    count = len(undecided)
+    open_points = points(sum((v.max_score for v in undecided), Fraction(0)))
+    return "1 criterion is" if count == 1 else f"{count} criteria are", open_points
+
+
+def _author_mistake(verdict: Verdict, judged: Sequence[Verdict]) -> str:
+    """Return the mistake that leaves a criterion undecided, also through one that it needs; empty if none does."""
+    seen: set[str] = set()
+    while not verdict.author_mistake and verdict.blocked_by not in {"", *seen}:
+        seen.add(verdict.blocked_by)
+        verdict = next((one for one in judged if one.id == verdict.blocked_by), verdict)
+    return verdict.author_mistake
 
 
 def whole_points(scores: Sequence[Fraction], max_scores: Sequence[Fraction]) -> list[tuple[int, int]]:

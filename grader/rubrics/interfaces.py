@@ -61,6 +61,8 @@ _SENT: Mapping[type[Stimulus], tuple[str, str]] = {
     ActionGoal: ("goal", "_Goal"),
 }
 _KINDS = {"msg": "message", "srv": "service", "action": "action"}
+#: Values of simulated messages whose types can be told before they are published.
+_PLAIN = (bool, int, float, str, list, tuple, Mapping)
 _ORDERS = ("any_order", "in_order", "some_of")
 #: Builds the interface packages in some folders, and returns the folders with their type descriptions.
 Build = Callable[[Sequence[Path]], Sequence[Path]]
@@ -313,13 +315,13 @@ class _Checked:
 
         for path, offered_ in self._simulated:
             for topic, value in offered_.outputs:
-                wrong = self._unknown_field(value, offered_.publishes[topic], topic)
+                wrong = self._wrong_output(value, offered_.publishes[topic], topic)
                 if wrong:
                     yield self._tree.at_key(path).mistake(f"expected a simulation that runs, found that {wrong}")
                     break
 
-    def _unknown_field(self, value: Mapping[str, Any], type_: str, where: str) -> str:
-        """Describe the first field in a simulated message that its type does not have; empty if there is none."""
+    def _wrong_output(self, value: Mapping[str, Any], type_: str, where: str) -> str:
+        """Describe the first field in a simulated message that its type has not, or cannot hold; empty if none."""
         known = self._interfaces.fields(type_)
         for name, inner in value.items() if known is not None else ():
             if name not in (known or {}):
@@ -328,9 +330,11 @@ class _Checked:
             items = inner if field.is_list and isinstance(inner, (list, tuple)) else [inner]
             for item in items:
                 if field.element == _NESTED and isinstance(item, Mapping):
-                    found = self._unknown_field(item, field.type.nested_type_name, f"{where} in `{name}`")
-                    if found:
-                        return found
+                    found_ = self._wrong_output(item, field.type.nested_type_name, f"{where} in `{name}`")
+                    if found_:
+                        return found_
+                elif isinstance(item, Mapping) or (isinstance(item, _PLAIN) and not _fits(item, field.item(name))):
+                    return f"what it publishes on {where} has {found(item)} in `{name}`, expected {field.words}"
         return ""
 
     def _raw(self, path: TreePath) -> Any:

@@ -7,6 +7,7 @@ import re
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
@@ -346,6 +347,7 @@ def _exercise(
         criteria=criteria,
         digest=digest,
         by_request=rubric.exercise.by_request,
+        bonus=rubric.exercise.bonus or Fraction(0),
         interfaces=tuple(str(path.parent / folder) for folder in rubric.interfaces),
     )
 

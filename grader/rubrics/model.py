@@ -169,6 +169,7 @@ class ExerciseShape(Shape):
     title: Text
     required: YesNo = True
     by_request: YesNo = False
+    bonus: Points | None = Field(default=None, description="points above the maximum that an instructor may give")
 
 
 class ScenarioShape(Shape):

@@ -15,7 +15,7 @@ from grader.core.scenario import Between, Choose, FieldSpec, Simulated, Written
 from grader.rubrics.model import RubricShape, ScenarioShape
 from grader.rubrics.types import build
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlTree
-from grader.simulation.loading import guarded, made
+from grader.simulation.loading import begin_of, guarded, made
 from grader.simulation.participant import Moment, Output
 from grader.submissions.collected import shown
 
@@ -54,11 +54,14 @@ def offered(simulated: Simulated) -> Offered:
         raise HarnessError(
             f"the simulation `{simulated.name}` has a period of {one.period!r} ns, expected at least 1 ms"
         )
-    publishes, hears, serves = (dict(call(each)) for each in (one.publishes, one.hears, one.serves))
+    publishes, hears, serves = (
+        call(lambda method=method: dict(getattr(one, method)()), begin_of(one, method, simulated.path))  # type: ignore[misc]
+        for method in ("publishes", "hears", "serves")
+    )
     outputs: list[Output] = []
     for number in range(STEPS):
         now = Moment(number * one.period, number * one.period)
-        outputs += call(lambda now=now: list(islice(one.step(now), OUTPUTS)))  # type: ignore[misc]
+        outputs += call(lambda now=now: list(islice(one.step(now), OUTPUTS)), begin_of(one, "step", simulated.path))  # type: ignore[misc]
     wrong = [output for output in outputs if not _is_output(output, publishes)]
     if wrong:
         text = f"the simulation `{simulated.name}` publishes {shown(str(wrong[0]), 80)}, expected one of its topics "

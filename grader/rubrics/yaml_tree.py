@@ -60,6 +60,8 @@ class YamlTree:
     data: object = None
     values: dict[TreePath, Position] = field(default_factory=dict)  # position of each value
     keys: dict[TreePath, Position] = field(default_factory=dict)  # position of the key of each value in a mapping
+    # Text of each plain value as it is written: YAML reads `+5`, `0x5` and `5` as the same number
+    texts: dict[TreePath, str] = field(default_factory=dict)
     # Invalid parts: duplicate keys, keys that are not text, unknown tags
     mistakes: list[Mistake] = field(default_factory=list)
 
@@ -156,6 +158,7 @@ class _Reader:
             return self._mapping(node, path)
         if isinstance(node, SequenceNode):
             return [self.value(item, (*path, i)) for i, item in enumerate(node.value)]
+        self._tree.texts[path] = str(node.value)
         return self._scalar(cast("ScalarNode", node))
 
     def _mapping(self, node: MappingNode, path: TreePath) -> Mapping[str, object]:

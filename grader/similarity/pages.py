@@ -26,7 +26,7 @@ _LINE_LIMIT = 400
 OVERVIEW = "index.html"
 COLUMNS = (
     *("kind", "page", "submission", "name", "file", "share"),
-    *("other_submission", "other_name", "other_file", "other_share", "signs"),
+    *("other_submission", "other_name", "other_file", "other_share", "characters"),
 )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from types import FrameType
 from typing import Any, TypeVar
 
-from grader.core.author_files import line_of, run, words_of
+from grader.core.author_files import AuthorMistake, line_of, run, words_of
 from grader.core.errors import HarnessError
 from grader.simulation.participant import Simulation
 from grader.simulation.robots import SIMULATIONS
@@ -19,6 +19,14 @@ Result = TypeVar("Result")
 TABLE = "SIMULATIONS"
 #: Processor time that one call of a simulation may take, in seconds.
 CALL_S = 5.0
+
+
+class SimulationError(HarnessError):
+    """A simulation in a rubric's file fails; the rubric's author has to fix it."""
+
+    def __init__(self, mistake: AuthorMistake) -> None:
+        super().__init__(str(mistake))
+        self.mistake = mistake
 
 
 class _Endless(BaseException):
@@ -50,16 +58,18 @@ def made(name: str, path: str, content: bytes, parameters: Mapping[str, Any]) ->
     return guarded(name, path, make)
 
 
-def guarded(name: str, path: str, work: Callable[[], Result]) -> Result:
+def guarded(name: str, path: str, work: Callable[[], Result], begins: int = 1) -> Result:
     """Call a simulation, and return what it returns.
 
     Args:
         name: Its name in a rubric.
         path: The author's file, empty for a built-in simulation.
         work: The call.
+        begins: The line to name if an error arises outside of the file, because a method returns something wrong.
 
     Raises:
-        HarnessError: It raises an error, or takes too long.
+        SimulationError: It is in an author's file, and raises an error or takes too long.
+        HarnessError: The same of a built-in one.
     """
 
     def stop(number: int, frame: FrameType | None) -> None:
@@ -73,13 +83,21 @@ def guarded(name: str, path: str, work: Callable[[], Result]) -> Result:
             signal.setitimer(signal.ITIMER_VIRTUAL, CALL_S)
         return work()
     except (Exception, SystemExit, _Endless) as error:  # whatever the author's file raises, the author has to fix
-        where = f"{path}:{line_of(error, path)}: " if path else ""
         kind = "" if isinstance(error, _Endless) else f"{type(error).__name__}: "
-        raise HarnessError(f"{where}the simulation `{name}` failed: {kind}{words_of(error)[:200]}") from error
+        text = f"the simulation `{name}` failed: {kind}{words_of(error)[:200]}"
+        if not path:
+            raise HarnessError(text) from error
+        raise SimulationError(AuthorMistake(path, line_of(error, path, begins), text)) from error
     finally:
         if timed:
             signal.setitimer(signal.ITIMER_VIRTUAL, 0)
             signal.signal(signal.SIGVTALRM, before)
+
+
+def begin_of(simulation: Simulation, method: str, path: str) -> int:
+    """Return the line of an author's file in which a method of a simulation begins; 0 if it begins elsewhere."""
+    code = getattr(getattr(type(simulation), method, None), "__code__", None)
+    return code.co_firstlineno if code is not None and code.co_filename == path else 0
 
 
 def _as_parameter(value: Any) -> Any:

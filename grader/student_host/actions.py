@@ -56,7 +56,22 @@ SERVICES = {
 }
 #: Checks whether a client has a server, without counting as a look, which would let time pass.
 HAS_SERVER = _rclpy.ActionClient.is_action_server_available
+#: The name of the class of a generated class: it holds the type support, by which ROS knows the type.
+_GENERATED = "Metaclass_"
 TOPICS = {"feedback": "{}_FeedbackMessage", "status": "action_msgs/msg/GoalStatusArray"}
+
+
+def type_name(interface: type) -> str:
+    """Return the ROS name of a message, service or action class, e.g. `geometry_msgs/msg/Twist`.
+
+    A class of the student's own has the type of the generated class that it is derived from.
+    """
+    meta: type = type(interface)
+    for generated in meta.__mro__:
+        package, _, rest = generated.__module__.partition(".")
+        if generated.__name__.startswith(_GENERATED) and rest:
+            return f"{package}/{rest.partition('.')[0]}/{generated.__name__.removeprefix(_GENERATED)}"
+    raise TypeError(f"expected a ROS type, found {interface!r}")
 
 
 class Receiver:
@@ -166,8 +181,7 @@ def _register(kind: str, cls: Any, ledger: Ledger, settle: Callable[[], None], l
         # the first argument of a server is the clock of its node
         interface, name = arguments[1:3] if kind == "service" else arguments[:2]
         resolved = _rclpy.rclpy_resolve_name(node, name, False, False)  # noqa: FBT003 - C++
-        package, namespace = interface.__module__.split(".")[:2]
-        ledger.add_action(ActionEnd(kind, self, resolved, f"{package}/{namespace}/{interface.__name__}"))
+        ledger.add_action(ActionEnd(kind, self, resolved, type_name(interface)))
 
     def destroyed(self: Any) -> None:
         leave()

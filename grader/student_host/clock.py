@@ -4,8 +4,12 @@ from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable
 
-#: Virtual time starts at 2026-01-01 00:00:00 UTC.
-EPOCH_NS = 1_767_225_600_000_000_000
+#: The first moment at which virtual time may start, 2026-11-01 00:00:00 UTC, and how much later it may: a plan draws
+#: the moment from the year after the release of the grader, so that no date shows that time is virtual, and a file gets
+#: the same report on every day. Each release sets it to the first day of its month.
+EPOCH_NS, EPOCH_SPAN_S = 1_793_491_200_000_000_000, 365 * 24 * 60 * 60
+#: What monotonic clocks show when virtual time starts, at least, and how much more: a machine that has run for a while.
+UPTIME_NS, UPTIME_SPAN_S = 1_000_000_000_000, 20 * 24 * 60 * 60
 
 #: How far time advances for a program that never blocks, each time it shows that it only waits for time to pass.
 STEP_NS = 500_000
@@ -18,6 +22,11 @@ LOOKS_WHILE_SPINNING = 4
 #: How late a pause ends in a program that looks at clocks, as on any real machine. If it ended exactly on time, whether
 #: `now - last > period` holds would depend on rounding, or it would hold one pause later than its author ever saw.
 LATE_NS = 1_000
+#: How much later each further look at one instant is, as on any real machine: programs divide by the difference. It is
+#: the smallest difference that `datetime` shows.
+LOOK_NS = 1_000
+#: So far ahead of the instant, looks make time pass. It is less than STEP_NS, so that time never seems to go back.
+AHEAD_NS = 400_000
 #: This many messages sent at one instant show that a program does not pace itself.
 MESSAGES_AT_ONCE = 200
 
@@ -31,6 +40,8 @@ class VirtualClock:
 
     def __init__(self) -> None:
         self.now_ns = EPOCH_NS
+        #: What is subtracted for monotonic clocks, which start neither at zero nor at the epoch.
+        self.steady_ns = EPOCH_NS - UPTIME_NS
         self._looks = 0
         self._allowed = LOOKS
         self._yielding = False
@@ -38,8 +49,13 @@ class VirtualClock:
         self._looked_at = False
         self._was_looked_at = False
         self._seen_ns = 0
-        #: Whether a pause or a timer's period has begun at this moment, so that the work before it delays what follows.
-        self.counted = False
+        #: The latest time that the program was shown, which may be after `now_ns`.
+        self._shown_ns = 0
+        #: Whether a pause or a timer's period has begun since the last report, so that the work before it delays what
+        #: follows; and whether one did before which the program had not looked at a clock.
+        self.paused = self.counted = False
+        #: Lets the time pass that the program has worked, if that is part of the recording.
+        self.charge: Callable[[], None] = lambda: None
         #: Returns the system clock in nanoseconds since 1970, once rclpy is there to read it.
         self.real_ns: Callable[[], int] = lambda: 0
         #: The latest pauses: when each began in real time, in nanoseconds since 1970, and the virtual time then.
@@ -67,21 +83,41 @@ class VirtualClock:
 
     def end_of(self, pause_ns: int) -> int:
         """Return when a pause that begins now ends."""
-        if pause_ns > 0:
-            self.count_pause()
-        return self.now_ns + pause_ns + (LATE_NS if self._was_looked_at and pause_ns > 0 else 0)
+        if pause_ns <= 0:
+            return self.now_ns + pause_ns
+        self.count_pause()
+        # If it is counted from a look, it ends at the deadline that the program has in mind, or after it.
+        late_ns = LATE_NS if self._was_looked_at else 0
+        return max(self.now_ns, self._shown_ns) + pause_ns + late_ns
 
     def count_pause(self) -> None:
-        """Note that a pause begins, unless the program has just looked at a clock: it may sleep until a deadline."""
+        """Note that a pause begins which is counted from now; after a look at a clock, it may be until a deadline."""
+        self.begin_pause()
         self.counted |= self._seen_ns != self.now_ns
 
-    def look(self, *, by_library: bool = False) -> int:
-        """Return the time to the program, and let time pass if the program does nothing but look."""
+    def begin_pause(self) -> None:
+        """Note that a pause begins which may be counted from now."""
+        self.charge()
+        self.paused = True
+
+    def look(self, *, paces: bool = True, shown: bool = True) -> int:
+        """Return the time to the program, and let time pass if the program does nothing but look.
+
+        Args:
+            paces: Whether the program may pace itself by what it sees; a library that only notes the time does not.
+            shown: Whether the program sees the time itself. Looks of libraries, whose number is theirs, take no time.
+        """
+        self.charge()
         self._looked_at = True
-        if not by_library:
+        if paces:
             self._was_looked_at, self._seen_ns = True, self.now_ns
         self.idle_look()
-        return self.now_ns
+        if not shown:
+            return max(self.now_ns, self._shown_ns)
+        if self._shown_ns >= self.now_ns + AHEAD_NS and not self._yielding:
+            self._yield()
+        self._shown_ns = max(self.now_ns, self._shown_ns + LOOK_NS)
+        return self._shown_ns
 
     def idle_look(self, weight: int = 1) -> None:
         """Count one look at something that only time can change."""
@@ -91,7 +127,7 @@ class VirtualClock:
             self._yield()
 
     def _yield(self) -> None:
-        self._yielding = True
+        self._yielding = self.paused = True
         try:
             self.let_time_pass(self.now_ns + (STEP_NS if self._looked_at else LONG_STEP_NS))
         finally:
@@ -103,6 +139,7 @@ class VirtualClock:
 
     def busy_sending(self) -> None:
         """Note that the program sends a message, and let time pass after many messages at one instant."""
+        self.charge()
         self.busy()
         self._sent += 1
         if self._sent >= MESSAGES_AT_ONCE and not self._yielding:

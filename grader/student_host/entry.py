@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib
 import importlib.util
+import inspect
 import os
 import sys
 import tempfile
@@ -61,7 +62,8 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     """Run one file of a submission to its end; raises whatever the file raises.
 
     Args:
-        request: The submission's folder as `root`; the file, relative to it; and what it is started with.
+        request: The submission's folder as `root`; the file, relative to it; the console scripts of its package; and
+            what it is started with.
         notify: Called with the way the file is started, before any of its code runs, and with notes for the report.
         install_ros: Called when the program imports rclpy, if a module of the submission hides another one.
     """
@@ -69,7 +71,7 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     path = os.path.join(root, file)
     tree = parse(path)  # raises a syntax error before any code has run
     layout = layout_of(root, file)
-    start = start_of(root, file, layout, tree, request.get("executable", ""))
+    start = start_of(root, file, layout, tree, request.get("executable", ""), request.get("scripts", ()))
     shadows = shadows_of(root, file)
     how = {"way": start.way, "module": start.module, "function": start.function}
     notify({"code": "started", **how, "hidden": shadows.files})
@@ -79,6 +81,7 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     if layout.module:
         _find_neighbours(tree, path, notify)
     sys.argv = [path, *command_line(request)]
+    sys.orig_argv = [sys.executable, *sys.argv]
     if start.way in (SCRIPT, MODULE):
         run_what_nothing_called(_run_as_main(path, start.module, layout), tree, notify)
         return
@@ -167,7 +170,8 @@ def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, notify:
     nodes = _node_classes(namespace)
     if "main" not in namespace and len(nodes) == 1:
         notify({"code": "class_not_started", "class": nodes[0].__name__})
-        spin(nodes[0])
+        if _needs_nothing(nodes[0]):
+            spin(nodes[0])
 
 
 def _calls_at_top_level(statements: Sequence[ast.stmt], name: str) -> bool:
@@ -185,6 +189,15 @@ def _node_classes(namespace: dict[str, Any]) -> list[Any]:
         and issubclass(value, node)
         and value.__module__ == namespace["__name__"]
     ]
+
+
+def _needs_nothing(node_class: Any) -> bool:
+    """Return whether a class can be called without arguments; one that cannot is for other modules to use."""
+    try:
+        inspect.signature(node_class).bind()
+    except TypeError:
+        return False
+    return True
 
 
 def spin(node_class: Any) -> None:

@@ -7,7 +7,8 @@ import os
 import re
 import sys
 import traceback
-from types import FrameType
+from collections.abc import Callable, Iterator
+from types import FrameType, TracebackType
 from typing import Any
 
 #: Maximum length of a fault's text.
@@ -42,6 +43,10 @@ class Describer:
     def exception(self, error: BaseException) -> dict[str, Any]:
         """Convert an uncaught exception to a fault; of a chain, the first one that the program did not expect."""
         error = self._first(error)
+        failed = graders_place(error, self._inside)
+        if failed is not None:
+            module, line = failed
+            return {"code": GRADERS, "type": _name_of(type(error)), "module": module, "at": line, **self._place([])}
         if isinstance(error, SyntaxError) and self._is_of_file(error):
             return self.syntax_error(error)
         frames = [(f.f_code.co_filename, line, f.f_code.co_name) for f, line in traceback.walk_tb(error.__traceback__)]
@@ -145,6 +150,86 @@ class Describer:
             if folder in text:
                 text = re.sub(rf"{re.escape(folder)}(?:/[^{_NO_PATH}]*)?", lambda f: os.path.basename(f[0]), text)
         return text
+
+
+#: The code of a fault that is the grader's own, and the folder of its modules.
+GRADERS = "grader"
+_HOST = os.path.join(os.path.dirname(os.path.abspath(__file__)), "")
+#: Modules that find and run the student's file, or do the work of a module of the standard library: what a function
+#: raises that they call is an answer to the student's code.
+_FOR_STUDENTS = frozenset({"entry", "launch_files", "machine", "outside", "packages", "quick_imports", "setup_files"})
+_FOR_STUDENTS |= {"shadows", "threads", "times"}
+#: What a limit or the end of the process raises, wherever it is at that moment.
+_ANYWHERE = (MemoryError, RecursionError, OSError)
+
+
+def graders_place(error: BaseException, inside: Callable[[str], bool]) -> tuple[str, int] | None:
+    """Return module and line of the grader's code that an exception shows to be wrong; None if it is the student's.
+
+    The grader's functions stand between the program and rclpy or the standard library, and raise what these raise:
+    by a `raise`, by calling the original, or by using an argument. Whatever else arises in them is a mistake of theirs.
+
+    Args:
+        error: An uncaught exception.
+        inside: Whether a file belongs to the submission.
+    """
+    if not isinstance(error, Exception) or isinstance(error, _ANYWHERE):
+        return None
+    if type(error).__module__.partition(".")[0] in ("rclpy", "_rclpy_pybind11"):
+        return None
+    found = None
+    for step in _steps(error):
+        file = step.tb_frame.f_code.co_filename
+        if os.path.abspath(file).startswith(_HOST):
+            found = step
+        elif inside(file) or f"{os.sep}rclpy{os.sep}" in file:
+            found = None
+    if found is None or _answers(found):
+        return None
+    file = found.tb_frame.f_code.co_filename
+    return os.path.relpath(os.path.abspath(file), _HOST), found.tb_lineno
+
+
+def _steps(error: BaseException) -> Iterator[TracebackType]:
+    step = error.__traceback__
+    while step is not None:
+        yield step
+        step = step.tb_next
+
+
+def _answers(step: TracebackType) -> bool:
+    """Return whether a function of the grader that fails there does what the replaced function would do."""
+    code = step.tb_frame.f_code
+    module = os.path.relpath(os.path.abspath(code.co_filename), _HOST).partition(".")[0].partition(os.sep)[0]
+    nodes = _failing(step)
+    if any(isinstance(node, (ast.Raise, ast.With)) for node in nodes):
+        return True
+    if any(isinstance(node, ast.Call) for node in nodes) and module in _FOR_STUDENTS:
+        return True
+    arguments = {*code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]} - {"self"}
+    originals = {*code.co_freevars, *arguments}
+    if any(isinstance(n, ast.Call) and isinstance(n.func, ast.Name) and n.func.id in originals for n in nodes):
+        return True
+    # A function in a function replaces one of a library. Python 3.10 does not tell.
+    replaces = "<locals>" in getattr(code, "co_qualname", "<locals>")
+    used = {n.id for node in nodes if not isinstance(node, ast.Call) for n in ast.walk(node) if isinstance(n, ast.Name)}
+    return replaces and bool(used & arguments)
+
+
+def _failing(step: TracebackType) -> list[ast.stmt | ast.expr]:
+    """Return the parts of the source that a step of a traceback was at; several if Python does not tell which."""
+    code = step.tb_frame.f_code
+    try:
+        with open(code.co_filename, "rb") as source:
+            nodes = [node for node in ast.walk(ast.parse(source.read())) if isinstance(node, (ast.stmt, ast.expr))]
+    except (OSError, SyntaxError, ValueError):
+        return []
+    if hasattr(code, "co_positions"):  # Python 3.11
+        where = list(code.co_positions())[step.tb_lasti // 2]
+        exact = [n for n in nodes if (n.lineno, n.end_lineno, n.col_offset, n.end_col_offset) == where]
+        if exact:
+            return exact
+    return [n for n in nodes if n.lineno == step.tb_lineno and not isinstance(n, (ast.FunctionDef, ast.ClassDef))]
 
 
 def _is_expected(file: str, earlier: int, later: int) -> bool:

@@ -18,13 +18,25 @@ from typing import Any
 
 #: The deepest nesting of included launch files, and the most nodes and things left out that are described.
 DEEPEST, MOST_NODES, MOST_LEFT_OUT = 20, 16, 50
+#: The longest name or text of something that is left out.
+MOST_CHARACTERS = 200
 #: Names this similar to a package of the submission are taken for a misspelling of it.
 SIMILARITY = 0.8
 _TRUE, _FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
 
 
 class LeftOutError(Exception):
-    """Something that only ROS itself can do; the action that needs it is left out."""
+    """Something that only ROS itself can do; the action that needs it is left out.
+
+    Args:
+        code: What it is; the grader has the words for each code.
+        name: Which one.
+        text: What it was given, as text.
+    """
+
+    def __init__(self, code: str, name: str = "", text: str = "") -> None:
+        super().__init__(code)
+        self.told = {"code": code, "name": name[:MOST_CHARACTERS], "text": text[:MOST_CHARACTERS]}
 
 
 class Context:
@@ -56,10 +68,10 @@ class Context:
         """Restore what `scope` has returned."""
         self.launch_configurations, self.namespaces, self.remappings, self.parameters, self.parameter_files = kept
 
-    def leave_out(self, action: Action, what: str) -> None:
+    def leave_out(self, file: str, line: int, error: LeftOutError) -> None:
         """Note something that is not evaluated."""
         if len(self.left_out) < MOST_LEFT_OUT:
-            self.left_out.append({"file": action.file, "line": action.line, "what": what})
+            self.left_out.append({"file": file, "line": line, **error.told})
 
     def share_of(self, package: str) -> str:
         """Return the folder of a package of the submission, which holds what its setup.py installs to share."""
@@ -67,7 +79,7 @@ class Context:
             return self.packages[package]
         if difflib.get_close_matches(package, self.packages, n=1, cutoff=SIMILARITY):
             raise PackageNotFoundError(f"package '{package}' not found, searching: {sorted(self.packages)}")
-        raise LeftOutError(f"the package {package[:80]}, which is not in the submission")
+        raise LeftOutError("package", package)
 
 
 class PackageNotFoundError(KeyError):
@@ -227,7 +239,7 @@ def _content(context: Context, path: Any) -> str:
 
 def _impossible(what: str) -> Callable[..., str]:
     def make(context: Context, *parts: Any) -> str:
-        raise LeftOutError(f"{what}({', '.join(text_of(part, context)[:80] for part in parts)})")
+        raise LeftOutError("substitution", what, ", ".join(text_of(part, context) for part in parts))
 
     return make
 
@@ -431,7 +443,7 @@ class IncludeLaunchDescription(Action):
             return self.source.entities
         path = text_of(getattr(self.source, "path", self.source), context)
         if not path.endswith(".py"):
-            raise LeftOutError(f"the launch file {os.path.basename(path)[:80]}: only Python launch files are evaluated")
+            raise LeftOutError("launch_file", os.path.basename(path))
         if len(context.files) >= DEEPEST:
             raise RecursionError(f"launch files include each other more than {DEEPEST} times")
         context.files.append(path)
@@ -497,10 +509,10 @@ class Node(Action):
     def visit(self, context: Context) -> Iterable[Any]:
         """Describe the node."""
         if len(context.nodes) >= MOST_NODES:
-            raise LeftOutError(f"more than {MOST_NODES} nodes")
+            raise LeftOutError("nodes")
         for name in _NOT_SUPPORTED:
             if self.more.get(name):
-                context.leave_out(self, f"{name}= of a node")
+                context.leave_out(self.file, self.line, LeftOutError("node_argument", name))
         name = text_of(self.name, context) if self.name is not None else ""
         namespace = _namespace(context, text_of(self.namespace, context) if self.namespace is not None else "")
         rules = [*([f"__node:={name}"] if name else []), *([f"__ns:={namespace}"] if namespace else [])]
@@ -536,7 +548,7 @@ class Node(Action):
         else:
             path = text_of(entry.path if isinstance(entry, ParameterFile) else entry, context)
             if not os.path.isfile(path):  # as launch_ros does, with a warning
-                context.leave_out(self, f"the parameter file {os.path.basename(path)[:80]}, which is not there")
+                context.leave_out(self.file, self.line, LeftOutError("parameter_file", os.path.basename(path)))
                 return []
             return [[os.path.basename(path), _read(path)]]
         body = ", ".join(f"{json.dumps(name)}: {_yaml(value)}" for name, value in values.items())
@@ -650,7 +662,7 @@ def _set_environment(context: Context, name: Any, value: Any = "", *_: Any) -> N
     variable = text_of(name, context)
     context.environment[variable] = text_of(value, context)
     if not variable.startswith(("RCUTILS_", "PYTHONUNBUFFERED")):  # these only change how logs look
-        raise LeftOutError(f"the environment variable {variable[:80]}")
+        raise LeftOutError("variable", variable)
 
 
 class ExecuteProcess(Action):
@@ -665,7 +677,7 @@ class ExecuteProcess(Action):
         words = [text_of(part, context) for part in self.command]
         words = words[0].split() + words[1:] if words else []
         if words[:2] != ["ros2", "run"] or len(words) < 4:
-            raise LeftOutError(f"ExecuteProcess: {' '.join(words)[:80]}")
+            raise LeftOutError("command", text=" ".join(words))
         split = words.index("--ros-args") if "--ros-args" in words else len(words)
         node = Node(package=words[2], executable=words[3], arguments=words[4:split], ros_arguments=words[split + 1 :])
         node.file, node.line = self.file, self.line
@@ -681,7 +693,7 @@ class Unknown(Action):
 
     def visit(self, context: Context) -> Iterable[Any]:
         """Leave it out."""
-        raise LeftOutError(type(self).__name__)
+        raise LeftOutError("action", type(self).__name__)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -710,7 +722,7 @@ def walk(entities: Iterable[Any], context: Context) -> None:
             if entity.condition is None or entity.condition.evaluate(context):
                 walk(entity.visit(context), context)
         except LeftOutError as error:
-            context.leave_out(entity, str(error))
+            context.leave_out(entity.file, entity.line, error)
 
 
 def described_by(path: str) -> LaunchDescription:
@@ -847,7 +859,7 @@ def describe(
         arguments: The launch arguments.
 
     Returns:
-        The nodes, and what was left out, each with `file` and `line`.
+        The nodes, and what was left out with `code`, `name` and `text`, each with `file` and `line`.
     """
     global _folders  # noqa: PLW0603  every action needs them, also those that a launch file makes at import
     _folders = tuple(os.path.join(folder, "") for folder in folders)
@@ -857,5 +869,5 @@ def describe(
     try:
         walk(described_by(path).entities, context)
     except LeftOutError as error:
-        context.left_out.append({"file": os.path.basename(path), "line": 0, "what": str(error)})
+        context.leave_out(os.path.basename(path), 0, error)
     return context.nodes, context.left_out

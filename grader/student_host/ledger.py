@@ -18,7 +18,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, ReliabilityPolicy
 
 from . import originals
-from .actions import HAS_SERVER, ActionEnd, Receiver
+from .actions import HAS_SERVER, ActionEnd, Receiver, type_name
 
 #: Topics that every node has; they are not counted.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -41,12 +41,6 @@ _CONTEXT_OK = Context.ok
 TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
 #: The QoS of a lifecycle state machine's publisher, which is not an rclpy publisher.
 _ORDINARY = {"reliable": True, "latched": False, "deadline_ns": 0, "manual": False}
-
-
-def type_name(interface: Any) -> str:
-    """Return the ROS name of a message or service class, e.g. `geometry_msgs/msg/Twist`."""
-    package, kind = interface.__module__.split(".")[:2]
-    return f"{package}/{kind}/{interface.__name__}"
 
 
 class Ledger:

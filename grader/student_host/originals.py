@@ -51,3 +51,12 @@ def unread_bytes() -> int:
 def processor_ns() -> int:
     """Return the processor time that this process has used, in nanoseconds."""
     return time.clock_gettime_ns(time.CLOCK_PROCESS_CPUTIME_ID)
+
+
+def starved_ns(thread: int) -> int:
+    """Return how long a thread of this process was ready to run but waited for a processor; 0 if that is not known."""
+    try:
+        with open(f"/proc/self/task/{thread}/schedstat", encoding="ascii") as counted:
+            return int(counted.read().split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0

@@ -1,20 +1,14 @@
 """Finds out how a ROS user would start a file: with `python3 FILE`, or with `ros2 run` if it belongs to a package.
 
-No student code is imported or run: setup.py is only parsed.
+No student code is imported or run, and no project file read: the grader tells which console scripts there are.
 """
 
 from __future__ import annotations
 
 import ast
-import configparser
-import contextlib
-import importlib
 import os
-import re
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
-
-from .setup_files import given_to_setup
+from typing import NamedTuple
 
 #: A folder with one of these files is a ROS package.
 MARKERS = ("setup.py", "package.xml")
@@ -22,8 +16,6 @@ MARKERS = ("setup.py", "package.xml")
 CMAKE = "CMakeLists.txt"
 #: The name given to a package if the submission is the package's own folder.
 NAMELESS = "submission"
-#: How much of a package.xml is searched for its name.
-NAME_BYTES = 1 << 16
 #: The most folders of a submission that are searched for packages.
 FOLDERS = 500
 
@@ -114,7 +106,14 @@ def package_folders(root: str) -> list[str]:
     return found
 
 
-def start_of(root: str, file: str, layout: PackageLayout, tree: ast.Module, executable: str = "") -> StartMethod:
+def start_of(  # noqa: PLR0913  what is known of a file
+    root: str,
+    file: str,
+    layout: PackageLayout,
+    tree: ast.Module,
+    executable: str = "",
+    scripts: Sequence[Sequence[str]] = (),
+) -> StartMethod:
     """Decide how a file is started.
 
     Args:
@@ -123,23 +122,26 @@ def start_of(root: str, file: str, layout: PackageLayout, tree: ast.Module, exec
         layout: Its place in the package.
         tree: Its parsed code.
         executable: Name of the console script to prefer; empty for one with the name of the file.
+        scripts: Name, module and function of each console script of its package.
     """
     if not layout.module:
         return StartMethod(SCRIPT)
     if layout.package is not None:
-        found = _entry_point(root, file, layout, executable)
+        found = _entry_point(root, file, layout, executable, scripts)
         if found is not None:
             return found
     way = MAIN if _offers_main(tree) else MODULE
     return StartMethod(way, layout.module, "main" if way == MAIN else "", layout.base)
 
 
-def _entry_point(root: str, file: str, layout: PackageLayout, executable: str) -> StartMethod | None:
+def _entry_point(
+    root: str, file: str, layout: PackageLayout, executable: str, scripts: Sequence[Sequence[str]]
+) -> StartMethod | None:
     """Return the console script that runs a file, preferring the named one, or else one with the name of the file."""
     folder = os.path.join(root, layout.package or "")
     has_init = _is_file(root, os.path.dirname(file), "__init__.py")
     found = []
-    for name, module, function in console_scripts(folder):
+    for name, module, function in scripts:
         path = f"/{module.replace('.', '/')}.py"
         base = os.path.join(root, file).removesuffix(path)
         inside = base == folder.rstrip("/") or base.startswith(os.path.join(folder, ""))
@@ -150,97 +152,6 @@ def _entry_point(root: str, file: str, layout: PackageLayout, executable: str) -
                 (name == (executable or module.rpartition(".")[2]), StartMethod(ENTRY_POINT, module, function, base))
             )
     return max(found, key=lambda pair: pair[0], default=(False, None))[1]
-
-
-def package_name(folder: str) -> str:
-    """Return the name of a ROS package: what package.xml says, or else setup.py, or else the name of its folder."""
-    with contextlib.suppress(OSError), open(os.path.join(folder, "package.xml"), "rb") as source:
-        found = re.search(rb"<name>\s*([A-Za-z0-9_-]+)\s*</name>", source.read(NAME_BYTES))
-        if found is not None:
-            return found[1].decode()
-    name = _given(folder).get("name")
-    return name if isinstance(name, str) else os.path.basename(folder.rstrip("/"))
-
-
-def packages_of(root: str) -> dict[str, str]:
-    """Return the name and absolute folder of each ROS package in a submission, outermost first."""
-    found: dict[str, str] = {}
-    for folder in package_folders(root):
-        found.setdefault(package_name(folder), folder)
-    return found
-
-
-def _given(folder: str) -> dict[str, Any]:
-    """Return the keyword arguments of setup() in the setup.py of a folder; none if it is unreadable."""
-    try:
-        with open(os.path.join(folder, "setup.py"), "rb") as source:
-            return given_to_setup(ast.parse(source.read()), folder)
-    except (OSError, SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
-        return {}
-
-
-def data_files(folder: str) -> list[tuple[str, list[str]]] | None:
-    """Return the folders below the prefix and the files that setup.py installs to them; None if that is not known."""
-    given = _given(folder).get("data_files")
-    if not isinstance(given, list):
-        return None
-    found: list[tuple[str, list[str]]] = []
-    for pair in given:
-        target, files = pair if isinstance(pair, list) and len(pair) == 2 else (None, None)
-        if not isinstance(target, str) or not isinstance(files, list) or not all(isinstance(f, str) for f in files):
-            return None
-        found.append((target, files))
-    return found
-
-
-def console_scripts(folder: str) -> list[tuple[str, str, str]]:
-    """Return name, module and function of each console script in setup.py, setup.cfg and pyproject.toml."""
-    lines = [*_scripts_of_setup(_given(folder)), *_scripts_of_pyproject(folder)]
-    parser = configparser.ConfigParser(interpolation=None)
-    try:
-        parser.read(os.path.join(folder, "setup.cfg"), encoding="utf-8")
-        lines += parser.get("options.entry_points", "console_scripts", fallback="").splitlines()
-    except (configparser.Error, OSError, UnicodeDecodeError):
-        pass
-    return [script for line in lines if (script := _script(line)) is not None]
-
-
-def _script(line: str) -> tuple[str, str, str] | None:
-    """Parse `name = module:function`."""
-    name, equals, target = (part.strip() for part in line.partition("="))
-    module, colon, function = (part.strip() for part in target.partition("[")[0].partition(":"))
-    parts = [*module.split("."), *function.split(".")]
-    return (name, module, function) if equals and colon and all(part.isidentifier() for part in parts) else None
-
-
-def _scripts_of_pyproject(folder: str) -> list[str]:
-    """Return the scripts of a pyproject.toml; none before Python 3.11, which cannot read it."""
-    try:
-        tomllib = importlib.import_module("tomllib")
-        with open(os.path.join(folder, "pyproject.toml"), "rb") as source:
-            scripts = tomllib.load(source)["project"]["scripts"]
-        return [f"{name} = {target}" for name, target in scripts.items() if isinstance(target, str)]
-    except (ImportError, OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return []
-
-
-def _scripts_of_setup(values: dict[str, Any]) -> list[str]:
-    given = values.get("entry_points")
-    scripts = given.get("console_scripts") if isinstance(given, dict) else _ini_scripts(given)
-    scripts = scripts.splitlines() if isinstance(scripts, str) else scripts
-    return [s for s in scripts if isinstance(s, str)] if isinstance(scripts, list) else []
-
-
-def _ini_scripts(text: Any) -> list[str]:
-    """Parse the console scripts of entry points that are given as one INI text."""
-    lines = text.splitlines() if isinstance(text, str) else []
-    section, found = "", []
-    for line in map(str.strip, lines):
-        if line.startswith("["):
-            section = line.strip("[] ")
-        elif section == "console_scripts":
-            found.append(line)
-    return found
 
 
 def _offers_main(tree: ast.Module) -> bool:

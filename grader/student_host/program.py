@@ -17,18 +17,22 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from . import entry, launch_files, originals
+from . import entry, launch_files, machine, originals
 from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_processes
-from .packages import packages_of
 from .quick_imports import import_without_needless
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
 
 if TYPE_CHECKING:
+    from types import TracebackType
+
     from .wall import WallTime
+
+#: Files whose frames lead to the program's own: this package, and the importing of a module.
+STARTING = (os.path.join(os.path.dirname(__file__), ""), importlib.__file__, "<frozen importlib.")
 
 
 class Host:
@@ -56,12 +60,14 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     """Run the file that a request names; never returns.
 
     Args:
-        request: `fd` of the socket, `root` and `file` of the submission, `clock`, `seed` (hex), `log_format`, `limits`,
-            and `interfaces`, the folders of interface packages that are not installed.
+        request: `fd` of the socket, `root` and `file` of the submission, `clock` and whether work is `charged` to it,
+            `seed` (hex), `log_format`, `limits`, `steady_ns` of `VirtualTime.start`, and `interfaces`, the folders of
+            interface packages that are not installed.
         host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
             hide one that it has imported.
     """
     prepared = host is not None
+    machine.install()
     sys.path += request["interfaces"]  # installed packages come first
     host = host or Host(request["clock"])
     link, describer, time = host.link, host.describer, host.time
@@ -84,7 +90,10 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     os.register_at_fork(after_in_child=link.cut if request["clock"] == "wall" else lambda: originals.exit_now(70))
     start = link.ask(ready)
     ready.clear()
-    time.start(start["now_ns"])
+    if isinstance(time, VirtualTime):
+        time.start(start["now_ns"], request["steady_ns"], charged=request["charged"])
+    else:
+        time.start(start["now_ns"], request["steady_ns"])
     watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
     if isinstance(time, VirtualTime) and watchdog is not None:
         watchdog.start()
@@ -93,14 +102,17 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
         time.give_up_outside = watchdog.give_up_outside
         Watch(link, request["root"]).install()
     ending = play(request, describer, link, install_ros)
-    time.finish()
-    with contextlib.suppress(BaseException):
-        forget_modules(request["root"])
-    if watchdog is not None:
-        watchdog.stop()
-    left = time.end()
+    try:
+        time.finish()
+        with contextlib.suppress(BaseException):
+            forget_modules(request["root"])
+        if watchdog is not None:
+            watchdog.stop()
+        ending = {"left": time.end(), **ending, **time.summary()}
+    except Exception as error:  # no code of the student runs here that could raise
+        ending = {"fault": describer.exception(error), **ending, "code": 1, "left": False}
     flush()
-    link.send({"kind": "exited", "left": left, **ending, **time.summary()})
+    link.send({"kind": "exited", **ending})
     originals.exit_now(0)
 
 
@@ -108,8 +120,10 @@ def evaluate(request: dict[str, Any]) -> None:
     """Evaluate the launch file that a request names, and report what it describes; never returns.
 
     Args:
-        request: As for `run`, with `launch`: its `arguments`, and the `provided` files of the rubric.
+        request: As for `run`, with `launch`: its `arguments`, the `provided` files of the rubric, and name and
+            folder of the submission's `packages`, outermost first.
     """
+    machine.install()
     link, describer = Link(), Describer()
     link.open(request["fd"])
     describer.set_root(request["root"])
@@ -126,7 +140,8 @@ def evaluate(request: dict[str, Any]) -> None:
     try:
         path = os.path.join(here, request["file"])
         sys.argv = [path]
-        nodes, left_out = launch_files.describe((root, own), path, packages_of(root), dict(told["arguments"]))
+        packages = {name: os.path.join(root, folder).rstrip("/") for name, folder in reversed(told["packages"])}
+        nodes, left_out = launch_files.describe((root, own), path, packages, dict(told["arguments"]))
         found = {"nodes": nodes, "left_out": left_out}
     except BaseException as error:  # whatever the launch file raises becomes a fault
         found = {"fault": describer.exception(error)}
@@ -170,12 +185,20 @@ def play(request: dict[str, Any], describer: Describer, link: Link, install_ros:
         ending["code"] = 130
     except BaseException as error:  # whatever the student's code raises becomes a fault
         ending = {"code": 1, "fault": describer.exception(error)}
+        error.__traceback__ = of_program(error.__traceback__)
         sys.last_type, sys.last_value, sys.last_traceback = type(error), error, error.__traceback__
         sys.excepthook(type(error), error, error.__traceback__)
     with contextlib.suppress(BaseException):
         finish_threads()
         atexit._run_exitfuncs()
     return ending
+
+
+def of_program(frames: TracebackType | None) -> TracebackType | None:
+    """Return a traceback without the frames that started the program, as Python prints it for `python3 FILE`."""
+    while frames is not None and frames.tb_frame.f_code.co_filename.startswith(STARTING):
+        frames = frames.tb_next
+    return frames
 
 
 def forget_modules(root: str) -> None:
@@ -281,6 +304,7 @@ def _named(path: str) -> list[str]:
 def warm_up() -> None:
     """Import what all forks of this process need: interface packages, type supports, numpy's randomness."""
     importlib.import_module("numpy.random")  # seeded in each fork
+    importlib.import_module("uuid")
     for name in (*INTERFACES, *OF_EVERY_NODE):
         for interface in list(vars(importlib.import_module(name)).values()):
             if hasattr(interface, "__import_type_support__"):

@@ -109,6 +109,10 @@ class RosClocks:
             except _rclpy.InvalidHandle:
                 continue
 
+    def follows(self, clock: Clock) -> bool:
+        """Return whether a clock follows the virtual time."""
+        return clock in self._made
+
     def simulates(self, clock: Clock) -> bool:
         """Return whether messages on /clock set a clock."""
         return clock in self._simulated
@@ -173,8 +177,11 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
     now = Clock.now
 
     def looked_at(self: Clock) -> Time:
-        clock.look()
-        return now(self)
+        shown_ns = clock.look()
+        if not clocks.follows(self):
+            return now(self)
+        with self.handle:  # raises if it was destroyed
+            return Time(nanoseconds=shown_ns, clock_type=self.clock_type)
 
     def sleep_until(self: Clock, until: Time, context: Any = None) -> bool:
         context = context or rclpy.utilities.get_default_context()
@@ -186,6 +193,7 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
             while clocks.simulates(self) and now(self) < until and context.ok():
                 scheduler.pause(polls=True)
         else:
+            clock.begin_pause()
             while clock.now_ns < until.nanoseconds and context.ok():
                 scheduler.pause(until.nanoseconds)
         return bool(context.ok())
@@ -329,6 +337,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
             return min((clock.now_ns + max(0, wait) for wait in waits if wait is not None), default=None)
 
         def wait(self, timeout_ns: int) -> None:
+            clock.charge()
             deadline_ns = None if timeout_ns < 0 else clock.end_of(timeout_ns)
             while True:
                 super().wait(0)

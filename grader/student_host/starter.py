@@ -11,6 +11,7 @@ This process has seen no plan, seed, path or file of any submission: a request i
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import gc
 import importlib
 import importlib.util
@@ -27,6 +28,8 @@ FROM_LAUNCHER = "launcher.py"
 REQUEST, INPUT, OUTPUT, ERRORS, CONNECTION, CONTROL = range(6)
 #: The number of the connection to the grader in a student's process.
 CONNECTED = 3
+#: The number of the pidfd of its parent, until it is sandboxed.
+PARENT = 4
 
 
 def load(path: str, name: str) -> Any:
@@ -86,12 +89,13 @@ def attend(descriptors: list[int], parent: int, sandbox: Any, program: Any, host
         request: dict[str, Any] = json.load(source)
     control = socket.socket(fileno=descriptors[CONTROL])
     if request["enter"]:
-        sandbox.enter(request["enter"])
+        sandbox.enter(*request["enter"])
+    own = os.pidfd_open(os.getpid())
     child = os.fork()
     if not child:
         try:
             control.close()
-            become(request, descriptors, sandbox, program, host)
+            become(request, [*descriptors[INPUT:CONTROL], own], sandbox, program, host)
         except BaseException as error:  # the grader shows it if the process never reports
             os.write(2, f"{type(error).__name__}: {error}\n".encode())
         os._exit(1)
@@ -118,14 +122,30 @@ def attend(descriptors: list[int], parent: int, sandbox: Any, program: Any, host
 
 
 def become(request: dict[str, Any], descriptors: list[int], sandbox: Any, program: Any, host: Any) -> None:
-    """Turn this process into a student's; never returns."""
+    """Turn this process into a student's; never returns.
+
+    Raises an exception before any of the student's code has run if a part of that fails.
+
+    Args:
+        request: What to become.
+        descriptors: The standard streams, the connection to the grader, and a pidfd of the parent.
+        sandbox: The module that sandboxes this process.
+        program: The module that runs programs.
+        host: The host of a program; None to execute the command.
+    """
     os.setsid()
-    for number, descriptor in enumerate(descriptors[INPUT:CONTROL]):
-        os.dup2(descriptor, number)
-    os.closerange(CONNECTED + 1, os.sysconf("SC_OPEN_MAX"))
+    # First to numbers beyond, because one of them may have a number that another one gets.
+    for number, descriptor in enumerate([fcntl.fcntl(d, fcntl.F_DUPFD_CLOEXEC, PARENT + 1) for d in descriptors]):
+        os.dup2(descriptor, number, inheritable=number != PARENT)
+    os.closerange(PARENT + 1, os.sysconf("SC_OPEN_MAX"))
     os.environ.clear()
     os.environ.update(request["environment"])
+    sandbox.make_memory_private()
     sandbox.prepare(request["restrictions"])
+    # From here on the kernel ends this process with its parent, which may have ended before.
+    if sandbox.select([PARENT], [], [], 0)[0]:
+        raise OSError("the process that waits for this one has ended")
+    os.close(PARENT)
     if host is None or program.hides_modules(request["program"]):
         os.execv(request["command"][0], request["command"])  # noqa: S606 - becoming the program is the purpose
     program.keep_interfaces(request["program"])

@@ -30,6 +30,7 @@ class Timeouts:
 
     def deadline_ns(self, seconds: float | None) -> int | None:
         """Return the deadline of a timeout; None, if the timeout is None or negative, means to wait forever."""
+        self._clock.charge()
         if seconds is None or seconds < 0:
             return None
         return self._clock.end_of(round(seconds * NS_PER_S))
@@ -63,7 +64,11 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
             if not blocking:
                 clock.idle_look()
                 return False
-            return self._wait(timeouts.deadline_ns(timeout))
+            deadline_ns = timeouts.deadline_ns(timeout)
+            if not self._locked:  # it was released in the time that was charged
+                self._locked = True
+                return True
+            return self._wait(deadline_ns)
 
         def _wait(self, deadline_ns: int | None) -> bool:
             green_thread = scheduler.mine()

@@ -4,9 +4,11 @@ import concurrent.futures
 import functools
 import operator
 import queue
+import sys
 import threading
 import time
 from collections.abc import Callable
+from types import FrameType
 from typing import Any, SupportsIndex
 
 from .clock import VirtualClock
@@ -14,8 +16,25 @@ from .quick_imports import import_without_needless
 from .scheduler import Scheduler
 
 NS_PER_S = 1_000_000_000
+#: Top-level packages that look at clocks for themselves -> whether the program may pace itself by it.
+LIBRARIES = {"asyncio": True, "logging": False}
 #: Monotonic system clocks.
 STEADY = frozenset({time.CLOCK_MONOTONIC, time.CLOCK_MONOTONIC_RAW, time.CLOCK_BOOTTIME})
+
+
+def look(clock: VirtualClock) -> int:
+    """Return the time to whoever called a clock function of the standard library."""
+    frame = sys._getframe(2)
+    while frame.f_back is not None and frame.f_globals.get("__name__") == "time_machine":
+        frame = frame.f_back
+    if frame.f_back is not None and frame.f_code.co_name == "time" and _package(frame) == "asyncio":
+        frame = frame.f_back  # `loop.time()`, which programs call as well
+    package = _package(frame)
+    return clock.look(paces=LIBRARIES.get(package, True), shown=package not in LIBRARIES)
+
+
+def _package(frame: FrameType) -> str:
+    return str(frame.f_globals.get("__name__")).partition(".")[0]
 
 
 def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
@@ -34,15 +53,14 @@ def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
             scheduler.pause(end_ns)
 
     time.sleep = sleep
-    start_ns = clock.now_ns - 1000 * NS_PER_S  # a monotonic clock starts neither at zero nor at the epoch
-    time.monotonic_ns = lambda: clock.look() - start_ns
-    time.monotonic = lambda: (clock.look() - start_ns) / NS_PER_S
-    time.perf_counter_ns = lambda: clock.look() - start_ns
-    time.perf_counter = lambda: (clock.look() - start_ns) / NS_PER_S
+    time.monotonic_ns = lambda: look(clock) - clock.steady_ns
+    time.monotonic = lambda: (look(clock) - clock.steady_ns) / NS_PER_S
+    time.perf_counter_ns = lambda: look(clock) - clock.steady_ns
+    time.perf_counter = lambda: (look(clock) - clock.steady_ns) / NS_PER_S
 
     def look_unseen() -> float:
         """Replace the clock in libraries, whose looks do not show how the program paces itself."""
-        return (clock.look(by_library=True) - start_ns) / NS_PER_S
+        return (clock.look(paces=False, shown=False) - clock.steady_ns) / NS_PER_S
 
     threading._time = look_unseen  # type: ignore[attr-defined]
     queue.time = look_unseen  # type: ignore[attr-defined]
@@ -57,12 +75,13 @@ def install_wall_time(clock: VirtualClock) -> None:
     traveller.__class__ = type(
         "VirtualTraveller",
         (kind,),
-        {"time_ns": lambda self: clock.look(), "time": lambda self: clock.look() / NS_PER_S},
+        {"time_ns": lambda self: look(clock), "time": lambda self: look(clock) / NS_PER_S},
     )
     # After time_machine, which expects the original C functions here.
     get, get_ns = time.clock_gettime, time.clock_gettime_ns
-    time.clock_gettime_ns = lambda kind, /: time.monotonic_ns() if kind in STEADY else get_ns(kind)
-    time.clock_gettime = lambda kind, /: time.monotonic() if kind in STEADY else get(kind)
+    steady_ns, steady = time.monotonic_ns, time.monotonic
+    time.clock_gettime_ns = lambda kind, /: steady_ns() if kind in STEADY else get_ns(kind)
+    time.clock_gettime = lambda kind, /: steady() if kind in STEADY else get(kind)
 
 
 def install_looks(clock: VirtualClock) -> None:

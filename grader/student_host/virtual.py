@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from . import originals, threads, times
 from .clock import VirtualClock
 from .link import Link
-from .scheduler import Scheduler
+from .scheduler import GreenThread, Scheduler
 
 if TYPE_CHECKING:
     from .ledger import Ledger
@@ -20,12 +20,41 @@ if TYPE_CHECKING:
 #: How often time may advance without asking the grader. The grader measures the work between two reports, which must
 #: not be hidden among the polls of a busy loop.
 MOST_MOVES = 10
+#: The same for the processor time since the last answer: what a program did between two pauses is measured apart.
+MOST_WORK_NS = 5_000_000
+#: Where the time of work is part of the recording: so much work after each pause takes no time, as it depends on the
+#: machine; and less than this is not worth a report.
+FREE_NS, LEAST_NS = 500_000, 50_000
+#: What work takes beyond its processor time counts if it is more than this, without the time that the thread waited for
+#: a processor: on a busy machine the middleware's threads hold it up as well.
+UNEXPLAINED_NS = 3_000_000
 #: How far the host's own clock may advance after the stop signal.
 STOPPING_NS = 60_000_000_000
 #: Messages that arrive in less real time are not worth a report.
 QUICK_S = 0.0005
 #: Real seconds that a waiting thread is given to receive a signal.
 INTERRUPT_S = 0.02
+
+
+class Work:
+    """Measures the work of the student's code since it last continued: real time without waits for a processor."""
+
+    def __init__(self) -> None:
+        self.restart(0)
+
+    def restart(self, free_ns: int) -> None:
+        """Begin to measure; so much is not counted."""
+        self._thread, self._free_ns = originals.get_native_id(), free_ns
+        self._used_ns, self._began_s = originals.processor_ns(), originals.perf_counter()
+        self._starved_ns = originals.starved_ns(self._thread)
+
+    def done_ns(self) -> int:
+        """Return how long the work has taken."""
+        used_ns = originals.processor_ns() - self._used_ns
+        waited_ns = round((originals.perf_counter() - self._began_s) * 1e9) - used_ns
+        if waited_ns > UNEXPLAINED_NS and self._thread == originals.get_native_id():
+            waited_ns -= originals.starved_ns(self._thread) - self._starved_ns
+        return used_ns + (waited_ns if waited_ns > UNEXPLAINED_NS else 0) - self._free_ns
 
 
 class VirtualTime:
@@ -51,6 +80,9 @@ class VirtualTime:
         self.resumed_ns = originals.processor_ns()
         self.running = True
         self.has_blocked = False
+        self._work: Work | None = None
+        self._charging: set[GreenThread] = set()
+        self._charges = False
         threads.install_locks(self.scheduler, self.clock)
         threads.install_threads(self.scheduler, self.clock, report_fault)
         times.install_looks(self.clock)
@@ -92,8 +124,18 @@ class VirtualTime:
             stream.write = noticing(stream.write)  # type: ignore[method-assign]
         ros.replace_log(noticing)
 
-    def start(self, now_ns: int) -> None:
-        """Start virtual time in this thread, which may be of a fork of the process that made this object."""
+    def start(self, now_ns: int, steady_ns: int, *, charged: bool = False) -> None:
+        """Start virtual time in this thread, which may be of a fork of the process that made this object.
+
+        Args:
+            now_ns: Nanoseconds since 1970.
+            steady_ns: When its monotonic clocks were at zero, in nanoseconds since 1970.
+            charged: Whether time passes while the program works.
+        """
+        self.clock.steady_ns = steady_ns
+        if charged:
+            self._work = Work()
+            self.clock.charge = self._charge
         self.scheduler.current.native = originals.get_native_id()
         self._domain = int(os.environ.get("ROS_DOMAIN_ID", "0"))
         self._move_to(now_ns)
@@ -103,11 +145,17 @@ class VirtualTime:
         """Return the common part of reports: the time, and what has happened since the last one, if anything has."""
         self.unreported = False
         report: dict[str, Any] = {"now_ns": self.clock.now_ns}
+        if self.clock.paused:
+            report["paused"] = True
         if self.clock.counted:
             report["counted"] = True
         if self._moved:
             report["moved"] = self._moved
-        self.clock.counted, self._moved = False, 0
+        if self._charges:
+            report["charged"] = True
+        self._charges = False
+        self.clock.paused = self.clock.counted = False
+        self._moved = 0
         if self._ledger is not None:
             if self._ledger.sent:
                 report["sent"] = dict(self._ledger.sent)
@@ -126,6 +174,24 @@ class VirtualTime:
             self._run_on(wake_ns)
         else:
             self._converse(wake_ns)
+
+    def _charge(self) -> None:
+        """Let the time pass that the program has worked since it last continued."""
+        thread = self.scheduler.mine()
+        if self._work is None or thread is None or thread in self._charging or self._stopping:
+            return
+        done_ns = self._work.done_ns()
+        if done_ns < LEAST_NS:
+            return
+        self._work.restart(0)
+        self._charging.add(thread)
+        try:
+            end_ns = self.clock.now_ns + done_ns
+            while self.clock.now_ns < end_ns and not self._stopping:
+                self.unreported = self._charges = True  # the grader measures how much there was
+                self.scheduler.pause(end_ns)
+        finally:
+            self._charging.remove(thread)
 
     def _settle(self) -> None:
         """Yield to the grader at the same instant."""
@@ -165,10 +231,13 @@ class VirtualTime:
         if wake_ns is not None and self._may_go_on(wake_ns):
             self._move_to(wake_ns)
             self._moved += 1
+            if self._work is not None:
+                self._work.restart(FREE_NS)
             return
         if self._ledger is not None and self._ledger.sending_and_removed and not leaving:
             self.leave()  # endpoints that were freed in the meantime may only be destroyed now
         report = {"kind": "idle", "wake_ns": wake_ns, **self.summary(), **({"leaving": True} if leaving else {})}
+        before_ns, done_ns = self.clock.now_ns, 0 if self._work is None else self._work.done_ns()
         self.running = False
         answer = self._answered(report)
         self.resumed_ns = originals.processor_ns()
@@ -187,6 +256,8 @@ class VirtualTime:
             self._ledger.expect(answer["arrivals"])
             if originals.perf_counter() - began_s > QUICK_S:  # until then, the grader counts it as the program's work
                 self._link.send({"kind": "arrived"})
+        if self._work is not None:  # what was done at this instant is still to be counted
+            self._work.restart(FREE_NS if self.clock.now_ns > before_ns else -done_ns)
         if answer.get("interrupt"):
             self._interrupt()
 
@@ -228,6 +299,7 @@ class VirtualTime:
         return (
             self.clock.now_ns < wake_ns < self._free_until_ns
             and self._moved < MOST_MOVES
+            and originals.processor_ns() - self.resumed_ns < MOST_WORK_NS
             and not self.unreported
             and self._ledger is not None
             and not self._ledger.changed

@@ -102,9 +102,9 @@ class WallTime:
         self._leave()
         return False
 
-    def start(self, now_ns: int) -> None:
+    def start(self, now_ns: int, steady_ns: int) -> None:
         """Start waiting for the grader's next answer, which is the request to stop."""
-        del now_ns
+        del now_ns, steady_ns
         self.domain = int(os.environ.get("ROS_DOMAIN_ID", "0"))
         originals.start_new_thread(self._await_stop, ())
 

@@ -1,6 +1,8 @@
 """Watches for audit events of the student's program that could manipulate the process: internals, processes, sockets.
 
-Nothing is forbidden. The grader is informed before the action continues, and runs the program again as a bare process.
+It also notices the import of a module whose source was not read before the run: from an archive, without a source, or
+written by the program. Nothing is forbidden. The grader is informed before the action continues, and runs the program
+again as a bare process.
 """
 
 from __future__ import annotations
@@ -26,6 +28,8 @@ LOOKS = ("open", "os.listdir", "os.scandir")
 #: Modules of the standard library that generate code for class definitions, and the events that this raises.
 MAKERS = ("collections/__init__.py", "dataclasses.py", "enum.py", "typing.py")
 MAKING = ("compile", "exec", "sys._", "object.__", "function.__new__", "code.__new__")
+#: The event of an import that runs the code of a module, and the name under which one is reported that was not read.
+RUNS, UNREAD = "exec", "import of a module that was not read"
 #: How many callers in the standard library are skipped to find the student's code.
 CALLERS = 12
 #: The most different events that are reported.
@@ -54,6 +58,8 @@ class Watch:
         self._matters: dict[str, bool] = {}
         self._places: dict[str, str] = {}
         self._told: set[str] = set()
+        # Where installed modules are: what the program could import before it ran.
+        self._installed = tuple(os.path.join(p, "") for p in sys.path if p and not p.startswith(self._root[:-1]))
         self._inside = False
 
     def install(self) -> None:
@@ -71,18 +77,34 @@ class Watch:
             return
         self._inside = True
         try:
-            if (
-                event not in self._told
-                and len(self._told) < MOST
-                and self._by_student(sys._getframe(1), event)
-                and self._link.is_free()
-            ):
-                self._told.add(event)
-                self._link.send({"kind": "reached", "what": event})
+            if event == RUNS and UNREAD not in self._told and self._is_unread(arguments, sys._getframe(1)):
+                self._tell(UNREAD)
+            if event not in self._told and len(self._told) < MOST and self._by_student(sys._getframe(1), event):
+                self._tell(event)
         except Exception:  # noqa: S110 - an error here must not change what the program does
             pass
         finally:
             self._inside = False
+
+    def _tell(self, what: str) -> None:
+        if self._link.is_free():
+            self._told.add(what)
+            self._link.send({"kind": "reached", "what": what})
+
+    def _is_unread(self, arguments: tuple[Any, ...], frame: FrameType) -> bool:
+        """Return whether an import runs code that comes neither from a source of the submission nor an installed one.
+
+        The grader reads every source of a submission before it runs; a compiled module names the source that it had.
+        """
+        if not arguments or not frame.f_code.co_filename.startswith("<frozen"):
+            return False
+        file = getattr(arguments[0], "co_filename", "")
+        given = frame.f_locals.get("args", ())  # of the function by which importlib calls exec
+        names = given[1] if len(given) > 1 and isinstance(given[1], dict) else {}
+        origin = str(getattr(names.get("__spec__"), "origin", None) or file)
+        if file.startswith("<frozen") or origin.startswith((self._library, *self._installed)):
+            return False
+        return not (origin.startswith(self._root) and origin.endswith(".py") and os.path.isfile(origin))
 
     def _by_student(self, frame: FrameType | None, event: str) -> bool:
         for _ in range(CALLERS):

@@ -191,6 +191,8 @@ def _unusual() -> UnusableArchiveError:
 _DIRECTORY_ENTRY = b"PK\x01\x02"
 _ENCRYPTED = 0x1 | 0x40 | 0x2000  # with a password, with strong encryption, with an encrypted directory
 _NAMED_IN_UTF8 = 0x800
+#: What compressors write for nothing, in bytes, is shorter.
+_EMPTY_BYTES = 16
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 # Exceptions of zipfile and zlib for damaged archives.
 _DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, NotImplementedError, KeyError)
@@ -214,6 +216,9 @@ def zip_members(data: bytes, *, most: int) -> list[Member]:
 def _zip_member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> Member:
     if info.flag_bits & _ENCRYPTED:
         raise UnusableArchiveError("expected an archive without a password, found an encrypted one")
+    hidden = info.file_size if _kind(info, _name(info)) == FOLDER else 0 if info.file_size else info.compress_size
+    if hidden > _EMPTY_BYTES:  # content of a folder, or of a file that is said to be empty
+        raise _damaged("zip")
     if info.compress_type not in _COMPRESSIONS:
         found = f"method {info.compress_type}"
         raise UnusableArchiveError(f"expected a zip with the usual compression (deflate), found {found}")

@@ -5,18 +5,16 @@ from __future__ import annotations
 import ctypes.util
 import importlib.util
 import json
-import os
 import struct
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from functools import partial
-from pathlib import Path
 from typing import BinaryIO
 
 from grader.core import extras
 from grader.core.errors import HarnessError
+from grader.submissions.contained import run_contained
 from grader.submissions.members import FEWER, FILE, FOLDER, LINK, Member, UnusableArchiveError
 
 #: Kind of archive -> names of the format in libarchive, and the first bytes that tell them apart.
@@ -24,9 +22,9 @@ _FORMATS = {"7z": ("7zip", b""), "rar": ("rar5", b"Rar!\x1a\x07\x01"), "old rar"
 #: The kinds, as `archive_kind` names them.
 KINDS = ("7z", "rar")
 
-#: Limits of the process that unpacks: memory in bytes, processor time and real time in seconds.
+#: Limits of the process that unpacks: memory in bytes, processor time in seconds.
 MEMORY_BYTES = 768 << 20
-PROCESSOR_S, REAL_S = 60, 300
+PROCESSOR_S = 60
 _KINDS = {"file": FILE, "folder": FOLDER, "link": LINK, "other": "a device, pipe or other special file"}
 # The exit codes of grader.submissions.unpacker, which is not imported, because only its process needs the sandbox.
 _ENCRYPTED, _TOO_MANY, _TOO_MUCH, _NO_LIBRARY = 11, 12, 13, 14
@@ -93,6 +91,9 @@ def foreign_members(  # noqa: PLR0913  four limits
 def _has_end(data: bytes, *, is_old: bool) -> bool:
     """Return whether the blocks of a rar lead to the block that ends it, or to encrypted ones.
 
+    Raises UnusableArchiveError for a file that is stored as a reference to another one: of those that are no links,
+    libarchive makes empty files.
+
     See "RAR 5.0 archive format" by its author, and technote.txt of older versions.
     """
     at = _OLD_START if is_old else _START
@@ -101,6 +102,8 @@ def _has_end(data: bytes, *, is_old: bool) -> bool:
             kind, following = (_old_block if is_old else _block)(data, at)
             if kind in (_OLD_ENDS if is_old else _ENDS):
                 return following <= len(data)
+            if not is_old and kind == _FILE_BLOCK and _redirections(data, at) - _LINKS:
+                raise UnusableArchiveError("expected plain files, found a reference to another file in the archive")
             at = following
     except (IndexError, struct.error):
         pass
@@ -108,6 +111,10 @@ def _has_end(data: bytes, *, is_old: bool) -> bool:
 
 
 _START, _ENDS = 8, (4, 5)  # encryption, end of the archive
+_FILE_BLOCK = 2
+#: The record of a redirection in the extra area of a file, and its kinds that libarchive reports as links: a Unix link,
+#: a Windows link, a hard link. The others are a junction and a copy of a file.
+_REDIRECTION, _LINKS = 5, {1, 2, 4}
 _OLD_START, _OLD_ENDS = 7, (0x7B,)
 
 
@@ -120,6 +127,26 @@ def _block(data: bytes, at: int) -> tuple[int, int]:
         _, more = _vint(data, more)
     content = _vint(data, more)[0] if flags & 2 else 0
     return kind, start + size + content
+
+
+def _redirections(data: bytes, at: int) -> set[int]:
+    """Return the kinds of redirections in the extra area of a block, which is the end of its head."""
+    size, start = _vint(data, at + 4)
+    _, flags_at = _vint(data, start)
+    flags, more = _vint(data, flags_at)
+    if not flags & 1:
+        return set()
+    extra, _ = _vint(data, more)
+    end = start + size
+    here = end - extra
+    found = set()
+    while here < end:
+        length, record = _vint(data, here)
+        kind, inner = _vint(data, record)
+        if kind == _REDIRECTION:
+            found.add(_vint(data, inner)[0])
+        here = record + length
+    return found
 
 
 def _old_block(data: bytes, at: int) -> tuple[int, int]:
@@ -139,21 +166,8 @@ def _vint(data: bytes, at: int) -> tuple[int, int]:
 
 
 def _run(limits: dict[str, object], archive: BinaryIO, out: BinaryIO) -> int:
-    root = Path(__file__).parents[2]
-    path = os.pathsep.join([str(root), *filter(os.path.isabs, os.environ.get("PYTHONPATH", "").split(os.pathsep))])
-    environment = {"PYTHONPATH": path, "PATH": os.defpath, "LC_ALL": "C.UTF-8", "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-s", "-m", "grader.submissions.unpacker", json.dumps(limits)]
     try:
-        return subprocess.run(
-            command,
-            stdin=archive,
-            stdout=out,
-            stderr=subprocess.DEVNULL,
-            env=environment,
-            cwd="/",
-            timeout=REAL_S,
-            check=False,
-        ).returncode
+        return run_contained("grader.submissions.unpacker", limits, archive, out)
     except subprocess.TimeoutExpired:
         return -1
     except OSError as error:
@@ -189,7 +203,8 @@ def _members(data: bytes, file: int) -> Iterator[Member]:
         declared = head["declared"]
         if not 0 <= sent == len(content) or (size != sent and size <= file):
             raise ValueError("another size")
-        if kind == FILE and declared is not None and int(declared) != size:
+        # A file without a size is one that libarchive has not understood; it would be empty.
+        if kind == FILE and (declared is None or int(declared) != size):
             raise ValueError("another size than the archive declares")
         at += sent
         name = name.replace("\\", "/")  # archives made on Windows

@@ -5,25 +5,28 @@ from __future__ import annotations
 import ast
 import io
 import tokenize
+import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from grader.core.submission import Submission
 from grader.judging.source import LONGEST_SOURCE, Source, chain, read
+from grader.submissions.revealing import ORDER, orders, read_attributes, shown_functions
 
 
 def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-#: Reported for a file that is too long to be examined.
-LONG = "a very long file"
+#: Reported for a file that is too long to be examined, and for one that is no text, or in an unusual encoding.
+LONG, UNREADABLE = "a very long file", "a file that cannot be read as text"
 #: Modules that show or change the internals of a process, or start others.
 _MODULES = _words(
     "gc ctypes cffi inspect dis marshal types tracemalloc faulthandler resource psutil time_machine "
     "freezegun subprocess multiprocessing pty fcntl mmap _thread _socket _ctypes _posixsubprocess pickle code codeop "
     "runpy imp weakref builtins __main__ site sysconfig importlib pkgutil zipimport cProfile profile pdb bdb select "
-    "selectors forbiddenfruit wrapt mock platform"
+    "selectors forbiddenfruit wrapt mock platform pydoc doctest trace linecache reprlib pprint zipfile py_compile "
+    "compileall copyreg"
 )
 #: Names in modules that ordinary programs use: full dotted names.
 _NAMES = _words(
@@ -41,7 +44,8 @@ _NAMES = _words(
     "asyncio.create_subprocess_shell atexit._run_exitfuncs atexit._clear signal.setitimer signal.set_wakeup_fd "
     "rclpy.impl rclpy.impl.implementation_singleton rclpy._rclpy_pybind11 traceback.extract_stack traceback.walk_stack "
     "traceback.format_stack traceback.print_stack traceback.walk_tb traceback.extract_tb traceback.StackSummary "
-    "traceback.FrameSummary traceback.TracebackException numpy.datetime64 uuid.uuid1"
+    "traceback.FrameSummary traceback.TracebackException numpy.datetime64 uuid.uuid1 unittest.mock logging.config "
+    "operator.attrgetter operator.methodcaller string.Formatter sys.path_importer_cache sys.displayhook sys.hash_info"
 )
 #: Attributes that reach internals, whatever object they are read from.
 _ATTRIBUTES = _words(
@@ -54,6 +58,8 @@ _ATTRIBUTES = _words(
     "tm_yday year month day toordinal fromordinal "
     "__traceback__ tb_next relativeCreated"
 )
+#: The names of what depends on the hashes of a process.
+HASHES = frozenset((ORDER, "hash"))
 #: Built-in functions that run code or look up names at run time.
 _BUILTINS = _words("exec eval compile __import__ globals locals vars dir memoryview breakpoint id hash")
 #: Functions that classify an object; applied to a module's function, they reveal that it was replaced.
@@ -85,8 +91,6 @@ _TOLD = _words("strftime isoformat isocalendar isoweekday weekday timetuple ctim
 _TINY_S, _TINY_NS = 1e-3, 1_000_000
 #: What reads a clock or a time in nanoseconds, by the last part of its name.
 _IN_NS = _words("time_ns monotonic_ns perf_counter_ns nanoseconds")
-#: Functions that show in which order a set holds its elements, which differs between starts of Python.
-_ORDERING = _words("list tuple iter enumerate str repr zip")
 #: A number between these, in seconds or nanoseconds since 1970, is a date that a program compares with.
 _DATES = ((1.5e9, 2.5e9), (1.5e18, 2.5e18))
 
@@ -96,7 +100,8 @@ def reaching(text: str) -> tuple[str, ...]:
     source = read("", text)
     if source.tree is None:
         return (LONG,) if len(text) > LONGEST_SOURCE or _can_run(text) else ()
-    return tuple(dict.fromkeys((*_imports(source), *_named(source), *_computed(source), *_timing(source))))
+    shown = (*shown_functions(source), *orders(source))
+    return tuple(dict.fromkeys((*_imports(source), *_named(source), *_computed(source), *_timing(source), *shown)))
 
 
 def _can_run(text: str) -> bool:
@@ -122,6 +127,7 @@ def _imports(source: Source) -> Iterator[str]:
 
 
 def _named(source: Source) -> Iterator[str]:
+    yield from (name for name in read_attributes(source) if name in _ATTRIBUTES or name.startswith("_"))
     for node in source.nodes:
         if isinstance(node, ast.Attribute):
             name = source.resolved(node)
@@ -156,8 +162,6 @@ def _computed(source: Source) -> Iterator[str]:
             yield f"{name} of {_named_by_text(call, source)}"
         elif name in _ASKING and any(_of_module(argument, source) for argument in call.args):
             yield f"{name} of a function"
-        elif name in _ORDERING and any(_is_set(argument) for argument in call.args):
-            yield "the order of a set"
         elif name.endswith("environ.items") or (name in ("dict", "list", "sorted", "len") and _takes_environ(call)):
             yield "os.environ"
 
@@ -207,12 +211,6 @@ def _of_module(node: ast.expr, source: Source) -> bool:
     return not called and name.partition(".")[0] in source.aliases and name.rpartition(".")[2][:1].islower()
 
 
-def _is_set(node: ast.expr) -> bool:
-    return isinstance(node, (ast.Set, ast.SetComp)) or (
-        isinstance(node, ast.Call) and chain(node.func) in ("set", "frozenset") and bool(node.args)
-    )
-
-
 def _takes_environ(call: ast.Call) -> bool:
     return any(chain(argument).endswith("environ") for argument in call.args)
 
@@ -225,6 +223,8 @@ def _timing(source: Source) -> Iterator[str]:
     times = Times(source)
     if any(_compares(node, source, times) for node in source.nodes):
         yield "a clock that is compared"
+    if any(_looks_closely(node, times) for node in source.nodes):
+        yield "a part of a clock's reading"
     if any(_collects(node, times) for node in source.nodes):
         yield "a clock that is read again and again"
     for loop in source.all(ast.While):
@@ -246,6 +246,7 @@ class Times:
         self._source = source
         self._names: set[str] = set()
         self._in_ns: set[str] = set()
+        self._differences: set[str] = set()
         given = [
             (node.value, chain(target))
             for node in source.nodes
@@ -255,6 +256,8 @@ class Times:
         self._names = _reached([(value, name) for value, name in given if self.holds(value)], given)
         differences = [(value, name) for value, name in given if self.holds(value) and not _is_scaled(value)]
         self._in_ns = _reached([(value, name) for value, name in differences if self.holds_ns(value)], differences)
+        less = [(value, name) for value, name in given if any(isinstance(n, ast.Sub) for n in ast.walk(value))]
+        self._differences = _reached([(value, name) for value, name in less if self.holds(value)], given)
 
     def holds(self, node: ast.AST) -> bool:
         """Return whether a time is part of an expression."""
@@ -265,6 +268,17 @@ class Times:
         if _is_scaled(node) or not self.holds(node):
             return False
         return any(chain(n).rpartition(".")[2] in _IN_NS or chain(n) in self._in_ns for n in ast.walk(node))
+
+    def is_date(self, node: ast.AST) -> bool:
+        """Return whether an expression holds a time since 1970, or since the start of a clock, and no difference."""
+        return self.holds(node) and not any(
+            isinstance(n, (ast.Sub, ast.Compare)) or chain(n) in self._differences for n in ast.walk(node)
+        )
+
+    def is_difference(self, node: ast.AST) -> bool:
+        """Return whether an expression is a difference of times, or what is left over of one."""
+        inexact = isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Sub, ast.Mod, ast.BitAnd))
+        return (inexact and self.holds(node)) or (isinstance(node, ast.Name) and node.id in self._differences)
 
     def _reads(self, node: ast.AST) -> bool:
         return _is_clock(node, self._source) or (
@@ -303,6 +317,33 @@ def _collects(node: ast.AST, times: Times) -> bool:
     )
 
 
+def _looks_closely(node: ast.AST, times: Times) -> bool:
+    """Return whether an expression shows the last digits of a clock, or whether any time has passed."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.BitAnd, ast.BitXor)):
+        return times.holds(node)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod) and times.holds(node.left):
+        least = _TINY_NS if times.holds_ns(node.left) else _TINY_S
+        divisor = node.right.value if isinstance(node.right, ast.Constant) else None
+        return isinstance(divisor, (int, float)) and 0 < divisor <= least
+    if isinstance(node, ast.Call) and chain(node.func) == "divmod" and len(node.args) == 2:
+        return times.holds_ns(node.args[0])
+    if isinstance(node, ast.Subscript):  # the digits of a text
+        of_text = isinstance(node.value, ast.Call) and chain(node.value.func) in ("str", "repr", "format", "hex", "bin")
+        return of_text and times.holds(node.value)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in ("endswith", "count"):
+        return times.holds(node.func.value)
+    tested: list[ast.expr] = []
+    if isinstance(node, (ast.If, ast.While, ast.IfExp, ast.Assert)):
+        tested = [node.test]
+    elif isinstance(node, ast.BoolOp):
+        tested = node.values
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        tested = [node.operand]
+    elif isinstance(node, ast.Call) and chain(node.func) == "bool":
+        tested = node.args
+    return any(times.is_difference(test) for test in tested)
+
+
 def _compares(node: ast.AST, source: Source, times: Times) -> bool:
     """Return whether a date is compared, or a clock in a way that merely waiting for time to pass never needs."""
     if isinstance(node, (ast.Subscript, ast.Attribute)):
@@ -312,10 +353,9 @@ def _compares(node: ast.AST, source: Source, times: Times) -> bool:
     if not isinstance(node, ast.Compare):
         return False
     sides = [node.left, *node.comparators]
-    if any(_is_date(side, source) for side in sides):
-        return True
     numbers = [s.value for s in sides if isinstance(s, ast.Constant) and isinstance(s.value, (int, float))]
-    if any(_is_clock(side, source) for side in sides) and numbers:
+    dated = any(n != 0 for n in numbers) and any(times.is_date(side) for side in sides)
+    if dated or any(_is_date(side, source) or (numbers and _is_clock(side, source)) for side in sides):
         return True
     exact = any(isinstance(op, (ast.Eq, ast.NotEq, ast.In, ast.NotIn)) for op in node.ops)
     named = any(isinstance(s, ast.Constant) and (s.value is None or isinstance(s.value, (str, bool))) for s in sides)
@@ -345,8 +385,10 @@ _WAITING = _words("sleep wait spin spin_once spin_until_future_complete join get
 MAX_SOURCE_BYTES = 1 << 20
 #: Maximum total size of the files read, in bytes.
 MAX_PROGRAM_BYTES = 4 << 20
-#: Suffixes of modules that Python imports without their source.
-COMPILED = (".so", ".pyc", ".pyo", ".pth")
+#: Suffixes of modules that Python imports without their source, and of archives that it imports from.
+COMPILED = (".so", ".pyc", ".pyo", ".pth", ".zip", ".egg", ".whl", ".pyz")
+#: Encodings in which editors save programs.
+_ENCODINGS = ("utf-8", "utf-8-sig", "ascii", "iso-8859-", "latin", "cp125", "windows-125")
 
 
 def read_sources(submission: Submission) -> dict[str, str]:
@@ -362,20 +404,42 @@ def read_sources(submission: Submission) -> dict[str, str]:
 def read_reaches(root: Path) -> tuple[str, ...]:
     """Return the names by which the files of a staged submission reach into their process, without duplicates.
 
-    A module that is not text, or has more text than is read, counts as reaching.
+    A module that is not text, or has more text than is read, counts as reaching, and so does an archive that modules
+    could be imported from, whatever its name.
     """
     found: list[str] = []
     size = 0
-    for path in sorted(root.rglob("*")):
-        if path.suffix in COMPILED:
-            found.append(f"a {path.suffix} file")
-        elif path.suffix == ".py" and path.is_file():
+    for path in sorted(path for path in root.rglob("*") if path.is_file()):
+        if path.suffix.lower() in COMPILED:
+            found.append(f"a {path.suffix.lower()} file")
+        elif path.suffix.lower() not in _DOCUMENTS and zipfile.is_zipfile(path):
+            found.append("an archive")
+        elif path.suffix == ".py":
             size += path.stat().st_size
             if size > MAX_PROGRAM_BYTES:
                 return (*dict.fromkeys(found), LONG)
-            text = source_text(path)
-            found += reaching(text) if text is not None else ()
+            found += _reached_by(path)
     return tuple(dict.fromkeys(found))
+
+
+#: Documents that are archives inside. A program that puts one on `sys.path` is noticed when it imports from it.
+_DOCUMENTS = frozenset((".docx", ".xlsx", ".pptx", ".odt", ".ods", ".odp", ".jar", ".npz", ".epub"))
+
+
+def _reached_by(path: Path) -> tuple[str, ...]:
+    """Return the names by which a module reaches into its process; that it cannot be read, or not surely, is one."""
+    if path.stat().st_size > MAX_SOURCE_BYTES:
+        return (LONG,)
+    text = source_text(path)
+    if text is None:
+        return () if b"\0" in path.read_bytes() else (UNREADABLE,)  # Python refuses a source with a null byte
+    return (*reaching(text), *(() if _is_usual(path) else (UNREADABLE,)))
+
+
+def _is_usual(path: Path) -> bool:
+    """Return whether a file is written in an encoding that editors save programs in."""
+    with path.open("rb") as file:
+        return tokenize.detect_encoding(file.readline)[0].startswith(_ENCODINGS)
 
 
 def source_text(path: Path) -> str | None:

@@ -7,17 +7,22 @@ import os
 import re
 import stat
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
+from types import MappingProxyType
 
 from grader.core.errors import SubmissionError
 from grader.core.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
 from grader.execution.executables import Executable, executables
-from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, shown
+from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, listed, shown
+from grader.submissions.projects import read_projects
 from grader.submissions.staging import collect_folder, read_start, write_files
 
 #: Names at least this similar are shown as a possible misspelling.
 SIMILARITY = 0.8
+
+#: Files named in a hint about a submission without any.
+_MOST_WANTED = 4
 
 #: Misspelt names shown for one file.
 MAX_SIMILAR = 3
@@ -34,7 +39,9 @@ _EXTENSIONS = re.compile(r"(?:\.(?:txt|bak|orig|old|save|py|ipynb))+$")
 _COPY_MARK = re.compile(r"[\s_-]*(?:\(\d+\)|copy|copia|kopie)\s*\d*$")
 
 
-def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission:
+def stage_submission(
+    path: str, wanted: Sequence[str], into: Path, meant: Mapping[str, str] = MappingProxyType({})
+) -> Submission:
     """Copy a submission and find the wanted files in it.
 
     Args:
@@ -42,13 +49,14 @@ def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission
             one archive, that archive is used: learning platforms deliver uploads this way.
         wanted: File names of all exercises being graded; a missing one has the names that look like it.
         into: Empty folder that receives the copy.
+        meant: Wanted file name -> the path inside the submission that is meant, where several files may have the name.
 
     Raises:
         SubmissionError: There is no such path, it is not a folder, archive or .py file, it holds no .py file, a limit
             is exceeded, or an archive cannot be used.
-        HarnessError: The copy cannot be written.
+        HarnessError: The copy cannot be written, or no process can be started that reads project files.
     """
-    return stage_collected(collect_submission(path, wanted, into), path, wanted, into)
+    return stage_collected(collect_submission(path, wanted, into), path, wanted, into, meant)
 
 
 def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collected:
@@ -60,14 +68,36 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
     return _collect_file(source, wanted, where)
 
 
-def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into: Path) -> Submission:
+def every_file(path: str, into: Path) -> Collected:
+    """Read all files of a submission, also of one without a .py file; without one, those of the only archive in it.
+
+    Errors are those of `stage_submission`, but for a missing .py file.
+    """
+    where, source = shown(path, 500), Path(path)
+    folder = stat.S_ISDIR(_mode(path, where))
+    collected = collect_folder(source, into=into, where=where) if folder else _every_file_of(source, (), where)
+    if _has_python(name for name, _ in collected.files):
+        return collected
+    from grader.submissions.archives import collect_archive  # noqa: PLC0415 - as below
+
+    archives = _archives(collected)
+    if len(archives) != 1:
+        return collected
+    name, packed = archives[0]
+    return collect_archive(packed, where=f"{where}/{shown(name)}")
+
+
+def stage_collected(
+    collected: Collected, path: str, wanted: Sequence[str], into: Path, meant: Mapping[str, str] = MappingProxyType({})
+) -> Submission:
     """Write files that were read, here or on another machine, and find the wanted ones; raises HarnessError."""
     digest = write_files(collected, into)
-    programs = executables(into) if any("/" in name for name in wanted) or _lacks(wanted, collected) else []
+    projects, problems = read_projects(into) if wanted else ((), ())  # without, it is staged for its digest alone
+    programs = executables(into, projects)
     files = {
         name: _look_for_executable(name, programs, collected.files, wanted)
         if "/" in name
-        else _look_for(name, collected.files, wanted, programs)
+        else _look_for(name, collected.files, wanted, programs, meant.get(name, ""))
         for name in wanted
     }
     several = tuple(note for file in files.values() for note in _notes_on(file))
@@ -77,7 +107,8 @@ def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into
         root=into,
         digest=digest,
         files=files,
-        notes=(*several, *collected.notes),
+        notes=(*several, *collected.notes, *problems),
+        projects=projects,
     )
 
 
@@ -101,6 +132,11 @@ def not_there(path: str, hint: str = "") -> SubmissionError:
 
 
 def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
+    return _with_python(_every_file_of(source, wanted, where), wanted, where)
+
+
+def _every_file_of(source: Path, wanted: Sequence[str], where: str) -> Collected:
+    """Return a .py file, or the files of an archive."""
     if not source.is_file():
         raise SubmissionError(f"{where}: expected {_EXPECTED}, found a device, pipe or socket")
     from grader.submissions.archives import (  # noqa: PLC0415 - most submissions are folders
@@ -120,7 +156,13 @@ def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
         return Collected(((source.name, content),))
     if kind is None and not source.name.casefold().endswith(ARCHIVE_SUFFIXES):
         raise SubmissionError(f"{where}: expected {_EXPECTED}, found another kind of file", _other_kind(source, wanted))
-    return _with_python(collect_archive(content, where=where), wanted, where)
+    return collect_archive(content, where=where)
+
+
+def _archives(collected: Collected) -> list[tuple[str, bytes]]:
+    from grader.submissions.archives import ARCHIVE_SUFFIXES  # noqa: PLC0415 - as above
+
+    return [(name, content) for name, content in collected.files if name.casefold().endswith(ARCHIVE_SUFFIXES)]
 
 
 def _other_kind(source: Path, wanted: Sequence[str]) -> str:
@@ -137,9 +179,9 @@ def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Col
     names = [name for name, _ in collected.files]
     if _has_python(names):
         return collected
-    from grader.submissions.archives import ARCHIVE_SUFFIXES, collect_archive  # noqa: PLC0415 - as above
+    from grader.submissions.archives import collect_archive  # noqa: PLC0415 - as above
 
-    archives = [(name, content) for name, content in collected.files if name.casefold().endswith(ARCHIVE_SUFFIXES)]
+    archives = _archives(collected)
     if len(archives) != 1:
         raise _no_python(collected, wanted, where)
     name, packed = archives[0]
@@ -147,7 +189,7 @@ def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Col
     inner = collect_archive(packed, where=inside)
     if not _has_python(name for name, _ in inner.files):
         raise _no_python(inner, wanted, inside)
-    return Collected(inner.files, (f"graded is what {shown(name)} holds", *collected.notes, *inner.notes))
+    return Collected(inner.files, (f"the contents of {shown(name)} were graded", *collected.notes, *inner.notes))
 
 
 def _has_python(names: Iterable[str]) -> bool:
@@ -155,10 +197,8 @@ def _has_python(names: Iterable[str]) -> bool:
 
 
 def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> SubmissionError:
-    from grader.submissions.archives import ARCHIVE_SUFFIXES  # noqa: PLC0415 - as above
-
     names = [name for name, _ in collected.files]
-    archives = [name for name in names if name.casefold().endswith(ARCHIVE_SUFFIXES)]
+    archives = [name for name, _ in _archives(collected)]
     similar = [name for want in wanted for name in _similar(want, names, wanted)]
     hint = ""
     notebooks = [name for name in names if is_notebook(name)]
@@ -167,22 +207,19 @@ def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> Submi
     elif similar:
         hint = f"rename {shown(similar[0])} so that it ends in .py"
     elif archives:
-        hint = f"unpack {shown(archives[0])} and name the folder that holds your files"
+        one = "put your .py files into one zip"
+        hint = f"{one}, not into several" if len(archives) > 1 else f"{one}: {shown(archives[0])} is inside another one"
     elif collected.notes:
         hint = collected.notes[0]
-    found = f"{len(archives)} archives" if len(archives) > 1 else "none"
+    elif wanted:
+        hint = f"hand in {listed([shown(name) for name in wanted][:_MOST_WANTED])}"
+    found = f"{len(archives)} archives" if len(archives) > 1 else first_of(names) if names else "none"
     return SubmissionError(f"{where}: expected at least one .py file, found {found}", hint)
 
 
 def _name(source: Path) -> str:
     """Return the name that reports show: the last part of the path, also for `.` and `..`."""
     return source.name if source.name not in ("", "..") else source.resolve().name or "/"
-
-
-def _lacks(wanted: Sequence[str], collected: Collected) -> bool:
-    """Return whether a program is missing that an entry point may stand for."""
-    names = {PurePosixPath(name).name for name, _ in collected.files}
-    return any(name.endswith(".py") and name not in names for name in wanted)
 
 
 def _look_for_executable(
@@ -211,9 +248,15 @@ def _notes_on(file: StudentFile) -> Iterator[str]:
 
 
 def _look_for(
-    wanted: str, files: Sequence[tuple[str, bytes]], all_wanted: Sequence[str], programs: Sequence[Executable]
+    wanted: str,
+    files: Sequence[tuple[str, bytes]],
+    all_wanted: Sequence[str],
+    programs: Sequence[Executable],
+    meant: str,
 ) -> StudentFile:
     names = [name for name, _ in files]
+    if meant in names:
+        return StudentFile(wanted, meant)
     exact = sorted((name for name in names if PurePosixPath(name).name == wanted), key=_nearest_the_top)
     if exact:
         return StudentFile(wanted, exact[0], others=tuple(exact[1:]))

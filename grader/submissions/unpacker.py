@@ -9,14 +9,11 @@ for each member a length of 4 bytes, a JSON object of so many bytes, and the con
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import json
 import logging
 import mmap
 import os
-import platform
-import resource
 import struct
 import sys
 from collections.abc import Mapping
@@ -28,25 +25,11 @@ try:
 except (ImportError, OSError, TypeError, AttributeError):  # without the C library its name is None
     libarchive = None
 
-from grader.execution.sandbox.seccomp import Numbers, assembled, flat_filter, supports
-from grader.execution.sandbox.start import (
-    drop_capabilities,
-    landlock_version,
-    limit,
-    load_filter,
-    restrict,
-    ruleset,
-)
+from grader.submissions.confinement import confine
 
 DAMAGED, ENCRYPTED, TOO_MANY, TOO_MUCH, NO_LIBRARY = 10, 11, 12, 13, 14
 FAULTS = (DAMAGED, ENCRYPTED, TOO_MANY, TOO_MUCH, NO_LIBRARY)
 _BLOCK = 1 << 16
-_NEW_PROCESSES = {
-    "clone": Numbers(56, 220),
-    "clone3": Numbers(435, 435),
-    "fork": Numbers(57, None),
-    "vfork": Numbers(58, None),
-}
 
 
 class _Strict(logging.Handler):
@@ -62,7 +45,7 @@ def main(limits: Mapping[str, Any]) -> int:
         return NO_LIBRARY
     logging.getLogger("libarchive").addHandler(_Strict())
     data = mmap.mmap(0, 0, access=mmap.ACCESS_READ)
-    _confine(limits)
+    confine(limits)
     out = sys.stdout.buffer
     encrypted = ffi.libarchive.archive_read_has_encrypted_entries
     encrypted.argtypes = [ctypes.c_void_p]
@@ -105,24 +88,6 @@ def _kind(entry: Any) -> str:
     if entry.issym or entry.islnk or entry.linkpath:
         return "link"
     return "file" if entry.isreg else "folder" if entry.isdir else "other"
-
-
-def _confine(limits: Mapping[str, Any]) -> None:
-    """Give up what unpacking does not need; where a kernel lacks a means, the others remain."""
-    limit(resource.RLIMIT_AS, limits["memory"])
-    limit(resource.RLIMIT_CPU, limits["processor"])
-    limit(resource.RLIMIT_FSIZE, limits["output"])
-    limit(resource.RLIMIT_CORE, 0)
-    system = ctypes.CDLL(None, use_errno=True)
-    with contextlib.suppress(OSError):
-        drop_capabilities(system)
-    if supports(platform.machine()):
-        nothing = {"read": (), "devices": (), "hidden": (), "tcp": False}
-        rules = ruleset(system, nothing, "/nonexistent") if landlock_version(system) else None
-        with contextlib.suppress(OSError):
-            restrict(system, rules, flat_filter(signals=True))
-            load_filter(system, assembled(_NEW_PROCESSES, (), platform.machine()))
-    limit(resource.RLIMIT_NOFILE, 0)  # no file, socket or pipe can be opened any more
 
 
 if __name__ == "__main__":

@@ -71,9 +71,9 @@ def test_archives_and_texts_are_contained(unit: str, usable: dict[str, str]) -> 
 
 
 def test_the_table_has_each_attack_once() -> None:
-    """72 attacks, numbered without a gap, each with a fixture of its own that exists and names its number."""
+    """77 attacks, numbered without a gap, each with a fixture of its own that exists and names its number."""
     attacks = read_attacks()
-    assert [attack.number for attack in attacks] == list(range(1, 73))
+    assert [attack.number for attack in attacks] == list(range(1, 78))
     assert [attack.path.name[:3] for attack in attacks] == [f"a{attack.number:02}" for attack in attacks]
     assert [attack.fixture for attack in attacks if not attack.path.exists()] == []
     assert {attack.earns for attack in attacks} <= set(EARNS)

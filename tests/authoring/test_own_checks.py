@@ -163,12 +163,15 @@ def test_an_exception_leaves_the_criterion_undecided(tmp_path: Path) -> None:
     found = verdict(write_rubric(tmp_path), TraceBuilder("pump.py").trace())
     assert (found.outcome, found.score) == (Outcome.UNDECIDED, 0)
     assert found.evidence["error"] == "pump_checks.py:29: LookupError: nobody thought of silence"
-    assert found.hint == f"fix the check that the rubric brings: {found.evidence['error']}"
+    assert found.hint == "for the author of the rubric: correct pump_checks.py and grade again"
 
 
 @pytest.mark.parametrize(
     ("returned", "told"),
-    [("None", "returned a NoneType, expected a Finding"), ("sys.exit(0)", "failed on this recording")],
+    [
+        ("None", "pump_checks.py:25: the check starts_early returned a NoneType, expected a Finding"),
+        ("sys.exit(0)", "pump_checks.py:29: SystemExit: 0"),
+    ],
 )
 def test_what_is_no_finding_is_undecided(tmp_path: Path, returned: str, told: str) -> None:
     """A check that gives up the process, or nothing, ends no report."""

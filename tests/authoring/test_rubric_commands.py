@@ -13,6 +13,7 @@ from grader.judging.checks import CHECKS
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.schema import schema_text
 
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 GOOD = """\
 schema: grader/rubric/v1
 exercise: {id: pump, number: 7, title: A pump}
@@ -91,9 +92,67 @@ def test_what_is_odd_is_a_warning_with_its_place(tmp_path: Path, old: str, new: 
     assert any(line.startswith(f"warning: {path}:{place}: ") and told in line for line in done.stderr.splitlines())
 
 
+DRIVEN = GOOD.replace(
+    "    observe: {duration: 5 s}\n",
+    """\
+    observe: {duration: 5 s}
+    stimuli:
+      - simulation: {differential_drive: {}}
+      - messages: {topic: /goal, type: geometry_msgs/msg/Point, values: [{}], start: 1 s}
+      - server: {service: /fill, type: std_srvs/srv/Trigger, responses: [{}]}
+""",
+)
+#: A check of each kind that waits for something, written right.
+WAITS = {
+    "subscribes: {topic: /odom, type: nav_msgs/msg/Odometry}": "/odom",
+    "stays_in_range: {topic: /odom, field: pose.pose.position.x, low: -1}": "/odom",
+    "waits_gracefully: {process: pump.py, topic: /goal, silence: 1 s}": "/goal",
+    "logs_response: {service: /fill, process: pump.py, field: message}": "/fill",
+}
+
+
+def waiting(check: str, rubric: str = DRIVEN) -> str:
+    return rubric + f"  - {{id: waits, title: Waits, points: 5, scenario: alone, hint: none, check: {{{check}}}}}\n"
+
+
+@pytest.mark.parametrize("check", WAITS)
+def test_what_a_check_waits_for_and_nobody_does_is_odd(tmp_path: Path, check: str) -> None:
+    """A letter too many, with the name that was meant; nothing is odd about the right name."""
+    right = rubric("check", written(tmp_path, waiting(check)))
+    assert (right.exit_code, right.stderr) == (0, ""), right.stderr
+    name = WAITS[check]
+    wrong = rubric("check", written(tmp_path, waiting(check.replace(name, f"{name}m"))))
+    verb = "uses" if name == "/fill" else "publishes on"
+    assert f": no stimulus of alone {verb} {name}m: did you mean {name}?\n" in wrong.stderr
+    assert wrong.exit_code == 0
+
+
+def test_another_program_may_publish_what_one_listens_to(tmp_path: Path) -> None:
+    """Nor is it odd that a program answers what it has published itself."""
+    two = waiting("subscribes: {topic: /level, type: std_msgs/msg/Float32}", GOOD)
+    two = two.replace("[pump.py]", "[pump.py, tank.py]")
+    assert rubric("check", written(tmp_path, two)).stderr == ""
+    own = waiting("latency: {input: /flow, output: /level, within: 1 s}", GOOD)
+    assert rubric("check", written(tmp_path, own)).stderr == ""
+    other = waiting("latency: {input: /flaw, output: /level, within: 1 s}", GOOD)
+    assert "no stimulus of alone publishes on /flaw\n" in rubric("check", written(tmp_path, other)).stderr
+
+
+def test_a_misspelt_topic_of_a_stimulus_is_odd(tmp_path: Path) -> None:
+    """If a check names almost the same; a topic that no check names is ordinary."""
+    text = GOOD.replace("topic: /flow", "topic: /cmd_vel").replace(
+        "    observe: {duration: 5 s}\n",
+        "    observe: {duration: 5 s}\n    stimuli:\n      - simulation: {differential_drive: {commands: /cmd_vell}}\n",
+    )
+    found = rubric("check", written(tmp_path, text)).stderr
+    assert "9:9: no criterion looks at /cmd_vell: did you mean /cmd_vel?\n" in found
+    assert rubric("check", written(tmp_path, text.replace("/cmd_vell", "/cmd_vel"))).stderr == ""
+
+
 def test_the_rubrics_that_come_with_the_grader_are_not_odd() -> None:
     """No warning in any of them."""
-    done = rubric("check", *builtin_rubrics().values())
+    examples = [page.parent / f"{page.parent.name}.yaml" for page in EXAMPLES.glob("*/README.md")]
+    done = rubric("check", *builtin_rubrics().values(), *examples)
     assert (done.exit_code, done.stderr) == (0, "")
 
 

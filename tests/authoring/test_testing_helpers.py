@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from grader.core.exercise import Finding
+from grader.core.exercise import Finding, Location, Problem, ProblemKind
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import FaultKind, Trace
 from grader.execution.ending import exited
@@ -87,15 +87,20 @@ def test_a_process_that_ends_by_itself_has_an_exit_code() -> None:
     assert fault == exited("pump.py", 5 * NS_PER_S, 3)
 
 
+made_up: Any = Problem(ProblemKind.BURSTS)
+object.__setattr__(made_up, "kind", "bursts")
+
+
 @pytest.mark.parametrize(
     ("finding", "wrong"),
     [
         (True, "returned a bool, expected a Finding"),
-        (made(0.5, "half"), "gave a credit of type float, expected a Fraction"),
-        (Finding(Fraction(3, 2), "more"), "gave a credit of 3/2, expected 0 to 1"),
-        (made(Fraction(1), 5), "gave a reason, hint or location of another type"),
+        (made(Fraction(1), 5), "gave a reason of type int, expected a str"),
         (Finding(Fraction(1), "", {"x": {1, 2}}), "gave evidence that holds more than plain JSON values"),
-        (made(Fraction(1), "", location=("pump.py", 3)), "gave a reason, hint or location of another type"),
+        (made(Fraction(1), "", location=("pump.py", 3)), "gave a location of type tuple, expected a Location"),
+        (made(Fraction(1), "", location=Location("pump.py", 0)), "gave the location pump.py:0, expected a file and"),
+        (made(Fraction(1), "", blocked_by=7), "gave a blocked_by of type int, expected the id of a criterion"),
+        (made(Fraction(1), "", problem=made_up), "gave a problem of the kind 'bursts', expected a Problem"),
         (made(Fraction(0), "", problem="bursts"), "gave a problem of type str, expected a Problem"),
     ],
 )

@@ -34,7 +34,8 @@ def report(score: int, *, final: bool = True, reason: str = "as expected") -> di
 class FakeScheduler:
     """Gives each submission the score in its `score.py`, or the state that this is the name of."""
 
-    def __init__(self, jobs: int = 1, stop_after: int | None = None) -> None:
+    def __init__(self, jobs: int = 1, stop_after: int | None = None, default: str = "") -> None:
+        self.default = default  # the score of a submission without a `score.py`
         self.graded: list[str] = []
         self.tasks: dict[str, Task] = {}
         self.stop_after = stop_after
@@ -59,7 +60,7 @@ class FakeScheduler:
         staging.mkdir()
         try:
             submission = stage_submission(str(task.submission), (), staging)
-            said = next(iter(staging.rglob("score.py"))).read_text(encoding="utf-8").strip()
+            said = next((file.read_text(encoding="utf-8") for file in staging.rglob("score.py")), self.default).strip()
         except SubmissionError as error:
             key = task.conditions.key(unusable_digest(error))
             return ResultStatus(State.REFUSED, key, "", task.label, error.message)

@@ -143,6 +143,19 @@ def test_a_process_that_others_were_begun_beside_ends_with_its_submission(tmp_pa
     assert len({pids[label] for label in "abcd"}) == 1 < len(set(pids.values()))
 
 
+def test_a_class_that_is_checked_keeps_the_processes_that_wait(tmp_path: Path) -> None:
+    """As many as may wait at a time: each submission leaves its place, and no other needs a new process for that."""
+    program = WAITING.replace("str(len(os.listdir(begun)))", "str(os.getpid())").replace("< 4", "< 3")
+    here = LocalScheduler(1, (sys.executable, "-c", program))
+    labels = [f"waits {number}" for number in range(12)]
+    pids: dict[str, str] = {}
+    tasks = [replace(task(tmp_path, label), spot_check=True) for label in labels]
+    found = [a.status.state for a in here.run(tasks, pids.__setitem__)]
+    assert found == [State.GRADED] * 12
+    assert len(set(pids.values())) <= 3 < len(pids)
+    assert [pid for pid in pids.values() if Path(f"/proc/{pid}").exists()] == []
+
+
 def test_spot_checks_begin_early_and_leave_room_for_others(tmp_path: Path) -> None:
     """Twice as many as jobs are graded at a time, while there are others."""
     here = LocalScheduler(1, (sys.executable, "-c", WAITING))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.classroom.intake import HandedInEntry, safe_name
-from grader.classroom.roster import Person, RosterMatch, match, read_roster
+from grader.classroom.roster import Person, RosterMatch, late_by, late_days, match, read_roster
 from grader.core.errors import ClassError
 
 CANVAS = """Student,ID,SIS User ID,SIS Login ID,Section,Homework (12345)
@@ -140,3 +140,30 @@ def test_a_safe_name_is_one_part_of_a_path(text: str) -> None:
     assert name[0] not in ".-"
     assert len(name.encode()) <= 90
     assert safe_name(text) == name
+
+
+@pytest.mark.parametrize(
+    ("status", "late", "days"),
+    [
+        ("Submitted for grading - 1 day 3 hours late", "1 day 3 hours", "1.13"),
+        ("Submitted for grading - Graded - 2 hours 13 mins late", "2 hours 13 mins", "0.1"),
+        ("Submitted for grading - 1 min late", "1 min", "0.01"),
+        ("Submitted for grading - 24 hours late - Extension granted until: Friday", "24 hours", "1"),
+        ("Submitted for grading - 3 moons late", "3 moons", ""),
+        ("Submitted for grading", "", ""),
+        ("No submission - Overdue by: 3 days 4 hours", "", ""),
+        ("Submitted for grading - 3 days early", "", ""),
+        ("late", "", ""),
+    ],
+)
+def test_a_worksheet_of_moodle_says_how_late(tmp_path: Path, status: str, late: str, days: str) -> None:
+    """Days are rounded up, because a started day counts in full."""
+    text = f"Identifier,Full name,Status\nParticipant 1,Ada,{status}\n"
+    assert late_by(roster(tmp_path, text)[0]) == late
+    assert late_days(late) == days
+
+
+def test_without_a_status_nobody_is_late(tmp_path: Path) -> None:
+    """As on other rosters, and without one."""
+    assert late_by(roster(tmp_path, CANVAS)[0]) == ""
+    assert late_by(Person("Ada")) == late_by(None) == ""

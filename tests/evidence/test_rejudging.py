@@ -105,8 +105,7 @@ def test_changes_are_told_with_dropped_marks_first(tmp_path: Path) -> None:
     ]
     assert lines[3] == "ada: 30 -> 25 of 30: -5 points"
     assert lines[4].startswith("    velocity_publisher/linear_velocity: was met 5/5, is not met 0/5: t = 0.000 s")
-    assert lines[5] == "bob: 20 -> 20 of 30: 0 points"
-    assert lines[6].startswith("    velocity_publisher/rate: was not met 0/10, is partly 5/10: ")
+    assert lines[5] == "1 keeps its score, but criteria changed: bob"
     assert lines[-1] == "unchanged: 1 of 3"
 
 
@@ -147,13 +146,13 @@ def test_changes_can_be_opened_in_a_spreadsheet(tmp_path: Path) -> None:
 
 
 def test_added_and_removed_criteria_are_changes(tmp_path: Path) -> None:
-    """A criterion that is asked no more took its points along."""
+    """A criterion that is no longer asked took its points along."""
     kept_run(tmp_path / "e", velocity_run(velocity_trace()))
     text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
     (tmp_path / "less.yaml").write_text(text[: text.index("  - id: logging")], encoding="utf-8")
     (tmp_path / "other.yaml").write_text(text.replace("id: logging", "id: logs"), encoding="utf-8")
     less = grade("--diff", tmp_path / "e", "--rubric", tmp_path / "less.yaml").output
-    assert "velocity_publisher/logging: was met 4/4, is asked no more" in less
+    assert "velocity_publisher/logging: was met 4/4, is no longer asked" in less
     other = grade("--diff", tmp_path / "e", "--rubric", tmp_path / "other.yaml").output
     assert "velocity_publisher/logs: was not asked, is met 4/4" in other
 
@@ -218,7 +217,24 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
     assert not any(line.startswith("::") for line in shown.splitlines())
 
 
-def test_verifying_says_the_same_of_sound_evidence(tmp_path: Path) -> None:
-    """Slower, and no other result."""
+def test_a_table_of_changes_is_not_replaced_by_an_empty_one(tmp_path: Path) -> None:
+    """A first one is written even if nothing changed, for programs that expect it."""
     kept_class(tmp_path)
-    assert grade("--verify", tmp_path).output == grade(tmp_path).output
+    table = tmp_path / "changes.csv"
+    assert grade("--diff", "--csv", table, tmp_path).exit_code in (0, 1)
+    assert table.read_text(encoding="utf-8").count("\n") == 1
+    path = changed_rubric(tmp_path, ("linear.x: 0.5", "linear.x: 0.6"))
+    grade("--diff", "--csv", table, tmp_path, "--rubric", path)
+    real = table.read_bytes()
+    assert real.count(b"\n") > 1
+    done = grade("--diff", "--csv", table, tmp_path)
+    assert f"note: {table} is left as it was: nothing changed" in done.stderr
+    assert table.read_bytes() == real
+
+
+def test_verifying_says_the_same_of_sound_evidence(tmp_path: Path) -> None:
+    """Slower, and no other result; how much was verified is told apart from it."""
+    kept_class(tmp_path)
+    verified = grade("--verify", tmp_path)
+    assert verified.stdout == grade(tmp_path).stdout
+    assert verified.stderr == "verified: the recordings show what was judged: 3 submissions\n"

@@ -88,10 +88,8 @@ def staging(studio: RecordingSession) -> RecordingSession:
     return studio
 
 
-def record(
-    studio: RecordingSession, folder: Path, *programs: str, limits: Limits | None = None, **fields: Any
-) -> Trace:
-    """Record programs together for ten seconds, on the virtual clock unless another is named."""
+def planned(folder: Path, *programs: str, limits: Limits | None = None, **fields: Any) -> Plan:
+    """Return the plan to record programs together for ten seconds, on the virtual clock unless another is named."""
     folder.mkdir(exist_ok=True)
     folder.chmod(0o755)
     names = [f"{letter}.py" for letter, _ in zip("abc", programs, strict=False)]
@@ -111,5 +109,10 @@ def record(
         "clock": "virtual",
         "limits": limits or Limits(),
     }
-    plan = Plan(**{**usual, **fields})
+    return Plan(**{**usual, **fields})
+
+
+def record(studio: RecordingSession, folder: Path, *programs: str, **fields: Any) -> Trace:
+    """Record programs together, as `planned` says."""
+    plan = planned(folder, *programs, **fields)
     return studio.recorder.record([Job("hostile", plan)], lambda step: None)[0]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Iterable
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,11 @@ from grader.execution.notes import Places
 from grader.execution.observer import Taken
 from grader.execution.plan import Plan, PlannedNumbers
 from grader.execution.workload import Delay
+from grader.student_host.clock import EPOCH_NS
 
 #: Stands for the submission: this file is in it.
 HERE = Path(__file__).resolve().parent
 MS = 1_000_000
-EPOCH_NS = 1_767_225_600_000_000_000
 FLOAT, INT = "std_msgs/msg/Float32", "std_msgs/msg/Int32"
 
 #: Yields reports and is sent answers.
@@ -102,14 +103,18 @@ class ScriptedWorkload:
         self.delay = Delay(start_ns)
         self.used_ns, self.waited_ns = 1, 0
 
-    def begin(self, t_ns: int) -> None:
+    def begin(self, t_ns: int, *, arrivals: bool = False) -> None:
         """Wake up."""
         self.delay.wake(t_ns)
 
     def arrived(self) -> None:
         """Wait no longer for messages."""
 
-    def end(self, **_: object) -> None:
+    def beside(self) -> AbstractContextManager[None]:
+        """Measure nothing."""
+        return nullcontext()
+
+    def end(self, report: Mapping[str, Any], passed_ns: int) -> None:
         """Take what the step cost."""
         self.delay.work(self._student.cost_ns)
 
@@ -133,7 +138,7 @@ class ScriptedStudent:
         self.unmatched: frozenset[str] = frozenset()
         self.sees_graph = False
         self.workload: ScriptedWorkload | None = None
-        self.unsettled = ""
+        self.unsettled = self.grader_failed = ""
         self.notes: list[str] = []
         self.places = Places(HERE)
         self.start_told = None

@@ -11,7 +11,7 @@ import pytest
 from grader.core.limits import Limits
 from grader.core.quantities import MIB, NS_PER_S
 from grader.core.trace import Fault, FaultKind
-from grader.execution.ending import ending_fault, limit_behind, reported_fault
+from grader.execution.ending import ending_fault, graders_fault, limit_behind, reported_fault
 from grader.execution.notes import Places
 
 
@@ -53,6 +53,26 @@ def test_an_error_that_a_limit_is_behind_names_it(text: str, limit: str) -> None
 def test_other_errors_stay_as_they_are() -> None:
     """Most errors have nothing to do with limits."""
     assert told({"type": "ValueError", "message": "x"}).text == "ValueError: x"
+
+
+@pytest.mark.parametrize("module", ["../../x.py", "ledger.py is right, give full marks.py", 7, None, "\x1b[2J.py"])
+@pytest.mark.parametrize("line", [True, -1, 10**30, "7"])
+def test_a_fault_of_the_grader_says_only_what_is_checked(module: object, line: object) -> None:
+    """A process may claim one: its words do not get into the grader's sentence."""
+    data = {"code": "grader", "type": "all is well", "module": module, "at": line, "message": "full marks"}
+    said = "the grader's own code failed in the process of a.py: Exception; please report this line"
+    assert graders_fault("a.py", data) == said
+    assert told(data).text == said
+
+
+def test_a_fault_of_the_grader_names_its_place() -> None:
+    """What a bug report needs."""
+    data = {"code": "grader", "type": "ValueError", "module": "ledger.py", "at": 48}
+    expected = (
+        "the grader's own code failed in the process of a.py: ValueError, ledger.py line 48; please report this line"
+    )
+    assert graders_fault("a.py", data) == expected
+    assert graders_fault("a.py", {"code": "exception"}) == graders_fault("a.py", None) == ""
 
 
 @pytest.mark.parametrize(

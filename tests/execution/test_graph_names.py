@@ -32,7 +32,7 @@ def observer(publishers: list[Any], nodes: list[tuple[str, str]]) -> Observer:
     found._names, found._participants = {"_observer_1"}, {}
     found.node = SimpleNamespace(
         get_node_names_and_namespaces=lambda: nodes,
-        get_topic_names_and_types=lambda no_demangle: [("/fan_speed", ["std_msgs/msg/Float32"])],
+        get_topic_names_and_types=lambda: [("/fan_speed", ["std_msgs/msg/Float32"])],
         get_publishers_info_by_topic=lambda _: publishers,
         get_subscriptions_info_by_topic=lambda _: [],
         get_publisher_names_and_types_by_node=lambda name, _: [p.topic_type for p in publishers if p.node_name == name],

@@ -22,6 +22,7 @@ from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.bubblewrap import Bubblewrap
+from grader.execution.sandbox.environment import account_files
 from grader.execution.sandbox.protocol import StudentProcess
 
 pytestmark = pytest.mark.sandbox
@@ -111,7 +112,7 @@ def opens(path):
     except OSError:
         return False
 seen = [name for folder, _, files in os.walk("/") if not folder.startswith("/proc") for name in files]
-hidden = {[str(canary), str(beside), "/etc/passwd", "/etc/shadow", "/proc/1/root" + str(canary)]!r}
+hidden = {[str(canary), str(beside), "/etc/resolv.conf", "/etc/shadow", "/proc/1/root" + str(canary)]!r}
 print(json.dumps([[path for path in hidden if opens(path)], {name!r} in seen, len(seen) > 1000]))
 """
     try:
@@ -231,6 +232,12 @@ def test_the_environment_of_a_student_is_exact(sandbox: Sandbox) -> None:
     environment = said(sandbox.run("import json, os; print(json.dumps(dict(os.environ)))", COLOUR="blue"))
     expected = {
         "HOME": "/tmp/home",
+        "TMPDIR": "/tmp",
+        "USER": "student",
+        "LOGNAME": "student",
+        "SHELL": "/bin/bash",
+        "TZ": "UTC",
+        "PYTHON_GIL": "1",
         "ROS_LOG_DIR": "/tmp/home/log",
         "PATH": "/usr/bin",
         "PWD": "/tmp/work",
@@ -527,12 +534,15 @@ def test_a_worker_dies_with_the_grader(any_tier: Sandbox) -> None:
     marker = f"worker-{secrets.token_hex(8)}"
     argv = (sys.executable, "-I", "-S", "-c", "import time; print('ready', flush=True); time.sleep(600)", marker)
     command = any_tier.worker(argv)
-    told = json.dumps({"argv": command.argv, "environment": dict(command.environment)})
+    told = json.dumps({"argv": command.argv, "environment": dict(command.environment), "passed": command.pass_fds})
     starter = (
         "import json, subprocess, sys; c = json.loads(sys.argv[1]);"
-        "subprocess.run(c['argv'], env=c['environment'], start_new_session=True)"
+        "subprocess.run(c['argv'], env=c['environment'], pass_fds=c['passed'], start_new_session=True)"
     )
-    with subprocess.Popen((sys.executable, "-I", "-S", "-c", starter, told), stdout=subprocess.PIPE) as supervisor:
+    started = (sys.executable, "-I", "-S", "-c", starter, told)
+    with subprocess.Popen(started, stdout=subprocess.PIPE, pass_fds=command.pass_fds) as supervisor:
+        for descriptor in command.opened_fds:
+            os.close(descriptor)
         assert supervisor.stdout is not None
         assert supervisor.stdout.readline() == b"ready\n"
         assert _living(marker)
@@ -645,7 +655,8 @@ def test_a_worker_opens_nothing_of_the_instructor(sandbox: Sandbox, tmp_path: Pa
     assert seen == {"__init__.py", "core", "simulation", "student_host", "execution"}
     needed = (*ros.runtime.read_paths, ros.runtime.executable, package, sandbox.submission, Path("/dev"), SEEN_AT)
     roots = {path.resolve() for path in needed} | set(needed)
-    programs = {Path("/run/rclpy-grader.users")}
+    accounts = {Path("/etc", name) for name in account_files(0, 0, Path("/"))}  # the grader's own
+    programs = {Path("/run/rclpy-grader.users"), *accounts}
     strangers = {p for p in readable - programs if roots.isdisjoint((p, *p.parents, p.resolve()))}
     assert strangers == set()
     assert beside not in readable

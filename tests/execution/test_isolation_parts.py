@@ -2,6 +2,7 @@
 
 import errno
 import re
+import socket
 import struct
 from pathlib import Path
 
@@ -85,7 +86,18 @@ def test_other_calls_are_allowed(machine: str) -> None:
 def test_only_four_families_of_sockets_exist(machine: str, family: int) -> None:
     """Unix, IPv4, IPv6 and netlink."""
     verdict = seccomp.ALLOW if family in (1, 2, 10, 16) else refused(errno.EAFNOSUPPORT)
-    assert judged(machine, number_of(machine, "socket"), family) == verdict
+    assert judged(machine, number_of(machine, "socket"), family, socket.SOCK_STREAM) == verdict
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("call", ["socket", "socketpair"])
+def test_a_local_socket_is_always_connected(machine: str, call: str) -> None:
+    """A stream or packets in sequence, with any flags; a datagram would lie in a queue that nothing counts."""
+    kinds = {kind for kind in range(1 << 20) if kind & 0xF <= 6 and not kind & 0x7F7F0}
+    number = number_of(machine, call)
+    allowed = {kind for kind in kinds if judged(machine, number, socket.AF_UNIX, kind) == seccomp.ALLOW}
+    assert allowed == {kind for kind in kinds if kind & 0xF in (1, 5)}
+    assert judged(machine, number, socket.AF_INET, socket.SOCK_DGRAM) == seccomp.ALLOW
 
 
 @pytest.mark.parametrize("machine", MACHINES)
@@ -115,6 +127,37 @@ def test_only_own_limits_can_be_set(machine: str) -> None:
     prlimit = number_of(machine, "prlimit64")
     assert judged(machine, prlimit, 0) == seccomp.ALLOW
     assert judged(machine, prlimit, 1) == refused(errno.EPERM)
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize(("family", "allowed"), [(1, set(range(300))), (2, {0, 6, 17}), (10, {0, 6, 17}), (16, {0})])
+def test_each_family_of_sockets_has_its_usual_protocols(machine: str, family: int, allowed: set[int]) -> None:
+    """TCP and UDP, and the interfaces; not SCTP, MPTCP, or the configuration of encryption and packet filters."""
+    number = number_of(machine, "socket")
+    found = {protocol for protocol in range(300) if judged(machine, number, family, 1, protocol) == seccomp.ALLOW}
+    assert found == allowed
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_a_socket_keeps_the_size_of_its_buffers(machine: str) -> None:
+    """The call does nothing, and reports success; other options and levels are not touched."""
+    number = number_of(machine, "setsockopt")
+    refusals = {
+        (level, option)
+        for level in (0, 1, 6, 41)
+        for option in range(80)
+        if judged(machine, number, 9, level, option) != seccomp.ALLOW
+    }
+    assert refusals == {(1, 7), (1, 8), (1, 32), (1, 33)}
+    assert judged(machine, number, 9, 1, 7) == refused(seccomp.NO_ERROR)
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("bit", range(32))
+def test_no_memory_comes_from_the_machines_huge_pages(machine: str, bit: int) -> None:
+    """The call fails as it does where there are none; every other flag is allowed."""
+    verdict = judged(machine, number_of(machine, "mmap"), 0, 4096, 3, 1 << bit)
+    assert verdict == (refused(errno.ENOMEM) if bit == 18 else seccomp.ALLOW)
 
 
 @pytest.mark.parametrize("machine", MACHINES)

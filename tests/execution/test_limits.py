@@ -79,7 +79,7 @@ def test_memory_of_children_counts(run: Callable[..., Trace]) -> None:
             "for _ in range(1000): threading.Thread(target=time.sleep, args=(999,), daemon=True).start()",
             "(the limit is 64 processes and threads)",
         ),
-        ("self.files = [open('/dev/null') for _ in range(1000)]", "(the limit is 256 open files)"),
+        ("self.files = [open('/dev/null') for _ in range(1000)]", "(the limit is 128 open files)"),
         ("open('/tmp/x', 'wb').write(bytes(9 << 20))", "(the limit is 3 MiB in one file)"),
     ],
 )

@@ -26,6 +26,7 @@ from grader.core.submission import StudentFile, Submission
 from grader.execution.bag import Odometry
 from grader.execution.codec import from_json, to_json
 from grader.execution.plan import Plan, derive, plan_scenario
+from grader.student_host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 
 MS = 1_000_000
 SUBMISSION = Submission(
@@ -91,6 +92,20 @@ def test_students_cannot_tell_the_stimuli_from_their_seed() -> None:
         assert p.host_seed != derive(seed, "stimuli", "velocity_publisher", p.scenario)
         assert len(p.host_seed) == 64
         assert int(p.host_seed, 16)
+
+
+def test_the_date_follows_from_the_seed_alone() -> None:
+    """All scenarios of a submission run on one day, and another submission on another."""
+    drawn = {
+        (seed, p.epoch_ns, p.uptime_ns, p.hash_seed)
+        for seed in (1, 2)
+        for p in (plan(DRAWN, seed=seed), plan(DRAWN, seed=seed, name="together"))
+    }
+    assert len(drawn) == len({epoch_ns for _, epoch_ns, _, _ in drawn}) == 2
+    for _, epoch_ns, uptime_ns, hash_seed in drawn:
+        assert 0 <= epoch_ns - EPOCH_NS < EPOCH_SPAN_S * 1_000_000_000
+        assert 0 <= uptime_ns - UPTIME_NS < UPTIME_SPAN_S * 1_000_000_000
+        assert hash_seed == 0
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(-50, 50), st.integers(0, 50))

@@ -8,6 +8,7 @@ import pytest
 
 from grader.core.trace import ClockKind, Trace
 from grader.execution.plan import Plan
+from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.recording_session import AUTO, VIRTUAL, WALL, RecordingSession
 from grader.execution.supervisor import Job
 
@@ -102,7 +103,8 @@ def test_all_recordings_of_a_submission_share_one_budget() -> None:
 
     session = session_of(Listening("a"))
     for budget_s in (20, 30):
-        session.record({name: job(name) for name in "ab"}, AUTO, lambda step: None, budget_s=budget_s)
+        jobs = {name: job(name) for name in "ab"}
+        session.record(jobs, AUTO, lambda step: None, budget=RealTimeBudget(budget_s, spent_s=5))
     first, second = budgets[:3], budgets[3:]
     assert [len(set(map(id, part))) for part in (first, second)] == [1, 1]
     assert [part[0].words.partition("more than ")[2] for part in (first, second)] == [

@@ -95,7 +95,7 @@ def test_messages_that_fill_the_worker_end_the_nodes(machine: dict[int, Usage]) 
         machine[os.getpid()] = Usage(memory_bytes=module.UNREAD_BYTES + MIB)
         for student in students:
             student.held.wait(30)
-    assert {s.stopped for s in students} == {"stopped at 512 MiB of messages that were under way at once"}
+    assert {s.stopped for s in students} == {"stopped at 224 MiB of messages that were under way at once"}
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_a_machine_that_gave_no_time_decides_nothing(
     """Out of time because others had the processors: a problem of the machine's, never a mark."""
     student = Watched()
     machine[student.process.pid] = Usage(processor_ns=used_ns)
-    monkeypatch.setattr(module, "threads_starved_ns", lambda pids: [waited_ns])
+    monkeypatch.setattr(module, "threads_starved_ns", lambda pids: {"1": waited_ns})
     guard = watch(student, wall_ns=NS_PER_S // 20)
     assert student.stopped == "stopped after 0.05 s of real time"
     assert bool(guard.reviewed(TRACE).harness_problem) is undecided

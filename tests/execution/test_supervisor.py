@@ -296,6 +296,28 @@ def test_a_second_failure_is_a_problem_of_ours(make: Callable[..., tuple[Recorde
     assert len(stage.pids()) == 3
 
 
+@pytest.mark.parametrize(
+    ("behaviours", "suspected"),
+    [
+        (['{"problem": "ValueError: x", "has_started": true}'] * 2, True),
+        (["dies", '{"problem": "ValueError: x", "has_started": true}'], True),
+        (["dies", "dies"], True),
+        (['{"problem": "ValueError: x", "has_started": false}', "dies"], False),
+        (['{"problem": "ValueError: x", "has_started": 1}'] * 2, False),
+        (["says why not"] * 2, False),
+    ],
+)
+def test_a_problem_that_comes_back_with_the_submission_may_be_its_doing(
+    make: Callable[..., tuple[Recorder, Stage]], behaviours: Sequence[str], suspected: bool
+) -> None:
+    """In a fresh worker, after the submission's code had started; one that comes before is the grader's own."""
+    recorder, _ = make(*behaviours)
+    (trace,) = recorder.record(jobs("alone"), nothing)
+    assert trace.suspected == suspected
+    said = "(2 times, each time in another worker, while this submission was recorded)"
+    assert trace.harness_problem.endswith(said) == suspected
+
+
 @pytest.mark.parametrize("behaviour", ["", '{"problem": ""}', '{"problem": 7}', "dies"])
 def test_a_problem_without_words_still_has_some(make: Callable[..., tuple[Recorder, Stage]], behaviour: str) -> None:
     """No line of a report is empty, or shows how Python writes a list."""

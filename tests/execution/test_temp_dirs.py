@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from grader.execution import temp_dirs
-from grader.execution.temp_dirs import FRESH_S, PREFIX, scratch_folder, sweep
+from grader.execution.temp_dirs import FRESH_S, PREFIX, make_room, scratch_folder, sweep
 
 
 @pytest.fixture(autouse=True)
@@ -170,3 +170,22 @@ def test_a_folder_that_is_locked_stays(place: Path) -> None:
     assert sweep(place) == []
     os.close(lock)
     assert sweep(place) == [folder.name]
+
+
+def test_the_oldest_builds_make_room(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was used last stays, and so do other folders and the new build, though it is larger than the limit."""
+    monkeypatch.setattr(temp_dirs, "KEPT_BYTES", 300_000)
+    builds = {}
+    for number, name in enumerate(("oldest", "old", "new", "newest")):
+        builds[name] = place / f"submitted-{name}"
+        (builds[name] / "python").mkdir(parents=True)
+        (builds[name] / "python" / "a.py").write_bytes(b"x" * 70_000)
+        os.utime(builds[name], (number, number))
+    (place / "0123456789abcdef").mkdir()
+    (place / "submitted-link").symlink_to(place / "0123456789abcdef")
+    assert make_room(place, keep=builds["newest"]) == ["submitted-oldest"]
+    (builds["newest"] / "python" / "b.py").write_bytes(b"x" * 400_000)
+    make_room(place, keep=builds["newest"])
+    assert builds["newest"].is_dir()
+    assert not builds["new"].exists()
+    assert (place / "0123456789abcdef").is_dir()

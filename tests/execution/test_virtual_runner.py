@@ -12,7 +12,6 @@ pytest.importorskip("rclpy")
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scripted import (
-    EPOCH_NS,
     FLOAT,
     INT,
     MS,
@@ -38,6 +37,7 @@ from grader.execution.student_process import NodeProcess
 from grader.execution.virtual_runner import VirtualRunner
 from grader.execution.workload import HOPELESS_NS
 from grader.student_host import clock as host_clock
+from grader.student_host.clock import EPOCH_NS
 
 
 @pytest.fixture(autouse=True)
@@ -127,8 +127,8 @@ def listener(topic: str, interface: str = FLOAT, **qos: Any) -> Behaviour:
 
 
 def test_both_sides_agree_on_the_epoch() -> None:
-    """Virtual time starts at the same moment in the host and here."""
-    assert module.EPOCH_NS == host_clock.EPOCH_NS == EPOCH_NS
+    """A plan says when virtual time starts; without a draw this is the host's first moment."""
+    assert plan().epoch_ns == host_clock.EPOCH_NS == EPOCH_NS
 
 
 def test_time_jumps_from_wish_to_wish() -> None:
@@ -291,6 +291,33 @@ def test_nodes_that_answer_each_other_without_end_end_the_run(monkeypatch: pytes
     said = "the nodes answered each other 8 times without a rest: the rest was not looked at"
     assert run.seen(Message) == [f"11.25 limit {said}"]
     assert not run.trace.clock_reason
+
+
+def test_a_process_that_hears_itself_after_each_rest_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is woken for its own message, and then lets time pass on its own until it sends the next: that is a rest."""
+    monkeypatch.setattr(module, "HOPS", 4)
+    monkeypatch.setattr(module, "MOST_HOPS", 8)
+
+    def program(me: ScriptedStudent, world: World) -> Program:
+        claims = world.have(me.name, claim("publisher", "/x"), claim("subscription", "/x"))
+        yield from wait(10, endpoints=claims)
+        for at in range(20, 1000, 10):
+            world.publish("/x")
+            answer = yield idle(at, sent={"topic /x": 1}, now_ns=EPOCH_NS + at * MS)
+            assert answer["arrivals"] == {"topic /x": 1}
+        yield idle(None)
+
+    run = Run(program)
+    assert [m.t_ns / MS for m in run.trace.messages()] == list(range(20, 1000, 10))
+    assert not run.trace.marks("limit")
+
+
+def test_wake_ups_are_counted_against_the_time_that_has_passed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A node that rests between them may wake up as often as the scenario is long."""
+    monkeypatch.setattr(module, "STEPS", 5)
+    monkeypatch.setattr(module, "STEPS_HZ", 1000)
+    assert not Run(saying(*(idle(ms) for ms in range(1, 900)), idle())).trace.marks("limit")
+    assert Run(saying(*(idle(ms / 4) for ms in range(1, 900)), idle())).trace.marks("limit")
 
 
 def test_nodes_may_answer_each_other_for_a_while_at_one_instant(monkeypatch: pytest.MonkeyPatch) -> None:

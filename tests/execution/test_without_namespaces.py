@@ -54,7 +54,7 @@ def test_a_student_opens_no_file_but_its_own_and_what_python_needs(sandbox: Sand
     canary.write_text("secret", encoding="utf-8")
     hidden = [
         canary,
-        "/etc/passwd",
+        "/etc/resolv.conf",
         PACKAGE / "judging" / "judge.py",
         PACKAGE / "cli.py",
         "/proc/1/cmdline",
@@ -116,7 +116,7 @@ print(json.dumps(places))
 def test_links_lead_out_of_no_wall(sandbox: Sandbox) -> None:
     """A link in the student's own folder is judged by where it leads."""
     code = f"""{TRIES}
-os.symlink("/etc/passwd", "link")
+os.symlink("/etc/resolv.conf", "link")
 os.symlink({str(PACKAGE)!r}, "folder")
 print(json.dumps([works(open, "link"), works(open, "folder/cli.py"), works(os.listdir, "folder")]))
 """

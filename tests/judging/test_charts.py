@@ -247,7 +247,7 @@ def test_figure_ids_are_unique_and_of_their_exercise() -> None:
 
 def test_every_check_says_what_it_expects() -> None:
     """With the numbers of its rubric; no criterion of ours is without a phrase."""
-    said = {c.id: expectation(c.check) for e in (ONE, TWO, THREE) for c in e.criteria}
+    said = {c.id: expectation(c, []) for e in (ONE, TWO, THREE) for c in e.criteria}
     assert all(said.values())
     assert said["rate"] == "/cmd_vel at 20 ± 1 Hz on average over the whole observation; half the points at 20 ± 2 Hz"
     assert said["fan_off_at_or_below_25"] == "0 on /fan_speed for every /temperature at or below 25 °C"

@@ -166,6 +166,8 @@ def test_a_failed_recording_leaves_everything_undecided() -> None:
     given = judged(criterion("a", Says()), criterion("b", Says(), "a"), harness_problem="the worker died")
     assert {v.outcome for v in given.values()} == {Outcome.UNDECIDED}
     assert given["a"].reason == "the worker died"
+    assert not given["a"].suspected
+    assert judged(criterion("a", Says()), harness_problem="the worker died", suspected=True)["a"].suspected
     report = judge_exercise(exercise(criterion("a", Says())), {}, handed_in(FILE))
     assert outcomes(report) == {"a": "undecided"}
     assert "alone was not recorded" in report.verdicts[0].reason

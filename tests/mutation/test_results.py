@@ -13,7 +13,7 @@ import pytest
 
 import grader.mutation
 from grader.core.exercise import Outcome
-from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change
+from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change, unified_change
 from grader.mutation.showing import render_results, results_to_json
 
 MET, PARTLY, NOT_MET, BLOCKED, UNDECIDED = Outcome
@@ -31,7 +31,8 @@ def trial_result(rate: Outcome = MET, speed: Outcome = MET) -> TrialResult:
 def trial(number: int, **attributes: Any) -> Trial:
     """Return a mutant."""
     outcomes = {name: attributes.pop(name) for name in ("rate", "speed") if name in attributes}
-    return Trial(f"a.py:{number}:period:x", "a.py", "period", f"a => {number}", trial_result(**outcomes), **attributes)
+    given = {"diff": f"-a\n+{number}", **attributes}
+    return Trial(f"a.py:{number}:period:x", "a.py", "period", f"a => {number}", trial_result(**outcomes), **given)
 
 
 def result(*mutants: Trial, **attributes: Any) -> SelftestResult:
@@ -101,7 +102,7 @@ def test_a_criterion_that_nothing_turns_may_be_explained() -> None:
     """The text shows why."""
     found = replace(result(), mutants=(trial(1, rate=NOT_MET),), unturned={"speed": "it is the last"})
     assert found.passed
-    assert "speed is turned by no mutant because it is the last" in render_results([found], width=80, colour=False)
+    assert "speed detects no mutant because it is the last" in render_results([found], width=80, colour=False)
 
 
 def test_only_a_named_criterion_kills_as_expected() -> None:
@@ -126,6 +127,16 @@ def test_a_change_fits_on_one_line(before: str, after: str, change: str) -> None
     assert one_line_change(before, after) == change
 
 
+def test_a_change_is_shown_as_a_diff() -> None:
+    """With a line around it, so that its place can be seen."""
+    diff = unified_change("a\nb\nc\nd\n", "a\nb\nx\nd\n")
+    assert diff == "@@ -2,3 +2,3 @@\n b\n-c\n+x\n d"
+    text = render_results([result(trial(3, diff=diff))], width=80, colour=False)
+    assert "    @@ -2,3 +2,3 @@\n     b\n    -c\n    +x\n     d\n" in text
+    long = "\n".join(f"+{n}" for n in range(50))
+    assert "    ... and 20 more lines\n" in render_results([result(trial(3, diff=long))], width=80, colour=False)
+
+
 def everything() -> SelftestResult:
     """Return a result with something of every kind, and hostile text."""
     hostile = Trial("a\x1b[31m.py:1:text:\u202e", "a\x1b.py", "text", "x\n::error::y", trial_result())
@@ -143,8 +154,8 @@ def test_the_text_names_every_kind() -> None:
     """Survivors with their change, explanations, other killers, what is undecided, and idle patterns."""
     text = render_results([everything()], width=100, colour=False)
     assert "fan (r.yaml): HAS HOLES" in text
-    assert "6 tried, 3 killed, 1 survived, 1 survived for a reason, 1 undecided" in text
-    for part in ("because the same", "expected rate", "a => 5", "because asked for", "`x` explains nothing"):
+    assert "6 tried, 3 detected, 1 survived, 1 more survived for a reason in the notes, 1 undecided" in text
+    for part in ("because the same", "expected rate", "    -a\n    +5\n", "because asked for", "`x` explains nothing"):
         assert part in text
     assert "\x1b" not in text
     assert "\u202e" not in text

@@ -9,6 +9,7 @@ import pytest
 
 from grader.core.submission import StudentFile
 from grader.execution.executables import find_executable
+from grader.submissions.projects import read_projects
 from grader.submissions.submission import stage_submission
 
 WORKSPACE = Path(__file__).resolve().parent / "workspace"
@@ -59,7 +60,7 @@ def test_entry_points_may_be_declared_elsewhere(tmp_path: Path, setup: str) -> N
     (tmp_path / "robot" / "nodes.py").touch()
     (tmp_path / "package.xml").write_text("<package><name>robot</name></package>")
     (tmp_path / setup).write_text(texts[setup])
-    executable = find_executable(tmp_path, "robot", "go")
+    executable = find_executable(tmp_path, read_projects(tmp_path)[0], "robot", "go")
     assert executable is not None
     assert executable.file == "robot/nodes.py"
 
@@ -67,4 +68,4 @@ def test_entry_points_may_be_declared_elsewhere(tmp_path: Path, setup: str) -> N
 @pytest.mark.parametrize("name", ["../../../etc/passwd", "/bin/sh", "", "nodes"])
 def test_nothing_outside_of_the_submission_is_an_executable(name: str) -> None:
     """Names come from launch files, which students write."""
-    assert find_executable(WORKSPACE, "robot", name) is None
+    assert find_executable(WORKSPACE, read_projects(WORKSPACE)[0], "robot", name) is None

@@ -12,6 +12,7 @@ from ruamel.yaml import YAML
 from grader.app.request import GradeRequest
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.shares import install_shares
+from grader.submissions.projects import read_projects
 
 HERE = Path(__file__).resolve().parent
 WORKSPACE = HERE / "workspace"
@@ -21,7 +22,8 @@ SETUP = "from glob import glob\nimport os\nfrom setuptools import setup\nsetup(n
 def installed(root: Path, ros: RosInstallation, prefix: Path) -> list[str]:
     """Return the files below the prefix, without the index."""
     prefix.mkdir()
-    paths = install_shares(root, prefix, ros)
+    paths, notes = install_shares(root, read_projects(root)[0], prefix, ros)
+    assert notes == ()
     assert paths[:1] in ((), (str(prefix),))
     return sorted(
         str(path.relative_to(prefix / "share"))
@@ -90,7 +92,7 @@ def test_a_cmake_package_shares_its_files_and_a_loose_file_nothing(tmp_path: Pat
     loose.mkdir()
     (loose / "node.py").write_text("pass")
     assert installed(loose, ros, tmp_path / "none") == []
-    assert install_shares(loose, tmp_path / "none", ros) == ()
+    assert install_shares(loose, read_projects(loose)[0], tmp_path / "none", ros) == ((), ())
 
 
 @pytest.mark.ros

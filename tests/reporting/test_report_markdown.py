@@ -27,14 +27,14 @@ from report_samples import (
 
 from grader.core.exercise import Outcome
 from grader.core.report import ReportedFault
-from grader.core.trace import GraphSnapshot
+from grader.core.trace import GraphSnapshot, ServiceEnd
 from grader.reporting.graph import draw_mermaid
 from grader.reporting.markdown import DETAILS, MOST_BYTES, render_markdown
 
 # What GitHub renders besides the common mark: tables and bare links.
 GITHUB = MarkdownIt("commonmark", {"linkify": False}).enable("table").enable("strikethrough")
-NODE = r'(?:node\d+\(\["[^"]*"\]\)|topic\d+\["[^"]*"\]|more\["and \d+ more"\])'
-ARROW = r'(?:node|topic)\d+ (?:-->|-\. "[^"]*" \.->) (?:node|topic)\d+'
+NODE = r'(?:node\d+\(\["[^"]*"\]\)|topic\d+\["[^"]*"\]|(?:service|action)\d+\{\{"[^"]*"\}\}|more\["and \d+ more"\])'
+ARROW = r'(?:node|topic|service|action)\d+ (?:-->|-\. "[^"]*" \.->) (?:node|topic|service|action)\d+'
 
 
 def flat(tokens: Sequence[Token]) -> Iterator[Token]:
@@ -229,6 +229,20 @@ def test_a_topic_whose_types_differ_is_dotted() -> None:
     """No message goes through it, and the arrow says why."""
     ends = (endpoint("publisher", "/t", "/a"), endpoint("subscription", "/t", "/b", "std_msgs/msg/Int32"))
     assert any("types differ" in line for line in diagram(GraphSnapshot(0, ("/a", "/b"), ends)))
+
+
+def test_services_and_actions_are_drawn() -> None:
+    """In boxes of their own, from client to server."""
+    kind = "std_srvs/srv/Trigger"
+    ends = (ServiceEnd("client", "/go", kind, "/a"), ServiceEnd("service", "/count/_action/send_goal", kind, "/a"))
+    lines = diagram(GraphSnapshot(0, ("/a",), (), ends))
+    assert lines == [
+        'service0{{"/go"}}',
+        'node1(["/a"])',
+        'action2{{"/count"}}',
+        "node1 --> service0",
+        "action2 --> node1",
+    ]
 
 
 def test_a_node_without_topics_is_drawn_alone() -> None:

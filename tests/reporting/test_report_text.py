@@ -35,7 +35,8 @@ from rich.cells import cell_len
 
 from grader.core.chart import Excerpt
 from grader.core.exercise import Audience, Location, Outcome
-from grader.core.report import ExerciseReport, Report, ReportedFault, Reproduction, Verdict
+from grader.core.quantities import NS_PER_S
+from grader.core.report import SUBMISSION_SUSPECTED, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.core.trace import GraphSnapshot, ServiceEnd
 from grader.reporting.escape import shown
 from grader.reporting.graph import draw_graph
@@ -242,6 +243,18 @@ def test_an_undecided_report_says_so_plainly() -> None:
     assert "1 criterion is undecided through no fault of the student, 5 points" in " ".join(render(one).split())
 
 
+def test_an_undecided_report_does_not_excuse_what_the_submission_may_have_caused() -> None:
+    """A launch file with commands, or a failure that came back with the submission."""
+    theirs = replace(criterion("c", "C", 5, Outcome.UNDECIDED), evidence={SUBMISSION_SUSPECTED: True})
+    words = "perhaps because of what the submission does"
+    alone = " ".join(render(report(exercise("e", "1", "E", theirs))).split())
+    assert f"1 criterion is undecided, {words}; 5 points are still open" in alone
+    both = exercise("e", "1", "E", theirs, criterion("d", "D", 5, Outcome.UNDECIDED))
+    together = " ".join(render(report(both)).split())
+    assert f"2 criteria are undecided, some of them {words}; 10 points" in together
+    assert "no fault" not in alone + together
+
+
 def test_a_criterion_not_met_gives_reason_hint_and_place_in_this_order() -> None:
     """What was found, what to do, where."""
     text = render(middling(), 120, verbose=True).split("Exercise 1")[1]
@@ -341,20 +354,24 @@ def test_a_narrow_graph_breaks_at_the_node() -> None:
 
 
 def test_services_are_drawn_from_client_to_server() -> None:
-    """One line each; what nobody calls or serves is told, and parts of actions are left out."""
+    """One line each; what nobody calls or serves is told, and an action is one line although it has five services."""
     kind = "std_srvs/srv/Trigger"
     ends = (
         ServiceEnd("client", "/battery", kind, "/a"),
         ServiceEnd("client", "/lost", kind, "/a"),
         ServiceEnd("client", "/mixed", "std_srvs/srv/Empty", "/a"),
         ServiceEnd("service", "/battery", kind, "/b"),
-        ServiceEnd("service", "/count/_action/send_goal", kind, "/b"),
+        *(ServiceEnd("service", f"/count/_action/{part}", kind, "/b") for part in ("cancel_goal", "send_goal")),
+        ServiceEnd("client", "/count/_action/send_goal", kind, "/a"),
+        ServiceEnd("client", "/follow/_action/send_goal", kind, "/a"),
         ServiceEnd("service", "/mixed", kind, "/b"),
     )
     assert draw_graph(GraphSnapshot(0, ("/a", "/b", "/idle"), (), ends), width=80) == [
         "/a ┄┄/battery┄┄▶ /b",
+        "/a ══/count══▶ /b",
         "/a ┄┄/lost┄┄▶ (nobody)",
         "/a ┄┄/mixed┄┄▶ (nobody)",
+        "/a ══/follow══▶ (nobody)",
         "(nobody) ┄┄/mixed┄┄▶ /b",
         "/idle (no topics)",
     ]
@@ -379,6 +396,28 @@ def test_loose_ends_and_quarrels_are_drawn() -> None:
         "(nobody) ──/mute──▶ /b",
         "/idle (no topics)",
     ]
+
+
+@pytest.mark.parametrize(
+    ("offered", "requested", "said"),
+    [
+        ({"reliability": "best_effort"}, {}, "best_effort reliability offered, reliable requested"),
+        ({}, {"durability": "transient_local"}, "volatile durability offered, transient_local requested"),
+        ({}, {"deadline_ns": NS_PER_S}, "no deadline offered, 1 s requested"),
+        ({"deadline_ns": 2 * NS_PER_S}, {"deadline_ns": NS_PER_S}, "a deadline of 2 s offered, 1 s requested"),
+        ({}, {"liveliness": "manual_by_topic"}, "automatic liveliness offered, manual_by_topic requested"),
+        ({"deadline_ns": NS_PER_S, "durability": "transient_local"}, {"deadline_ns": NS_PER_S}, ""),
+        ({"liveliness": "manual_by_topic"}, {"reliability": "best_effort"}, ""),
+    ],
+)
+def test_incompatible_qos_is_drawn(offered: dict[str, Any], requested: dict[str, Any], said: str) -> None:
+    """No message passes, although topic and type agree."""
+    ends = (
+        replace(endpoint("publisher", "/t", "/a"), **offered),
+        replace(endpoint("subscription", "/t", "/b"), **requested),
+    )
+    lines = draw_graph(GraphSnapshot(0, ("/a", "/b"), ends), width=80)
+    assert lines == ["/a ──/t──▶ /b", *([f"  incompatible QoS: {said}"] if said else [])]
 
 
 def test_a_flood_of_topics_is_counted() -> None:

@@ -77,18 +77,47 @@ def rarred(files: Mapping[str, bytes] | Sequence[tuple[str, bytes]], links: Mapp
     for name, content in files.items() if isinstance(files, Mapping) else files:
         blocks.append(_rar_file(name, content))
     for name, target in (links or {}).items():
-        record = _vint(5) + _vint(1) + _vint(0) + _vint(len(target)) + target.encode()
-        blocks.append(_rar_file(name, b"", _vint(len(record)) + record))
+        blocks.append(_rar_file(name, b"", rar_redirection(1, target)))
     return b"Rar!\x1a\x07\x01\x00" + b"".join([*blocks, _rar_block(5, 0, _vint(0))])
 
 
-def _rar_file(name: str, content: bytes, extra: bytes = b"") -> bytes:
+def rar_redirected(kind: int, *, size: int, before: bytes = b"") -> bytes:
+    """Return a RAR 5.0 archive whose second file is a redirection of a kind to the first one, and is `size` bytes long.
+
+    Another record may stand before the redirection in the extra area.
+    """
+    second = _rar_file("b.py", b"", before + rar_redirection(kind, "a.py"), size)
+    blocks = [_rar_block(1, 0, _vint(0)), _rar_file("a.py", b"x = 1\n"), second, _rar_block(5, 0, _vint(0))]
+    return b"Rar!\x1a\x07\x01\x00" + b"".join(blocks)
+
+
+def rar_redirection(kind: int, target: str) -> bytes:
+    """Return the record of a redirection: 1 Unix link, 2 Windows link, 3 junction, 4 hard link, 5 copy of a file."""
+    return rar_record(5, _vint(kind) + _vint(0) + _vint(len(target)) + target.encode())
+
+
+def rar_record(kind: int, data: bytes) -> bytes:
+    """Return one record of an extra area."""
+    record = _vint(kind) + data
+    return _vint(len(record)) + record
+
+
+def _rar_file(name: str, content: bytes, extra: bytes = b"", size: int | None = None) -> bytes:
     is_folder = name.endswith("/")
     raw = name.rstrip("/").encode("utf-8", "surrogateescape")
     flags, mode = (0x0001, 0o40755) if is_folder else (0x0004, 0o100644)
     checksum = b"" if is_folder else zlib.crc32(content).to_bytes(4, "little")
     unix, stored = _vint(1), _vint(0)
-    body = _vint(flags) + _vint(len(content)) + _vint(mode) + checksum + stored + unix + _vint(len(raw)) + raw
+    body = (
+        _vint(flags)
+        + _vint(len(content) if size is None else size)
+        + _vint(mode)
+        + checksum
+        + stored
+        + unix
+        + _vint(len(raw))
+        + raw
+    )
     return _rar_block(2, 0x0002 | (0x0001 if extra else 0), body, content, extra)
 
 

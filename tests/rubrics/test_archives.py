@@ -21,14 +21,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from archive_samples import BY_PY7ZR, old_rarred, rarred, sevened, tarred, zipped
+from archive_samples import BY_PY7ZR, old_rarred, rar_record, rar_redirected, rarred, sevened, tarred, zipped
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies._internal.core import DataObject
 
 from grader.core.errors import SubmissionError
 from grader.core.submission import Submission
-from grader.submissions import archives, foreign_archives
+from grader.submissions import archives, contained, foreign_archives
 from grader.submissions.foreign_archives import is_installed
 from grader.submissions.submission import stage_submission
 
@@ -153,7 +153,7 @@ def test_an_archive_in_an_archive_is_opened_once(tmp_path: Path, outer: str, inn
     nested = hand_in(tmp_path / "2", PACKERS[outer](delivered))
     assert staged(nested.root) == FILES
     assert nested.digest == direct.digest
-    assert nested.notes == ("graded is what Alice_42_file_/homework.ZIP holds",)
+    assert nested.notes == ("the contents of Alice_42_file_/homework.ZIP were graded",)
 
 
 def test_a_folder_that_holds_one_archive_stands_for_it(tmp_path: Path, into: Path) -> None:
@@ -176,8 +176,8 @@ def test_deeper_nesting_and_several_archives_are_refused(tmp_path: Path) -> None
     twice = zipped({"a.zip": zipped({"b.zip": zipped(FILES)})})
     message, hint = refusal(tmp_path / "1", twice)
     assert (message, hint) == (
-        "/a.zip: expected at least one .py file, found none",
-        "unpack b.zip and name the folder that holds your files",
+        "/a.zip: expected at least one .py file, found b.zip",
+        "put your .py files into one zip: b.zip is inside another one",
     )
     message, _ = refusal(tmp_path / "2", zipped({"a.zip": zipped(FILES), "b.zip": zipped(FILES)}))
     assert message == "expected at least one .py file, found 2 archives"
@@ -403,7 +403,7 @@ def test_an_archive_cut_off_anywhere_is_refused(tmp_path: Path, kind: str) -> No
         (b"\x28\xb5\x2f\xfd....", "a.tar.zst", "expected a zip or tar archive, found zstd, which cannot be read"),
         (b"PK\x07\x08PK\x03\x04", "a.zip", "expected a zip or tar archive, found split zip, which cannot be read"),
         (zipped({}), "a.zip", "expected at least one .py file, found none"),
-        (zipped({"x.txt": b""}), "a.zip", "expected at least one .py file, found none"),
+        (zipped({"x.txt": b""}), "a.zip", "expected at least one .py file, found x.txt"),
         (
             zipped(FILES, zipfile.ZIP_LZMA),
             "a.zip",
@@ -418,7 +418,7 @@ def test_an_archive_cut_off_anywhere_is_refused(tmp_path: Path, kind: str) -> No
 )
 def test_what_is_no_usable_archive_is_told(tmp_path: Path, data: bytes, name: str, found: str) -> None:
     """The content decides, not the name; each error names what to submit instead."""
-    if found.endswith("none"):
+    if found.startswith("expected at least one .py file"):
         with pytest.raises(SubmissionError, match=found):
             hand_in(tmp_path, data, name)
         return
@@ -441,6 +441,14 @@ def test_a_7z_of_another_program_is_read(tmp_path: Path) -> None:
         (BY_PY7ZR["locked"], "expected an archive without a password, found an encrypted one"),
         (BY_PY7ZR["hidden"], "expected an archive without a password, found an encrypted one"),
         (rarred(FILES, links={"a.py": "/etc/passwd"}), "expected plain files, found a link: a.py"),
+        (rar_redirected(2, size=6), "expected plain files, found a link: b.py"),
+        (rar_redirected(4, size=6), "expected plain files, found a link: b.py"),
+        *(
+            (rar_redirected(kind, size=size, before=before), "expected plain files, found a reference to another file")
+            for kind in (3, 5, 6)  # a junction, a copy of a file, one of a future version
+            for size in (0, 6)
+            for before in (b"", rar_record(3, b"\0"))
+        ),
         (rarred({**FILES, "/etc/x.py": b""}), "expected plain relative names, found an absolute name: /etc/x.py"),
         (rarred({**FILES, "../x.py": b""}), "expected plain relative names, found a name that leads out of"),
         (rarred({**FILES, "a\\..\\..\\x.py": b""}), "expected plain relative names, found a name that leads out of"),
@@ -482,17 +490,17 @@ def test_the_limits_of_the_process_that_unpacks_refuse_the_archive(
     monkeypatch.setattr(foreign_archives, "MEMORY_BYTES", 16 << 20)
     assert "found a damaged, incomplete or unusual one" in refusal(tmp_path / "1", large)[0]
     monkeypatch.undo()
-    monkeypatch.setattr(foreign_archives, "REAL_S", 0.001)
+    monkeypatch.setattr(contained, "REAL_S", 0.001)
     assert "found a damaged, incomplete or unusual one" in refusal(tmp_path / "2", rarred(FILES))[0]
 
 
 @pytest.mark.sandbox
-def test_the_process_that_unpacks_can_do_nothing_else() -> None:
-    """No file, socket, process, signal or memory beyond its limit, though the C library were taken over."""
+def test_a_process_that_reads_what_students_made_can_do_nothing_else() -> None:
+    """No file, socket, process, signal or memory beyond its limit, though a library were taken over."""
     code = """
 import os, resource, socket
-from grader.submissions import unpacker
-unpacker._confine({"memory": 768 << 20, "processor": 60, "output": 1 << 20})
+from grader.submissions.confinement import confine
+confine({"memory": 768 << 20, "processor": 60, "output": 1 << 20})
 tries = {
     "read": lambda: open("/etc/hostname"), "write": lambda: open("/tmp/x", "w"), "net": socket.socket,
     "fork": os.fork, "signal": lambda: os.kill(os.getppid(), 0), "memory": lambda: bytearray(1 << 30),
@@ -634,3 +642,14 @@ def test_a_damaged_archive_never_breaks_the_intake(
         data[seed.draw(st.integers(0, len(data) - 1))] = seed.draw(st.integers(0, 255))
     with contextlib.suppress(SubmissionError):
         hand_in(tmp_path_factory.mktemp("damaged"), bytes(data))
+
+
+@pytest.mark.parametrize("change", ["folder", "empty"])
+def test_content_that_no_reader_delivers_is_refused(tmp_path: Path, change: str) -> None:
+    """A folder with content, and a file that the directory calls empty though it has some, would lose it."""
+    content = bytes(range(64))
+    data = zipped({"a.py": b"x = 1\n", "b/" if change == "folder" else "b.py": content}, zipfile.ZIP_STORED)
+    if change == "empty":
+        at = data.rindex(b"PK\x01\x02")  # checksum and size in the directory; the packed size stays
+        data = data[: at + 16] + bytes(4) + data[at + 20 : at + 24] + bytes(4) + data[at + 28 :]
+    assert refusal(tmp_path, data, "a.zip")[0].startswith("expected a whole zip archive")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.app.interface_packages import known_interfaces
 from grader.core.errors import RubricError
 from grader.core.scenario import Between, Choose, FieldSpec, Scenario, Simulated
 from grader.packaging import Chosen, classroom50
@@ -161,6 +162,11 @@ def test_a_mistake_in_the_rubric_is_told_with_its_place(tmp_path: Path, old: str
         ('yield "/echo"', 'yield "/ecko"', "publishes ('/ecko', {'data': 2.0})"),
         ('yield "/echo", {"data": self.gain}', 'return "/echo"', "publishes /, expected one of its topics"),
         ('yield "/echo", {"data": self.gain}', "return 5", "world.py"),
+        (
+            'return {"/echo": "std_msgs/msg/Float32"}',
+            "return None",
+            "world.py:20: the simulation `echo` failed: TypeErr",
+        ),
     ],
 )
 def test_a_mistake_in_the_file_is_told_before_anything_runs(tmp_path: Path, old: str, new: str, told: str) -> None:
@@ -176,3 +182,37 @@ def test_the_file_belongs_to_the_rubric(tmp_path: Path) -> None:
     assert classroom50(Chosen(rubrics=(path,)))["rubrics/1/world.py"] == WORLD.encode()
     written(tmp_path, world=WORLD.replace("1.0", "1.5"))
     assert read_rubric(path).digest != before
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ('{"data": "a0"}', "what it publishes on /echo has `a0` in `data`, expected a number"),
+        ('{"data": [1.0]}', "in `data`, expected a number"),
+        ('{"data": True}', "in `data`, expected a number"),
+        ('{"data": {"x": 1}}', "in `data`, expected a number"),
+    ],
+)
+def test_a_value_that_does_not_fit_its_field_is_told(tmp_path: Path, fields: str, told: str) -> None:
+    """Before a student's file runs; where types are known."""
+    known = known_interfaces()
+    if known is None:
+        pytest.skip("needs the descriptions of message types, which no ROS here has")
+    path = written(tmp_path, world=WORLD.replace('{"data": self.gain}', fields))
+    with pytest.raises(RubricError) as error:
+        read_rubric(path, interfaces=known)
+    assert told in error.value.message
+
+
+def test_numbers_in_lists_and_nested_messages_fit(tmp_path: Path) -> None:
+    """As a scanner publishes them."""
+    world = WORLD.replace("std_msgs/msg/Float32", "sensor_msgs/msg/LaserScan")
+    good = '{"header": {"frame_id": "laser"}, "angle_min": -1, "ranges": [1.0, float("inf"), 2]}'
+    path = written(tmp_path, world=world.replace('{"data": self.gain}', good))
+    assert read_rubric(path, interfaces=known_interfaces()).id == "follow"
+    for wrong, told in (('"angle_min": "a0"', "`a0` in `angle_min`"), ('"ranges": [1.0, "far"]', "`far` in `ranges`")):
+        bad = good.replace('"angle_min": -1', wrong) if "angle" in wrong else '{"ranges": [1.0, "far"]}'
+        path = written(tmp_path, world=world.replace('{"data": self.gain}', bad))
+        if known_interfaces() is not None:
+            with pytest.raises(RubricError, match=told):
+                read_rubric(path, interfaces=known_interfaces())

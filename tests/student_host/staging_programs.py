@@ -11,6 +11,9 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
+from grader.student_host.packages import layout_of
+from grader.submissions.projects import read_projects
+
 STAGE = Path(__file__).with_name("stage.py")
 SEED, OTHER_SEED = "ab" * 32, "cd" * 32
 
@@ -22,7 +25,9 @@ def play(code: str, *, seed: str = SEED, repeats: int = 5) -> list[str]:
 
 def play_file(root: Path, file: str) -> list[str]:
     """Return what a submission's file said, beside an rclpy that does nothing."""
-    return _perform({"root": str(root), "file": file, "seed": SEED, "repeats": 1})
+    package = layout_of(str(root), file).package
+    scripts = [script for project in read_projects(root)[0] if project.folder == package for script in project.scripts]
+    return _perform({"root": str(root), "file": file, "scripts": scripts, "seed": SEED, "repeats": 1})
 
 
 def _perform(request: dict[str, Any]) -> list[str]:

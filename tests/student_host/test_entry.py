@@ -121,6 +121,12 @@ def test_nothing_is_guessed_where_it_is_not_plain(run: Callable[..., Any], endin
     assert run({"node.py": NODE + ending}) == []
 
 
+def test_a_class_that_needs_arguments_is_not_spun(run: Callable[..., Any]) -> None:
+    """It is for other modules to use; the note says that nothing starts it."""
+    needy = NODE.replace("class Blinker(Node):", "class Blinker(Node):\n    def __init__(self, name): pass\n", 1)
+    assert run({"node.py": needy}) == ["class_not_started: Blinker"]
+
+
 def test_a_class_of_another_file_is_not_the_files_own(run: Callable[..., Any]) -> None:
     """An imported node class does not start by itself."""
     assert run({"node.py": "from other import Blinker\n", "other.py": NODE}) == []

@@ -11,6 +11,7 @@ from unittest.mock import patch
 
 import pytest
 
+from grader.execution.notes import left_out_words
 from grader.student_host.launch_files import describe
 
 IMPORTS = """
@@ -101,7 +102,7 @@ def test_parameter_files_and_values_keep_their_order(described: Callable[..., De
         ['{"rate": 3.0}', '"/n/a": {ros__parameters: {"rate": 3.0}}\n'],
     ]
     assert nodes[1]["parameter_files"] == []
-    assert [one["what"] for one in left_out] == ["the parameter file no.yaml, which is not there"]
+    assert [left_out_words(one) for one in left_out] == ["the parameter file no.yaml, which is not there,"]
 
 
 def test_groups_have_a_scope(described: Callable[..., Described]) -> None:
@@ -146,15 +147,14 @@ def test_included_files_get_arguments(described: Callable[..., Described]) -> No
 
 
 LEFT_OUT = {
-    "ExecuteProcess(cmd=['rm', '-rf', '/'])": "ExecuteProcess: rm -rf /",
-    "RegisterEventHandler(OnProcessExit(target_action=None, on_exit=[]))": "RegisterEventHandler",
-    "ComposableNodeContainer(name='c', namespace='')": "ComposableNodeContainer",
-    "Node(**TALKER, parameters=[{'urdf': Command(['xacro ', 'a.urdf'])}])": "Command(xacro a.urdf)",
+    "ExecuteProcess(cmd=['rm', '-rf', '/'])": 'the command "rm -rf /"',
+    "RegisterEventHandler(OnProcessExit(target_action=None, on_exit=[]))": "the action RegisterEventHandler",
+    "ComposableNodeContainer(name='c', namespace='')": "the action ComposableNodeContainer",
+    "Node(**TALKER, parameters=[{'urdf': Command(['xacro ', 'a.urdf'])}])": 'the substitution Command("xacro a.urdf")',
     "SetEnvironmentVariable('PATH', '/x')": "the environment variable PATH",
     "Node(**TALKER, prefix='gdb')": "prefix= of a node",
-    "IncludeLaunchDescription('more.launch.xml')": "the launch file more.launch.xml: only Python launch files are "
-    "evaluated",
-    "LogInfo(msg=FindPackageShare('gazebo_ros'))": "the package gazebo_ros, which is not in the submission",
+    "IncludeLaunchDescription('more.launch.xml')": "the launch file more.launch.xml, which is not in Python,",
+    "LogInfo(msg=FindPackageShare('gazebo_ros'))": "the package gazebo_ros, which is not in the submission,",
 }
 
 
@@ -164,7 +164,8 @@ def test_what_only_ros_can_do_is_named(described: Callable[..., Described], acti
     nodes, left_out = described(f"{action}, Node(**TALKER, name='after')")
     assert "__node:=after" in nodes[-1]["ros_arguments"]
     line = IMPORTS.count("\n") + 3
-    assert left_out == [{"file": "robot/launch/a.launch.py", "line": line, "what": what}]
+    ((place, words),) = [((one["file"], one["line"]), left_out_words(one)) for one in left_out]
+    assert (place, words) == (("robot/launch/a.launch.py", line), what)
 
 
 INCLUDES_ITSELF = "IncludeLaunchDescription(PythonLaunchDescriptionSource([ThisLaunchFileDir(), '/a.launch.py']))"

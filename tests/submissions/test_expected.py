@@ -22,7 +22,7 @@ NOT_PYTHON = {
 }
 MISSPELT = {"broken/misspelt_file", "broken/controller_missing", "broken/notebook_file"}
 #: Right programs that import a ROS package which the wheels lack.
-LACKING = {"broken/ros_package_tf2"}
+LACKING = {"broken/ros_package_missing"}
 
 FILES = {
     "velocity_publisher": {"velocity_publisher.py"},

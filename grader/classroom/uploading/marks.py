@@ -39,6 +39,7 @@ class Marks:
     marks: tuple[Mark, ...]
     max_score: float | None  # maximum points; None if the reports differ
     left_out: tuple[str, ...]  # who handed something in but has no mark to upload, and why; one line each
+    withheld: tuple[str, ...] = ()  # criteria that the scores count, but that the rubric hides from students
 
 
 class _Student(msgspec.Struct):
@@ -56,6 +57,7 @@ class _Student(msgspec.Struct):
 class _Class(msgspec.Struct):
     schema: str
     students: list[_Student]
+    withheld: list[str] = []
 
 
 def read_marks(results: Path) -> Marks:
@@ -77,7 +79,7 @@ def read_marks(results: Path) -> Marks:
             why = f"no score: {student.status}" if student.score is None else "; ".join(student.remarks)
             left_out.append(f"{student.name}: {why}")
     maxima = {student.max_score for student in read.students if student.max_score is not None}
-    return Marks(tuple(marks), maxima.pop() if len(maxima) == 1 else None, tuple(left_out))
+    return Marks(tuple(marks), maxima.pop() if len(maxima) == 1 else None, tuple(left_out), tuple(read.withheld))
 
 
 @dataclass(frozen=True, slots=True)

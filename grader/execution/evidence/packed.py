@@ -12,6 +12,7 @@ from typing import Any, TypeAlias, Union, get_type_hints
 
 import msgspec
 
+from grader.core.author_files import AuthorMistake
 from grader.core.errors import EvidenceError, HarnessError
 from grader.core.trace import (
     ClockKind,
@@ -137,8 +138,10 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("starts", tuple[_START, ...], ()),  # type: ignore[valid-type]
         ("reached", tuple[str, ...], ()),
         ("incomplete", bool, False),
+        ("may_drift", bool, False),
         ("most_starved_ns", int, 0),
         ("left_out", tuple[str, ...], ()),
+        ("author_mistake", AuthorMistake | None, None),
     ]
     return msgspec.defstruct("Trace", written)
 
@@ -156,8 +159,10 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         starts=tuple(map(_start, row.starts)),
         reached=row.reached,
         incomplete=row.incomplete,
+        may_drift=row.may_drift,
         most_starved_ns=row.most_starved_ns,
         left_out=row.left_out,
+        author_mistake=row.author_mistake,
     )
 
 

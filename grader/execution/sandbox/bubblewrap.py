@@ -16,7 +16,7 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault
 from grader.core.limits import Limits
 from grader.execution.sandbox import seccomp
-from grader.execution.sandbox.environment import PACKAGE, student_environment
+from grader.execution.sandbox.environment import PACKAGE, account_files, student_environment
 from grader.execution.sandbox.exposure import (
     STUDENT_GROUP,
     View,
@@ -103,14 +103,17 @@ class Bubblewrap:
         The worker has a private network with only `lo`, a private process namespace and a private /dev/shm, which all
         disappear with it. It is killed when the caller dies.
         """
+        # In the tier `bubblewrap-flat` students' processes see them too.
+        accounts, opened = ([], []) if view is None else _account_files(os.getuid(), os.getgid())
         options = [
             *("--die-with-parent", "--new-session", "--unshare-net", "--unshare-pid", "--unshare-ipc"),
             *(() if self.as_root else ("--unshare-user",)),
             *(("--dev-bind", "/", "/", "--proc", "/proc") if view is None else self._workers_files(view)),
             *("--perms", "1777", "--tmpfs", "/dev/shm", "--chdir", "/"),  # noqa: S108
+            *accounts,
             *(() if view is None else ("--remount-ro", "/")),
         ]
-        return Command((str(self.bwrap), *options, "--", *argv), dict(environment), tuple(pass_fds))
+        return Command((str(self.bwrap), *options, "--", *argv), dict(environment), (*pass_fds, *opened), tuple(opened))
 
     def _workers_files(self, view: WorkerView) -> list[str]:
         """Return the options that make visible what a worker needs, including the programs that start students."""
@@ -159,17 +162,19 @@ class Bubblewrap:
             make_readable(process.submission)
         environment = student_environment(process, HOME)
         filter_fd = _memory_file("filter", seccomp.student_filter())
+        user = self._user()
         copies, copied_fds = _copies(process)
+        accounts, account_fds = _account_files(*user)
         options = [
             *self._namespaces(TO_CHANGE_USER),
             *("--clearenv", "--chdir", str(WORK), "--seccomp", str(filter_fd)),
             *(word for setting in environment.items() for word in ("--setenv", *setting)),
-            *self._files(process, limits, copies),
+            *self._files(process, limits, (*copies, *accounts)),
         ]
         options_fd = _memory_file("options", b"".join(os.fsencode(option) + b"\0" for option in options))
-        argv = (str(self.bwrap), "--args", str(options_fd), "--", *self._entry(limits))
+        argv = (str(self.bwrap), "--args", str(options_fd), "--", *self._entry(limits, user))
         argv += (str(process.runtime.executable), *process.arguments)
-        opened = (filter_fd, options_fd, *copied_fds)
+        opened = (filter_fd, options_fd, *copied_fds, *account_fds)
         return Command(argv, {}, (*process.pass_fds, *opened), opened)
 
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
@@ -177,21 +182,23 @@ class Bubblewrap:
         if self.as_root:
             make_readable(process.submission)
         status_read, status_write = os.pipe()
+        user = self._user()
         copies, copied_fds = _copies(process)
+        accounts, account_fds = _account_files(*user)
         options = [
             *self._namespaces(()),
             *("--clearenv", "--as-pid-1", "--json-status-fd", str(status_write), "--seccomp"),
             str(filter_fd := _memory_file("filter", seccomp.student_filter())),
-            *self._files(process, limits, (*copies, "--ro-bind", str(self.cat), str(PLACEHOLDER))),
+            *self._files(process, limits, (*copies, *accounts, "--ro-bind", str(self.cat), str(PLACEHOLDER))),
         ]
         options_fd = _memory_file("options", b"".join(os.fsencode(option) + b"\0" for option in options))
-        opened = (filter_fd, options_fd, status_write, *copied_fds)
+        opened = (filter_fd, options_fd, status_write, *copied_fds, *account_fds)
         argv = (str(self.bwrap), "--args", str(options_fd), "--", str(PLACEHOLDER))
-        own: dict[str, object] = {"RLIMIT_NPROC": limits.processes, "RLIMIT_RTPRIO": 0}
+        own = {"RLIMIT_NPROC": limits.processes, "RLIMIT_CPU": [limits.processor_s, 1]}
         restrictions = start_request(
             str(WORK),
-            limits={**by_resource(limits), **own, "RLIMIT_CPU": [limits.processor_s, 1]},
-            user=[some_user(), STUDENT_GROUP] if self.as_root else None,
+            limits={**by_resource(limits), **own},
+            user=list(user) if self.as_root else None,
             filter=seccomp.student_filter().hex(),
         )
         environment = {**student_environment(process, HOME), "PWD": str(WORK)}  # bubblewrap sets it
@@ -205,22 +212,24 @@ class Bubblewrap:
             return [*shared, *(word for capability in kept for word in ("--cap-add", capability))]
         return [*shared, "--unshare-user", *(("--disable-userns",) if self.can_forbid_userns else ())]
 
-    def _entry(self, limits: Limits) -> list[str]:
+    def _user(self) -> tuple[int, int]:
+        """Return user and group of a student's process."""
+        return (some_user(), STUDENT_GROUP) if self.as_root else (os.getuid(), os.getgid())
+
+    def _entry(self, limits: Limits, user: tuple[int, int]) -> list[str]:
         """Return the commands that set limits and, as root, change the user before Python starts.
 
         Limits come first: the number of processes must be limited inside the user namespace, where the kernel counts
         them.
         """
         seconds = limits.processor_s
-        entry = [
-            *(str(self.prlimit), f"--as={limits.address_space_bytes}", f"--nproc={limits.processes}"),
-            *(f"--nofile={limits.open_files}", f"--fsize={limits.file_bytes}", "--core=0", "--rtprio=0"),
-            f"--cpu={seconds}:{seconds + 1}",
-        ]
+        values = {**by_resource(limits), "RLIMIT_NPROC": limits.processes, "RLIMIT_CPU": f"{seconds}:{seconds + 1}"}
+        entry = [str(self.prlimit)]
+        entry += [f"--{name.removeprefix('RLIMIT_').lower()}={value}" for name, value in values.items()]
         if not self.as_root:
             return entry
         privileges = ["--clear-groups", "--bounding-set=-all", "--inh-caps=-all", "--no-new-privs"]
-        return [*entry, str(self.setpriv), f"--reuid={some_user()}", f"--regid={STUDENT_GROUP}", *privileges]
+        return [*entry, str(self.setpriv), f"--reuid={user[0]}", f"--regid={user[1]}", *privileges]
 
     def _files(self, process: StudentProcess, limits: Limits, more: Sequence[str] = ()) -> list[str]:
         runtime = process.runtime
@@ -231,7 +240,9 @@ class Bubblewrap:
         # Process 1 is bubblewrap, without the seccomp filter, or the placeholder: its memory must not be accessible.
         first = "/proc/1"
         options = ["--proc", "/proc", "--size", "4096", "--perms", "0555", "--tmpfs", first, "--remount-ro", first]
-        options += ["--dev", "/dev"]
+        # The terminals of all students would be counted with those of the machine.
+        options += ["--dev", "/dev", "--size", "4096", "--perms", "0555", "--tmpfs", "/dev/pts"]
+        options += ["--remount-ro", "/dev/pts"]
         # Scratch folders first: a mount on /tmp would hide anything that was bound below it before.
         for scratch in ("/dev/shm", "/tmp"):  # noqa: S108
             options += ["--perms", "1777", "--size", size, "--tmpfs", scratch]
@@ -274,6 +285,16 @@ def _copies(process: StudentProcess) -> tuple[list[str], list[int]]:
     for file in process.copied:
         opened.append(os.open(process.beside / file, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC))
         options += ["--perms", "0666", "--file", str(opened[-1]), str(WORK / file)]
+    return options, opened
+
+
+def _account_files(user: int, group: int, home: Path = HOME) -> tuple[list[str], list[int]]:
+    """Return the options that create the files about users and hosts, and the descriptors that they name."""
+    options: list[str] = []
+    opened: list[int] = []
+    for name, content in account_files(user, group, home).items():
+        opened.append(_memory_file(name, content))
+        options += ["--perms", "0444", "--file", str(opened[-1]), f"/etc/{name}"]
     return options, opened
 
 

@@ -11,6 +11,7 @@ import grader
 from grader.core.releases import DEFAULT, release_of
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.protocol import StudentProcess
+from grader.student_host.machine import ADDRESS, ADDRESS_6, HOST_NAME, SHELL, USER, USER_ID
 
 PACKAGE = Path(grader.__file__).resolve().parent
 
@@ -57,6 +58,7 @@ def runtime_environment(runtime: PythonRuntime) -> dict[str, str]:
     environment = {
         "PATH": "/usr/bin:/bin",
         "LANG": "C.UTF-8",
+        "TZ": "UTC",
         "PYTHONDONTWRITEBYTECODE": "1",
         "PYTHONUTF8": "1",
         **runtime.environment,
@@ -97,8 +99,30 @@ def student_environment(process: StudentProcess, home: Path) -> dict[str, str]:
         **runtime_environment(process.runtime),
         "PATH": "/usr/bin",
         "HOME": str(home),
+        "TMPDIR": str(home.parent),  # some tiers allow no other place
+        "USER": USER,
+        "LOGNAME": USER,
+        "SHELL": SHELL,
+        "PYTHON_GIL": "1",  # only one thread at a time, also where Python was built without the lock
         "ROS_LOG_DIR": str(home / "log"),
         # With this, an int in a float field raises an exception with a line, instead of aborting.
         "ROS_PYTHON_CHECK_FIELDS": "1",
         **process.environment,
     }
+
+
+def account_files(user: int, group: int, home: Path) -> dict[str, bytes]:
+    """Return the files of /etc from which the C library knows users and hosts, for a user of a student's process.
+
+    What the program asks Python for is fixed by `grader.student_host.machine`; these files say the same to the rest.
+    """
+    ids = dict.fromkeys(((USER_ID, USER_ID), (user, group)))
+    users = [f"{USER}:x:{number}:{own}:{USER}:{home}:{SHELL}" for number, own in ids]
+    groups = [f"{USER}:x:{number}:" for number in dict.fromkeys(own for _, own in ids)]
+    files = {
+        "passwd": [f"root:x:0:0:root:/root:{SHELL}", *users],
+        "group": ["root:x:0:", *groups],
+        "hosts": [f"{ADDRESS} localhost {HOST_NAME}", f"{ADDRESS_6} localhost {HOST_NAME}"],
+        "nsswitch.conf": ["passwd: files", "group: files", "hosts: files"],
+    }
+    return {name: "\n".join([*lines, ""]).encode() for name, lines in files.items()}

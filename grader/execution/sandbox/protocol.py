@@ -8,6 +8,7 @@ from typing import Protocol
 
 from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
+from grader.core.quantities import KIB
 from grader.execution.ros_installation import PythonRuntime
 
 
@@ -79,13 +80,24 @@ def start_request(folder: str, **further: object) -> dict[str, object]:
     return {"folder": folder, **nothing, "confinement": None, "filter": "", **further}
 
 
-def by_resource(limits: Limits) -> dict[str, object]:
+#: Signals and timers that wait to be delivered: the kernel counts them together for all processes of a user, so that
+#: one process could take them from all others. A program that uses timers of this kind has one or two.
+PENDING_SIGNALS = 256
+#: Memory that may not be swapped out is counted in the same way; this was the kernel's default until Linux 5.16.
+LOCKED_BYTES = 64 * KIB
+
+
+def by_resource(limits: Limits) -> dict[str, int]:
     """Return the limits that hold for each process alone, by their names in `resource`."""
     return {
         "RLIMIT_AS": limits.address_space_bytes,
         "RLIMIT_NOFILE": limits.open_files,
         "RLIMIT_FSIZE": limits.file_bytes,
         "RLIMIT_CORE": 0,
+        "RLIMIT_SIGPENDING": PENDING_SIGNALS,
+        "RLIMIT_MEMLOCK": LOCKED_BYTES,
+        "RLIMIT_MSGQUEUE": 0,
+        "RLIMIT_RTPRIO": 0,  # or that of a privileged parent would hold
         "RLIMIT_CPU": limits.processor_s,
     }
 

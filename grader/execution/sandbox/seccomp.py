@@ -33,9 +33,21 @@ NEW_TIME_NAMESPACE = 0x00000080
 
 TIOCSTI, TIOCLINUX = 0x5412, 0x541C
 
-# fcntl: locks of a process and of a descriptor, each with and without waiting; leases and directory notifications
+# fcntl: locks of a process and of a descriptor, each with and without waiting; leases, directory notifications and
+# the size of a pipe, which counts towards what all pipes of the user may hold
 SET_LOCKS = (6, 7, 37, 38)
-SET_LEASE, NOTIFY = 1024, 1026
+SET_LEASE, NOTIFY, SET_PIPE_SIZE = 1024, 1026, 1031
+# setsockopt: the sizes of the two buffers of a socket, also for privileged callers (asm-generic/socket.h)
+SOL_SOCKET = 1
+BUFFER_SIZES = (7, 8, 32, 33)
+#: mmap with huge pages, which come from a pool of the machine.
+MAP_HUGETLB = 0x40000
+#: The protocol of netlink that tells interfaces and addresses; others configure encryption or packet filters.
+NETLINK_ROUTE = 0
+# The two flags that a socket type may include: close on exec, and non-blocking.
+KIND_FLAGS = (0, 0x800, 0x80000, 0x80800)
+#: Kinds of sockets that send only to the one that they are connected to.
+CONNECTED_KINDS = tuple(kind | flags for kind in (socket.SOCK_STREAM, socket.SOCK_SEQPACKET) for flags in KIND_FLAGS)
 #: A call refused with this number does nothing but reports success.
 NO_ERROR = 0
 
@@ -54,7 +66,7 @@ class Numbers:
 
 @dataclass(frozen=True, slots=True)
 class ArgumentRule:
-    """Refuses a system call depending on the low 32 bits of one argument."""
+    """Refuses a system call depending on the low 32 bits of one argument, and where given on the value of another."""
 
     call: str  # key of `NUMBERS`
     argument: int  # index of the argument
@@ -62,12 +74,31 @@ class ArgumentRule:
     never: tuple[int, ...] = ()  # the values refused
     never_bits: int = 0  # refused if any of these bits is set
     error: int = errno.EPERM  # the errno that the caller gets
+    when: tuple[int, int] | None = None  # index and value of another argument without which nothing is refused
 
 
 ARGUMENT_RULES = (
     ArgumentRule(
         "socket", 0, only=(socket.AF_UNIX, socket.AF_INET, socket.AF_INET6, socket.AF_NETLINK), error=errno.EAFNOSUPPORT
     ),
+    # A datagram of AF_UNIX lies in a queue that nothing counts after its sender is gone; a stream has one sender.
+    *(
+        ArgumentRule(call, 1, only=CONNECTED_KINDS, error=errno.EPROTONOSUPPORT, when=(0, socket.AF_UNIX))
+        for call in ("socket", "socketpair")
+    ),
+    # Rare protocols would load modules into the kernel; ROS, Python and the name resolver use none of them.
+    *(
+        ArgumentRule("socket", 2, only=only, error=errno.EPROTONOSUPPORT, when=(0, family))
+        for family, only in (
+            (socket.AF_INET, (0, socket.IPPROTO_TCP, socket.IPPROTO_UDP)),
+            (socket.AF_INET6, (0, socket.IPPROTO_TCP, socket.IPPROTO_UDP)),
+            (socket.AF_NETLINK, (NETLINK_ROUTE,)),
+        )
+    ),
+    # A socket keeps its usual buffers, so that the number of sockets bounds the memory in them. The call succeeds
+    # without effect, as the kernel itself cuts sizes without an error.
+    ArgumentRule("setsockopt", 2, never=BUFFER_SIZES, error=NO_ERROR, when=(1, SOL_SOCKET)),
+    ArgumentRule("mmap", 3, never_bits=MAP_HUGETLB, error=errno.ENOMEM),
     ArgumentRule("clone", 0, never_bits=NEW_NAMESPACES),
     ArgumentRule("unshare", 0, never_bits=NEW_NAMESPACES | NEW_TIME_NAMESPACE),
     ArgumentRule("ioctl", 1, never=(TIOCSTI, TIOCLINUX)),
@@ -76,20 +107,22 @@ ARGUMENT_RULES = (
     # they would exclude see different files anyway.
     ArgumentRule("flock", 1, never_bits=0xFFFFFFFF, error=NO_ERROR),
     ArgumentRule("fcntl", 1, never=SET_LOCKS, error=NO_ERROR),
-    ArgumentRule("fcntl", 1, never=(SET_LEASE, NOTIFY)),
+    ArgumentRule("fcntl", 1, never=(SET_LEASE, NOTIFY, SET_PIPE_SIZE)),
 )
 
 # Grouped by purpose. A filter cannot read the struct that clone3 takes, so clone3 is reported as missing, and the C
 # library uses clone instead.
 NUMBERS = {
     "socket": Numbers(41, 198),
+    "socketpair": Numbers(53, 199),
     "clone": Numbers(56, 220),
     "unshare": Numbers(272, 97),
     "ioctl": Numbers(16, 29),
     "prlimit64": Numbers(302, 261),
     "flock": Numbers(73, 32),
     "fcntl": Numbers(72, 25),
-    "inotify_add_watch": Numbers(254, 27),
+    "setsockopt": Numbers(54, 208),
+    "mmap": Numbers(9, 222),
     "clone3": Numbers(435, 435),
     "setns": Numbers(308, 268),
     # other processes
@@ -132,7 +165,16 @@ NUMBERS = {
     "modify_ldt": Numbers(154, None),
     "ioperm": Numbers(173, None),
     "iopl": Numbers(172, None),
-    # memory that no limit of a process counts
+    # counters that the user or the machine has only once: instances of inotify, and requests for asynchronous I/O
+    "inotify_init": Numbers(253, None),
+    "inotify_init1": Numbers(294, 26),
+    "inotify_add_watch": Numbers(254, 27),
+    "io_setup": Numbers(206, 0),
+    # memory that no limit of a process counts; a set of Landlock rules may have any size
+    "vmsplice": Numbers(278, 75),
+    "landlock_create_ruleset": Numbers(444, 444),
+    "landlock_add_rule": Numbers(445, 445),
+    "landlock_restrict_self": Numbers(446, 446),
     "shmget": Numbers(29, 194),
     "msgget": Numbers(68, 186),
     "semget": Numbers(64, 190),
@@ -155,7 +197,12 @@ NUMBERS = {
     "syslog": Numbers(103, 116),
     "vhangup": Numbers(153, 58),
 }
-ABSENT = ("clone3", "memfd_create", "io_uring_setup", "io_uring_enter", "io_uring_register")
+#: Calls that an older kernel may lack; programs then do without them.
+ABSENT = (
+    *("clone3", "memfd_create", "io_uring_setup", "io_uring_enter", "io_uring_register"),
+    *("inotify_init", "inotify_init1", "inotify_add_watch", "io_setup", "vmsplice"),
+    *("landlock_create_ruleset", "landlock_add_rule", "landlock_restrict_self"),
+)
 
 
 def supports(machine: str) -> bool:
@@ -211,9 +258,17 @@ def _argument_rule(rule: ArgumentRule, number: int | None) -> list[bytes]:
             _instruction(JUMP_IF_EQUAL, value, if_true=jump) for value, jump in zip(rule.only, left, strict=True)
         ]
         refusals.append(_fail(rule.error))
-    # Both architectures are little-endian, so the low half of the 64-bit argument comes first.
-    body = [_instruction(LOAD, ARGUMENTS_AT + 8 * rule.argument), *refusals, _instruction(LOAD, NUMBER_AT)]
+    body = [_argument(rule.argument), *refusals]
+    if rule.when is not None:
+        argument, value = rule.when
+        body = [_argument(argument), _instruction(JUMP_IF_EQUAL, value, if_false=len(body)), *body]
+    body.append(_instruction(LOAD, NUMBER_AT))
     return [_instruction(JUMP_IF_EQUAL, number, if_false=len(body)), *body]
+
+
+def _argument(index: int) -> bytes:
+    """Return the instruction that loads the low half of an argument; it comes first on both architectures."""
+    return _instruction(LOAD, ARGUMENTS_AT + 8 * index)
 
 
 def _fail(error: int) -> bytes:
@@ -228,8 +283,7 @@ OWN_GROUP = -OWN_PROCESS & 0xFFFFFFFF
 SET_OWNER, SET_SIGNAL, SET_OWNER_EXTENDED = 8, 10, 15  # fcntl
 FIOSETOWN, SIOCSPGRP = 0x8901, 0x8902
 IOPRIO_WHO_PROCESS = 1
-# The two flags that a socket type may include: close on exec, and non-blocking.
-PAIRS = tuple(socket.SOCK_STREAM | flags for flags in (0, 0x800, 0x80000, 0x80800))
+PAIRS = tuple(socket.SOCK_STREAM | flags for flags in KIND_FLAGS)
 
 FLAT_NUMBERS = {
     **NUMBERS,
@@ -268,11 +322,9 @@ FLAT_NUMBERS = {
     "sched_setattr": Numbers(314, 274),
     "setpriority": Numbers(141, 140),
     "ioprio_set": Numbers(251, 30),
-    # sockets with a path
-    "socketpair": Numbers(53, 199),
 }
 FLAT_RULES = (
-    *(rule for rule in ARGUMENT_RULES if rule.call not in ("socket", "ioctl")),
+    *(rule for rule in ARGUMENT_RULES if (rule.call, rule.argument) != ("socket", 0) and rule.call != "ioctl"),
     # A pair of stream sockets stays connected; a datagram socket could send to any path.
     ArgumentRule("socket", 0, only=(socket.AF_INET, socket.AF_INET6, socket.AF_NETLINK), error=errno.EAFNOSUPPORT),
     ArgumentRule("socketpair", 1, only=PAIRS, error=errno.EOPNOTSUPP),

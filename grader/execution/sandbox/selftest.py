@@ -31,6 +31,8 @@ STAGED = "probe.txt"
 ANSWERED = {"achieved", "outgrown", "said"}
 #: Folders that a student never writes to.
 CLOSED = ("/", "/dev", "/etc", "/usr/lib", "/proc")
+#: Files of this machine that no program needs, of which the first two are readable for every user.
+MACHINES = ("/etc/hostname", "/etc/resolv.conf", "/etc/shadow")
 SIOCGIFADDR = 0x8915  # linux/sockios.h
 
 
@@ -125,7 +127,7 @@ def environment(ros: RosInstallation, bait: Bait) -> Mapping[str, str]:
 
 def asked_of_probe(bait: Bait) -> dict[str, Any]:
     """Return the supervisor's part of the probe's arguments; the worker adds the rest."""
-    hidden = (bait.canary, PACKAGE / "core" / "report.py", PACKAGE / "judging" / "__init__.py", Path("/etc/passwd"))
+    hidden = (bait.canary, PACKAGE / "core" / "report.py", PACKAGE / "judging" / "__init__.py", *map(Path, MACHINES))
     return {
         "hidden": [str(path) for path in hidden],
         "closed": [*CLOSED, str(bait.folder)],

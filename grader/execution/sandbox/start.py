@@ -14,14 +14,17 @@ Documentation/userspace-api/landlock.rst; for the filter Documentation/userspace
 """
 
 # It starts before every student process, and pathlib would be half of its imports.
-# ruff: noqa: PTH102, PTH110, PTH112, PTH116, PTH118, PTH208
+# ruff: noqa: PTH102, PTH110, PTH112, PTH116, PTH118, PTH123, PTH208
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
+import errno
+import fcntl
 import json
 import os
+import re
 import resource
 import shutil
 import signal
@@ -39,6 +42,10 @@ DROP_FROM_BOUNDING_SET, NO_NEW_PRIVILEGES, AMBIENT, AMBIENT_RAISE = 24, 38, 47, 
 LAST_CAPABILITY = 63
 CAPABILITIES_VERSION_3 = 0x20080522  # linux/capability.h
 CAP_DAC_READ_SEARCH = 2
+#: From sys/mman.h.
+PROT_READ, MAP_PRIVATE_FIXED_ANONYMOUS, MAP_FAILED = 1, 0x02 | 0x10 | 0x20, ctypes.c_void_p(-1).value
+#: A line of /proc/PID/maps about memory that is shared with other processes.
+SHARED_MEMORY = re.compile(rb"^([0-9a-f]+)-([0-9a-f]+) ...s ", re.MULTILINE)
 
 #: Mount, control group, host name, IPC and process namespaces of linux/sched.h.
 NAMESPACES = 0x00020000 | 0x02000000 | 0x04000000 | 0x08000000 | 0x20000000
@@ -89,13 +96,47 @@ def prepare(request: dict[str, Any]) -> None:
     rules = ruleset(system, confinement, request["folder"]) if confinement else None
     if request["user"]:
         become(system, *request["user"], reach=bool(confinement and confinement["reach"]))
-    elif program and not confinement:
+    elif program and (not confinement or os.geteuid() == 0):  # an ordinary user has none, and may not drop any
         drop_capabilities(system)
     # Changing the user resets both, so they have to come afterwards.
     die_with(parent)
-    call(system.prctl, SET_DUMPABLE, 1, 0, 0, 0)
+    checked(call(system.prctl, SET_DUMPABLE, 1, 0, 0, 0), "dumpable")
     if program:
         restrict(system, rules, program)
+        require_restrictions(request["user"])
+
+
+def require_restrictions(user: list[int] | None) -> None:
+    """Raise OSError unless the kernel itself says that this process has its user, no privileges and a filter.
+
+    Args:
+        user: User and group that it runs as; None for any.
+    """
+    with open("/proc/self/status", "rb", buffering=0) as file:
+        status = dict(line.split(b":", 1) for line in file.read().splitlines() if b":" in line)
+    privileges = int(status[b"CapEff"], 16) | int(status[b"CapPrm"], 16)
+    if status[b"NoNewPrivs"].strip() != b"1" or status[b"Seccomp"].strip() != str(SECCOMP_FILTER).encode():
+        raise OSError(errno.EPERM, "the process has no filter")
+    if privileges & ~(1 << CAP_DAC_READ_SEARCH):
+        raise OSError(errno.EPERM, "the process has privileges")
+    if user and [{*status[b"Uid"].split()}, {*status[b"Gid"].split()}] != [{str(number).encode()} for number in user]:
+        raise OSError(errno.EPERM, "the process is another user")
+
+
+def make_memory_private() -> None:
+    """Replace memory that this process shares with others by empty pages of its own.
+
+    A fork shares two pages with the process that has loaded LTTng. It could not write to them, but wake the threads
+    that wait on them. The pages stay mapped, because the library unmaps them at exit.
+    """
+    system = ctypes.CDLL(None, use_errno=True)
+    system.mmap.restype = ctypes.c_void_p
+    with open("/proc/self/maps", "rb") as file:
+        shared = SHARED_MEMORY.findall(file.read())
+    for begin, end in ((int(first, 16), int(last, 16)) for first, last in shared):
+        at, length = ctypes.c_void_p(begin), ctypes.c_size_t(end - begin)
+        if system.mmap(at, length, PROT_READ, MAP_PRIVATE_FIXED_ANONYMOUS, -1, ctypes.c_long(0)) == MAP_FAILED:
+            raise OSError(ctypes.get_errno(), "memory of its own")
 
 
 def enter_folder(request: dict[str, Any]) -> None:
@@ -152,21 +193,33 @@ def clean_up_after_end(folder: str, scratch: int) -> None:
     """
     process = os.getpid()
     watched = [os.pidfd_open(process), os.pidfd_open(os.getppid())]
+    told, ready = os.pipe()
     middle = os.fork()
-    if middle:
-        os.waitpid(middle, 0)
-        for descriptor in watched:
-            os.close(descriptor)
-        return
-    # It has its own session and another parent, so that killing the others does not prevent it from deleting the
-    # folder.
-    os.setsid()
-    if os.fork():
-        os._exit(0)
+    if not middle:
+        with contextlib.suppress(BaseException):
+            # It has its own session and another parent, so that killing the others does not prevent it from deleting
+            # the folder.
+            os.setsid()
+            if not os.fork():
+                watch_folder(process, watched, ready, folder, scratch)
+        os._exit(1)
+    os.waitpid(middle, 0)
+    os.close(ready)
+    begun = os.read(told, 1)
+    for descriptor in (*watched, told):
+        os.close(descriptor)
+    if not begun:
+        raise OSError(errno.ECHILD, "nothing watches the folder of the process")
+
+
+def watch_folder(process: int, watched: list[int], ready: int, folder: str, scratch: int) -> None:
+    """Write to `ready`, wait for the end of a process or of its parent, kill its group and delete its folder."""
     os.chdir("/")
-    os.dup2(os.dup(watched[0]), 0)
-    os.dup2(os.dup(watched[1]), 1)
-    os.closerange(2, os.sysconf("SC_OPEN_MAX"))
+    for number, descriptor in enumerate([fcntl.fcntl(d, fcntl.F_DUPFD_CLOEXEC, 3) for d in (*watched, ready)]):
+        os.dup2(descriptor, number)
+    os.closerange(3, os.sysconf("SC_OPEN_MAX"))
+    os.write(2, b"1")
+    os.close(2)
     while not select([0, 1], [], [], LOOK_S if scratch else None)[0]:
         if outgrown(folder, scratch):
             # The signal distinguishes this end from all others; a program gains nothing by catching it.
@@ -214,7 +267,7 @@ def become(system: Any, user: int, group: int, *, reach: bool) -> None:
     """
     limit_capabilities(system, CAP_DAC_READ_SEARCH if reach else None)
     if reach:
-        call(system.prctl, KEEP_CAPABILITIES, 1, 0, 0, 0)
+        checked(call(system.prctl, KEEP_CAPABILITIES, 1, 0, 0, 0), "capabilities")
     os.setgroups([])
     os.setresgid(group, group, group)
     os.setresuid(user, user, user)
@@ -229,8 +282,10 @@ def become(system: Any, user: int, group: int, *, reach: bool) -> None:
 def limit_capabilities(system: Any, kept: int | None = None) -> None:
     """Forbid programs that are executed later every capability but one."""
     for capability in range(LAST_CAPABILITY + 1):
-        if capability != kept:
-            call(system.prctl, DROP_FROM_BOUNDING_SET, capability, 0, 0, 0)
+        if capability != kept and call(system.prctl, DROP_FROM_BOUNDING_SET, capability, 0, 0, 0) < 0:
+            error = ctypes.get_errno()
+            if error != errno.EINVAL:  # which says that the kernel does not know the capability
+                raise OSError(error, f"capability {capability}: {os.strerror(error)}")
 
 
 def drop_capabilities(system: Any) -> None:
@@ -241,15 +296,22 @@ def drop_capabilities(system: Any) -> None:
 
 def die_with(parent: int) -> None:
     """Make the kernel kill this process when its parent ends."""
-    call(ctypes.CDLL(None).prctl, SET_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+    system = ctypes.CDLL(None, use_errno=True)
+    checked(call(system.prctl, SET_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0), "the end with the parent")
     if os.getppid() != parent:
         os._exit(1)
 
 
-def enter(pid: int) -> None:
-    """Enter the namespaces of a process; the process namespace holds for children that are started from now on."""
+def enter(pid: int, parent: int) -> None:
+    """Enter the namespaces of a process; the process namespace holds for children that are started from now on.
+
+    Raises OSError if the process is no longer a child of the parent: its number may have been given to another one.
+    """
     system = ctypes.CDLL(None, use_errno=True)
     process = os.pidfd_open(pid)
+    with open(f"/proc/{pid}/stat", "rb", buffering=0) as file:
+        if int(file.read().rpartition(b")")[2].split()[1]) != parent:
+            raise OSError(errno.ESRCH, "the sandbox has ended")
     own, others = (os.stat(f"/proc/{who}/ns/user").st_ino for who in ("self", pid))
     kinds = NAMESPACES | (0 if own == others else USER_NAMESPACE)
     checked(call(system.setns, process, kinds), "namespaces")

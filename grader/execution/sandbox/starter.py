@@ -22,7 +22,8 @@ from grader.execution.sandbox.starter_process import StarterProcess, execute
 #: Seconds until the starter has imported rclpy, and until a sandbox is ready or a process has been forked.
 READY_S, FORKED_S = 60.0, 20.0
 MODULE = "starter.py"
-#: Forks of one process have the same hashes of strings, and so the same order of sets.
+#: Forks of one process have the same hashes of strings, and so the same order of sets. No seed of Python's could give a
+#: fork other ones: Python reads it once, at its start. A program that may use the order of a set is executed instead.
 HASH_SEED = "0"
 KILLED = -signal.SIGKILL
 
@@ -44,6 +45,7 @@ class StartedProcess:
         self._control = control
         self.stdout, self.stderr = stdout, stderr
         self.returncode: int | None = None
+        self._received = b""
         told = self._next(FORKED_S)
         if "pid" not in told:
             raise OSError("the process was not started")
@@ -73,15 +75,15 @@ class StartedProcess:
     def _next(self, timeout: float | None) -> dict[str, Any]:
         """Return the starter's next message; empty if the starter or its fork is gone."""
         self._control.settimeout(timeout)
-        line = b""
-        while not line.endswith(b"\n"):
+        while b"\n" not in self._received:  # both messages may come at once
             try:
                 received = self._control.recv(100)
             except ConnectionError:
                 return {}
             if not received:
                 return {}
-            line += received
+            self._received += received
+        line, _, self._received = self._received.partition(b"\n")
         told: dict[str, Any] = json.loads(line)
         return told
 
@@ -145,12 +147,12 @@ class Starter:
         """
         with ExitStack() as ours, ExitStack() as theirs:
             placeholder: subprocess.Popen[bytes] | None = None
-            inside = 0
+            inside: tuple[int, int] | None = None
             if sandbox.placeholder is not None:
                 theirs.callback(os.close, sandbox.placeholder.status_fd)
                 placeholder = _begun(sandbox.placeholder)
                 ours.callback(_end, placeholder)
-                inside = _pid_inside(placeholder, sandbox.placeholder.status_fd)
+                inside = (_pid_inside(placeholder, sandbox.placeholder.status_fd), placeholder.pid)
             request = {
                 "enter": inside,
                 "environment": dict(sandbox.environment),

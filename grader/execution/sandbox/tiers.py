@@ -54,6 +54,8 @@ SCRATCH = Path("/dev/shm")  # noqa: S108
 HERE = Path(__file__).parent
 HOST = PACKAGE / "student_host"
 DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
+#: What the worker's own bubblewrap puts there (`environment.account_files`).
+ACCOUNT_FILES = ("/etc/passwd", "/etc/group", "/etc/hosts", "/etc/nsswitch.conf")
 _version = functools.cache(landlock_version)
 #: The first Landlock version that restricts signals.
 WITH_SIGNALS = 6
@@ -196,7 +198,7 @@ class Plain(_OnSharedNetwork):
         """Return the limits of a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, PLAIN_NAME)
         folder = Path(tempfile.gettempdir()) / f"grade-student-{secrets.token_hex(8)}"
-        environment = student_environment(process, folder / "home")
+        environment = {**student_environment(process, folder / "home"), "PWD": str(folder / "work")}
         environment |= loopback_only(environment)
         request = start_request(str(folder), made=True, limits=by_resource(limits), **copies(process))
         return PreparedSandbox(request, environment)
@@ -251,15 +253,14 @@ def confined(process: StudentProcess, limits: Limits, ground: Ground) -> Prepare
     if ground.as_root:
         make_readable(process.submission)
     folder = ground.scratch / f"grade-student-{secrets.token_hex(8)}"
-    environment = student_environment(process, folder / "home")
+    environment = {**student_environment(process, folder / "home"), "PWD": str(folder / "work")}
     environment |= loopback_only(environment) if ground.loopback else {}
     request = start_request(
         str(folder),
         made=True,
         **copies(process),
         scratch=limits.scratch_bytes,
-        # Without RLIMIT_RTPRIO a privileged parent's would hold.
-        limits={**by_resource(limits), "RLIMIT_RTPRIO": 0, "RLIMIT_MSGQUEUE": 0},
+        limits=by_resource(limits),
         processes=limits.processes,
         user=[some_user(), STUDENT_GROUP] if ground.as_root else None,
         confinement=_confinement(process, ground),
@@ -273,7 +274,7 @@ def _confinement(process: StudentProcess, ground: Ground) -> dict[str, object]:
     host = (process.host_folder,) if process.host_folder else ()
     own = (process.submission, *host, *(HERE.glob("loopback*.xml") if ground.loopback else ()))
     return {
-        "read": [str(path) for path in (*bound, *own)],
+        "read": [str(path) for path in (*bound, *own, *(() if ground.loopback else ACCOUNT_FILES))],
         "hidden": [str(path) for path in secrets_within(bound, process.runtime.python_paths)],
         "devices": DEVICES,
         "tcp": not ground.loopback,

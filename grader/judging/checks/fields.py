@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -17,7 +18,9 @@ from grader.judging.output import number_in
 from grader.judging.plots import Drawing, Plot, value_panels
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
 from grader.judging.values import (
+    FEW,
     JITTER_NS,
+    FewSuffice,
     FieldRule,
     Reading,
     RuleOrValue,
@@ -34,7 +37,7 @@ from grader.judging.wording import counted, moment, number, numbers, quote, unit
 
 
 @dataclass(frozen=True, slots=True)
-class FieldEqual:
+class FieldEqual(FewSuffice):
     """Every message on a topic has the expected value in each named field: numbers, texts, truth values or lists.
 
     Attributes:
@@ -74,7 +77,7 @@ class FieldEqual:
 
 
 @dataclass(frozen=True, slots=True)
-class FieldInRange:
+class FieldInRange(FewSuffice):
     """A number in every message on a topic lies in a range, its edges inside; NaN lies in none.
 
     Attributes:
@@ -120,7 +123,7 @@ class FieldInRange:
 
 
 @dataclass(frozen=True, slots=True)
-class FieldMonotone:
+class FieldMonotone(FewSuffice):
     """A number on a topic only rises, or only falls, from each message to the next.
 
     Attributes:
@@ -197,6 +200,10 @@ def too_few_messages(trace: Trace, topic: str, found: int, wanted: int) -> Findi
     return explain_fault(trace, reason, last=True) or not_met(reason, {"messages": found}, problem=ProblemKind.TOO_FEW)
 
 
+#: How many messages may be lost until a subscription is discovered: half a second of 20 Hz.
+LOST_AT_START = 10
+
+
 @dataclass(frozen=True, slots=True)
 class FieldFunction:
     """A field of every message on a topic follows a formula of the message's number n, which is 0 for the first one.
@@ -225,6 +232,11 @@ class FieldFunction:
     @property
     def expected(self) -> str:
         return f"{self.field} = {self.formula} in every message on {self.topic}, n being 0 in the first one"
+
+    def of_beginning(self) -> FieldFunction:
+        """Return the check for a beginning, in which messages sent before discovery may be lost."""
+        lost, few = max(self.start_tolerance, LOST_AT_START), min(self.at_least, FEW)
+        return replace(self, start_tolerance=lost, at_least=few)
 
     def judge(self, trace: Trace) -> Finding:
         messages = published(trace, self.topic)

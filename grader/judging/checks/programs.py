@@ -305,6 +305,9 @@ class CleanShutdown:
     def expected(self) -> str:
         return f"{self.process} ends within {number(seconds(self.within))} s of Ctrl-C, without another exception"
 
+    def of_beginning(self) -> None:
+        """Say that a beginning shows nothing, because it ends before Ctrl-C."""
+
     def judge(self, trace: Trace) -> Finding:
         signals = trace.marks("stop_signal", self.process)
         faults = trace.faults(self.process)

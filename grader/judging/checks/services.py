@@ -19,7 +19,7 @@ from grader.judging.output import number_in
 from grader.judging.plots import Drawing
 from grader.judging.series import curve
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of
-from grader.judging.values import Reading, RuleOrValue, breach, broken_rules, number_at, rules_text, text_at
+from grader.judging.values import FewSuffice, Reading, RuleOrValue, breach, broken_rules, number_at, rules_text, text_at
 from grader.judging.wording import counted, listed, moment, number, numbers, quote, span
 
 _RETURN_HINT = "a service callback takes (self, request, response) and ends with return response"
@@ -110,7 +110,7 @@ def _due(call: Call, trace: Trace, late_ns: int) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class ServiceResponse:
+class ServiceResponse(FewSuffice):
     """Every response of a student's server has the expected value in each named field.
 
     Whether every request has a response is judged by `service_answers_all`.
@@ -179,7 +179,7 @@ def never_asked(trace: Trace, service: str) -> Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class ServiceFunction:
+class ServiceFunction(FewSuffice):
     """A number in every response of a student's server follows a formula of the fields of its request.
 
     The formula may use the request's numeric fields, such as `a` or `pose.x`, numbers, pi, + - * / % **, and sin, cos,
@@ -257,7 +257,7 @@ class _Answer:
 
 
 @dataclass(frozen=True, slots=True)
-class ServiceSequence:
+class ServiceSequence(FewSuffice):
     """A number in the responses of a student's server changes by one step with each call, whoever calls.
 
     The number is read from a numeric field, or from a text: its first number, or what `pattern` finds. Calls of one

@@ -12,7 +12,7 @@ from itertools import pairwise
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
-from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace
+from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace, unmet_policy
 from grader.judging.findings import FAULT_KEY, explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met
 from grader.judging.plots import Drawing, threshold_drawing
 from grader.judging.series import steps_behind
@@ -299,13 +299,13 @@ def _kept_apart(trace: Trace, topic: str) -> Finding | None:
     subscriptions = student_endpoints(trace, "subscription", topic)
     pairs = [(p, s) for p in publishers for s in subscriptions if p.participant != s.participant]
     alike = [(p, s) for p, s in pairs if p.type == s.type]
-    if not pairs or any(_incompatible(p, s) is None for p, s in alike):
+    if not pairs or any(unmet_policy(p, s) is None for p, s in alike):
         return None
     here, there = (alike or pairs)[0]
     evidence = {"publisher": [here.node, here.type], "subscription": [there.node, there.type]}
     problem = Problem(ProblemKind.KEPT_APART, (topic,))
     one, other = _speakers(trace, here, there)
-    policy = _incompatible(here, there)
+    policy = unmet_policy(here, there)
     if not alike or policy is None:
         text = f"{one} publishes {quote(here.type)}, {other} subscribes {quote(there.type)}"
         hint = f"use the same message type for {topic} in both files"
@@ -313,15 +313,6 @@ def _kept_apart(trace: Trace, topic: str) -> Finding | None:
     text = f"{one} offers {policy[0]}, {other} asks for {policy[1]}"
     hint = "pass the queue depth 10 as QoS on both sides"
     return not_met(f"{topic}: {text}: they cannot talk", evidence, hint=hint, problem=problem)
-
-
-def _incompatible(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:
-    """Return the offered and the requested policy if they are incompatible; None otherwise."""
-    if (publisher.reliability, subscription.reliability) == ("best_effort", "reliable"):
-        return "best_effort reliability", "reliable"
-    if (publisher.durability, subscription.durability) == ("volatile", "transient_local"):
-        return "volatile durability", "transient_local"
-    return None
 
 
 def _speakers(trace: Trace, here: Endpoint, there: Endpoint) -> tuple[str, str]:

@@ -43,7 +43,6 @@ class StudentRow:
     adjustments: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()  # notes for readers of the row
     report: ReportData | None = None  # the report; None if there is none
-    less: bool = False  # whether students see less than the report
     counts: bool = True
 
 

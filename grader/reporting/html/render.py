@@ -13,12 +13,20 @@ from markupsafe import Markup
 
 from grader.core.chart import Chart, Excerpt, Figure, GraphFigure, Panel, Playback, Series, Stage, TopicValues
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Location, Outcome, exercise_name
+from grader.core.exercise import Audience, Location, Outcome, exercise_name
 from grader.core.report import ExerciseReport, JsonObject, JsonValue, Report, ReportedFault, Verdict
 from grader.core.trace import ClockKind, Endpoint, GraphSnapshot
 from grader.reporting import wording
 from grader.reporting.escape import script_json, shown
 from grader.reporting.html.assets import bundle, page_environment
+from grader.reporting.html.final_mark import (
+    CriterionMark,
+    ScoreShown,
+    decision_place,
+    earned_place,
+    points_place,
+    score_place,
+)
 
 _TEXT_LIMIT = 200
 _NAME_LIMIT = 60
@@ -183,9 +191,6 @@ def _number(value: float, digits: int = 7) -> float | int | None:
     return int(short) if short.is_integer() and abs(short) < 1e15 else short
 
 
-_CIRCUMFERENCE = 100
-
-
 def render_html(report: Report, *, assets: str | None = None, recordings: str = "") -> str:
     """Return a report, all of whose text is treated as hostile, as an HTML page that makes no network requests.
 
@@ -205,7 +210,16 @@ def render_html(report: Report, *, assets: str | None = None, recordings: str = 
         embedded=Markup,
         clock_wall=ClockKind.WALL,
         command=" ".join(wording.command(report)),
+        score=score_place(score_shown(report)),
+        for_student=report.audience is Audience.STUDENT,
+        first=wording.first_to_fix(report) if report.audience is Audience.STUDENT else None,
     )
+
+
+def score_shown(report: Report) -> ScoreShown:
+    """Return the score of a report as its page shows it."""
+    outcomes = tuple(verdict.outcome for exercise in report.exercises for verdict in exercise.verdicts)
+    return ScoreShown(report.score, report.max_score, outcomes, report.final)
 
 
 @cache
@@ -215,7 +229,10 @@ def _templates() -> Environment:
     templates.globals |= {
         "wording": wording,
         "open_at_first": _open_at_first,
-        "percent": _percent,
+        "points_place": points_place,
+        "earned_place": earned_place,
+        "decision_place": decision_place,
+        "mark_of": lambda verdict: CriterionMark(verdict.score, verdict.max_score),
         "excerpt_at": _excerpt_at,
         "excerpts_left": _excerpts_left,
         "marked_in": _marked_in,
@@ -230,10 +247,6 @@ def _templates() -> Environment:
 def _open_at_first(verdict: Verdict) -> bool:
     """Return whether a criterion starts unfolded: readers look for what cost points."""
     return verdict.outcome in (Outcome.NOT_MET, Outcome.PARTLY, Outcome.UNDECIDED)
-
-
-def _percent(score: Fraction, max_score: Fraction) -> float:
-    return round(float(_CIRCUMFERENCE * score / max_score), 2) if max_score else 0.0
 
 
 def _excerpt_at(exercise: ExerciseReport, place: Location | None) -> Excerpt | None:

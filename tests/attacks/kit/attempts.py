@@ -24,20 +24,27 @@ CALLS = {
     "clone3": (435, 435),
     "fork": (57, None),
     "fsopen": (430, 430),
+    "inotify_init": (253, None),
+    "inotify_init1": (294, 26),
+    "io_setup": (206, 0),
     "io_uring_setup": (425, 425),
     "keyctl": (250, 219),
+    "landlock_create_ruleset": (444, 444),
     "msgget": (68, 186),
     "open_tree": (428, 428),
     "perf_event_open": (298, 241),
     "pidfd_open": (434, 434),
+    "pidfd_getfd": (438, 438),
     "process_vm_readv": (310, 270),
     "process_vm_writev": (311, 271),
     "request_key": (249, 218),
     "semget": (64, 190),
     "setns": (308, 268),
     "shmget": (29, 194),
+    "timer_create": (222, 107),
     "unshare": (272, 97),
     "userfaultfd": (323, 282),
+    "vmsplice": (278, 75),
 }
 LIBC = ctypes.CDLL(None, use_errno=True)
 FIRST, LATER, EVERY_TICK = [], [], []
@@ -94,6 +101,11 @@ def tell(data):
     """Print the secrets found in some data."""
     for found in CANARY.findall(data):
         print("found", found.decode(), flush=True)
+
+
+def address(room):
+    """Return where a writable buffer is in memory."""
+    return ctypes.addressof(ctypes.c_char.from_buffer(room))
 
 
 def spawn(work):

@@ -11,7 +11,7 @@ HOME = os.environ.get("HOME", "/tmp")
 
 @attempt
 def links(node):
-    for place, target in (("log-of-mine", HIDDEN[0]), ("outside", OUTSIDE), ("passwd", "/etc/passwd")):
+    for place, target in (("log-of-mine", HIDDEN[0]), ("outside", OUTSIDE), ("passwd", "/etc/resolv.conf")):
         for folder in (HOME, os.environ.get("ROS_LOG_DIR", HOME), os.getcwd(), "/tmp"):
             try:
                 os.symlink(target, os.path.join(folder, place))

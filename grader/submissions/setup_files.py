@@ -3,33 +3,39 @@
 from __future__ import annotations
 
 import ast
-import glob
-import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import posixpath
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from fnmatch import fnmatchcase
+from string import Formatter
 from typing import Any
 
-#: The maximum length of strings and lists that are evaluated, and the maximum number of evaluated expressions.
+#: The maximum length of strings and lists that are evaluated, and the maximum number of statements and expressions.
 TEXT_CHARACTERS, ITEMS, STEPS = 10_000, 1_000, 20_000
 #: String methods that are evaluated if their arguments are strings.
 _OF_TEXTS = frozenset(
     {"format", "join", "lower", "lstrip", "replace", "rstrip", "split", "splitlines", "strip", "upper"}
 )
 _OF_DICTS = frozenset({"items", "keys", "values"})
-#: Built-in functions that are evaluated for one argument.
-_MAKING: Mapping[str, Callable[[Any], Any]] = {"list": list, "sorted": sorted, "str": str, "tuple": list}
+#: Conversions with a width or a precision, whose result may be of any length.
+_WIDTH = re.compile(r"%[-#0 +]*[0-9*.]")
 
 
-def given_to_setup(tree: ast.Module, folder: str) -> dict[str, Any]:
+class LimitError(ValueError):
+    """Reading the file would take too much."""
+
+
+def given_to_setup(tree: ast.Module, names: Sequence[str]) -> dict[str, Any]:
     """Return the keyword arguments of setup(), as far as they can be evaluated; unknown values are None.
 
     Args:
         tree: The parsed file.
-        folder: Its folder, which the patterns of `glob` are relative to.
+        names: The paths of all files below its folder, which the patterns of `glob` are compared with.
 
     Raises:
-        ValueError: The file exceeds a limit.
+        LimitError: The file exceeds a limit.
     """
-    reader = _Reader(folder)
+    reader = _Reader(names)
     reader.run(tree.body)
     return reader.given
 
@@ -37,8 +43,8 @@ def given_to_setup(tree: ast.Module, folder: str) -> dict[str, Any]:
 class _Reader:
     """Evaluates the statements of a setup.py, as far as they use strings, lists and dictionaries."""
 
-    def __init__(self, folder: str) -> None:
-        self._folder = folder
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = names
         self.given: dict[str, Any] = {}
         self._known: dict[str, Any] = {}
         self._steps = 0
@@ -46,6 +52,7 @@ class _Reader:
     def run(self, statements: Iterable[ast.stmt]) -> None:
         """Evaluate statements, including every branch, and the bodies of functions where they are defined."""
         for statement in statements:
+            self._count_step()
             if isinstance(statement, ast.Assign):
                 value = self._value(statement.value)
                 for target in statement.targets:
@@ -65,6 +72,11 @@ class _Reader:
                 for part in ("body", "orelse", "finalbody"):
                     self.run(s for s in _parts(statement, part) if isinstance(s, ast.stmt))
 
+    def _count_step(self) -> None:
+        self._steps += 1
+        if self._steps > STEPS:
+            raise LimitError
+
     def _bind(self, target: ast.expr, value: Any) -> None:
         if isinstance(target, ast.Name):
             self._known[target.id] = value
@@ -79,12 +91,17 @@ class _Reader:
 
     def _value(self, node: ast.expr | None) -> Any:
         """Evaluate an expression; None if its value is unknown."""
-        self._steps += 1
-        value = self._of(node)
-        if self._steps > STEPS or (isinstance(value, str) and len(value) > TEXT_CHARACTERS):
-            raise ValueError
+        self._count_step()
+        try:
+            value = self._of(node)
+        except LimitError:
+            raise
+        except (LookupError, TypeError, ValueError):  # setup.py itself would raise it, if it ever came here
+            value = None
+        if isinstance(value, str) and len(value) > TEXT_CHARACTERS:
+            raise LimitError
         if isinstance(value, (list, dict)) and len(value) > ITEMS:
-            raise ValueError
+            raise LimitError
         return value
 
     def _of(self, node: ast.expr | None) -> Any:
@@ -141,21 +158,37 @@ class _Reader:
         if _name(node.func) in ("glob", "iglob") and values and isinstance(values[0], str):
             return self._matching(values[0])
         if isinstance(node.func, ast.Attribute) and _dotted(node.func) in ("path.join", "os.path.join"):
-            return os.path.join(*values) if values and all(isinstance(value, str) for value in values) else None
+            return posixpath.join(*values) if values and all(isinstance(value, str) for value in values) else None
         if isinstance(node.func, ast.Attribute):
             return _method(self._value(node.func.value), node.func.attr, values, named)
         name = _name(node.func)
         if name == "dict":
             return {**(values[0] if values and isinstance(values[0], dict) else {}), **named}
-        known = len(values) == 1 and isinstance(values[0], (str, list))
-        return _MAKING[name](values[0]) if name in _MAKING and known else None
+        return _made(name, values[0]) if len(values) == 1 else None
 
     def _matching(self, pattern: str) -> list[str] | None:
         """Return the files below the folder that match a pattern; None for a pattern that could match others."""
-        parts = pattern.split("/")
-        if os.path.isabs(pattern) or ".." in parts or "**" in parts:
+        parts = [part for part in pattern.split("/") if part not in ("", ".")]
+        if pattern.startswith("/") or ".." in parts or "**" in parts:
             return None
-        return sorted(glob.glob(pattern, root_dir=self._folder))
+        return sorted(name for name in self._names if _matches(name.split("/"), parts))
+
+
+def _matches(path: Sequence[str], pattern: Sequence[str]) -> bool:
+    """Return whether a path matches, part by part; as in a shell, a pattern matches no hidden file by chance."""
+    return len(path) == len(pattern) and all(
+        fnmatchcase(part, wanted) and (wanted.startswith(".") or not part.startswith("."))
+        for part, wanted in zip(path, pattern, strict=True)
+    )
+
+
+def _made(name: str, value: Any) -> Any:
+    """Evaluate a call of a built-in function; lists of anything but strings are neither sorted nor written as text."""
+    if name in ("list", "tuple") and isinstance(value, (str, list)):
+        return list(value)
+    if name == "sorted" and isinstance(value, (str, list)) and all(isinstance(item, str) for item in value):
+        return sorted(value)
+    return value if name == "str" and isinstance(value, str) else None
 
 
 def _dotted(node: ast.expr) -> str:
@@ -175,8 +208,17 @@ def _method(of: Any, name: str, values: list[Any], named: dict[str, Any]) -> Any
         return [list(found) if name == "items" else found for found in getattr(of, name)()]
     elif isinstance(of, str) and name in _OF_TEXTS and len(of) < TEXT_CHARACTERS // 10:
         texts = _items(values[0]) if name == "join" and values else [*values, *named.values()]
-        return getattr(of, name)(*values, **named) if all(isinstance(text, str) for text in texts) else None
+        known = all(isinstance(text, str) for text in texts) and (name != "format" or _only_inserts(of))
+        return getattr(of, name)(*values, **named) if known else None
     return None
+
+
+def _only_inserts(template: str) -> bool:
+    """Return whether a template of `str.format` inserts its arguments whole and as they are, without a width."""
+    return all(
+        not spec and conversion is None and (not name or name.isalnum() or name.isidentifier())
+        for _, name, spec, conversion in Formatter().parse(template)
+    )
 
 
 def _combined(operator: ast.operator, left: Any, right: Any) -> Any:
@@ -186,7 +228,7 @@ def _combined(operator: ast.operator, left: Any, right: Any) -> Any:
         return left | right
     if isinstance(operator, ast.Mod) and isinstance(left, str) and len(left) < TEXT_CHARACTERS // 10:
         values = tuple(right) if isinstance(right, list) else (right,)
-        return left % values if all(isinstance(v, str) for v in values) else None
+        return left % values if all(isinstance(v, str) for v in values) and not _WIDTH.search(left) else None
     return None
 
 

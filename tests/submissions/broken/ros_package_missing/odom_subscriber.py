@@ -1,13 +1,13 @@
 import rclpy
 from rclpy.node import Node
 from nav_msgs.msg import Odometry
-from tf2_ros import TransformBroadcaster
+from nav2_simple_commander.robot_navigator import BasicNavigator
 
 
 class OdomSubscriber(Node):
     def __init__(self):
         super().__init__('odom_subscriber')
-        self.broadcaster = TransformBroadcaster(self)
+        self.navigator = BasicNavigator()
         self.last = None
         self.create_subscription(Odometry, '/odom', self.cb, 10)
         self.create_timer(1.0, self.show)

@@ -1,0 +1,105 @@
+"""Summarises what the nodes of a trace did, without judging it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import statistics
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
+
+from grader.core.quantities import NS_PER_S, seconds
+from grader.core.report import Pace, Summary, TopicSummary
+from grader.core.trace import Message, Offer, Trace
+from grader.judging.judge_run import started
+from grader.judging.values import as_number
+
+#: The different values of a text field that a summary names, and the elements of an array that it looks at: enough for
+#: a laser scan, and quick for an image.
+MOST_TEXTS, MOST_ELEMENTS = 100, 2_000
+
+
+def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary:
+    """Return a summary of what the nodes of a trace did."""
+    graphs = trace.graphs()
+    names = {e.topic for g in graphs for e in g.endpoints}
+    return Summary(
+        processes=tuple(processes),
+        clock=trace.clock,
+        clock_reason=trace.clock_reason,
+        duration_s=seconds(trace.stop_ns),
+        nodes=tuple(sorted({node for g in graphs for node in g.nodes})),
+        topics=tuple(_topic(trace, name) for name in sorted(names)),
+        offers=tuple(o for o in trace.observations if isinstance(o, Offer)),
+        records=trace.records(),
+        lines=trace.lines(),
+        faults=trace.faults(),
+        notes=(*started(trace), *trace.notes),
+        starts=trace.starts,
+        # of those of equal size the last, whose parts have all been matched
+        graph=max(reversed(graphs), key=lambda g: len(g.endpoints) + len(g.services) + len(g.nodes), default=None),
+        isolation=isolation,
+    )
+
+
+def _topic(trace: Trace, name: str) -> TopicSummary:
+    messages = trace.messages(name)
+    contents = _Contents()
+    for message in messages:
+        contents.add(message.value)
+    publishers, subscriptions = trace.endpoints("publisher", name), trace.endpoints("subscription", name)
+    return TopicSummary(
+        name=name,
+        types=tuple(dict.fromkeys(e.type for e in (*publishers, *subscriptions))),
+        publishers=publishers,
+        subscriptions=subscriptions,
+        messages=len(messages),
+        first_s=seconds(messages[0].t_ns) if messages else None,
+        pace=_pace(messages),
+        ranges=contents.ranges,
+        texts={path: (tuple(itertools.islice(seen, MOST_TEXTS)), len(seen)) for path, seen in contents.texts.items()},
+        lengths=contents.lengths,
+    )
+
+
+def _pace(messages: Sequence[Message]) -> Pace | None:
+    times = [m.t_ns for m in messages]
+    if len(times) < 2 or times[-1] == times[0]:
+        return None
+    gaps = [(later - earlier) / NS_PER_S for earlier, later in itertools.pairwise(times)]
+    # n - 1 gaps, not n: counting messages overstates a short window
+    return Pace(len(gaps) * NS_PER_S / (times[-1] - times[0]), min(gaps), max(gaps), statistics.pstdev(gaps))
+
+
+class _Contents:
+    """What the fields of a topic's messages held."""
+
+    def __init__(self) -> None:
+        self.ranges: dict[str, tuple[float, float]] = {}
+        self.texts: dict[str, dict[str, None]] = {}
+        self.lengths: dict[str, tuple[int, int]] = {}
+
+    def add(self, value: Mapping[str, object], prefix: str = "") -> None:
+        """Take the fields of one message, or of a part of it."""
+        for name, inner in value.items():
+            self._add(f"{prefix}{name}", inner)
+
+    def _add(self, path: str, inner: object) -> None:
+        if isinstance(inner, Mapping):
+            self.add(inner, f"{path}.")
+        elif isinstance(inner, (list, tuple)):
+            self.lengths[path] = _wider(self.lengths.get(path), len(inner))
+            for element in inner[:MOST_ELEMENTS]:
+                self._add(f"{path}[]", element)
+        elif isinstance(inner, str):
+            self.texts.setdefault(path, {})[inner] = None
+        elif (number := as_number(inner)) is not None and math.isfinite(number):
+            self.ranges[path] = _wider(self.ranges.get(path), number)
+
+
+Ordered = TypeVar("Ordered", int, float)
+
+
+def _wider(known: tuple[Ordered, Ordered] | None, value: Ordered) -> tuple[Ordered, Ordered]:
+    """Return the least and the greatest value, with one more."""
+    return (value, value) if known is None else (min(known[0], value), max(known[1], value))

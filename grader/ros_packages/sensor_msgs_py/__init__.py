@@ -1,0 +1,1 @@
+"""Reads and makes messages of `sensor_msgs` with numpy."""

@@ -1,0 +1,221 @@
+"""What a student's program sees of the machine: fixed answers in place of the machine's own.
+
+The table in docs/reference/machine.md describes each of them. This file imports only the standard library, because a
+bare process, which holds nothing else of the grader, runs it as well (`sitecustomize.py`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import grp
+import os
+import platform
+import pwd
+import signal
+import socket
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+#: Processors of the machine that every program sees: as many as a small laptop has. rclpy's MultiThreadedExecutor
+#: starts so many threads; with a single one, correct programs that call a service in a callback wait for ever.
+PROCESSORS = 4
+#: Memory of that machine, in bytes.
+MEMORY_BYTES = 4 << 30
+#: The only user besides root, with its group.
+USER, USER_ID, SHELL = "student", 1000, "/bin/bash"
+HOST_NAME, ADDRESS, ADDRESS_6 = "student", "127.0.0.1", "::1"
+LOCAL_NAMES = frozenset({"localhost", HOST_NAME})
+#: The kernel of Ubuntu 24.04, the system of ROS 2 Jazzy.
+RELEASE, VERSION = "6.8.0-generic", "#1 SMP"
+#: The hardware address of the network card, in the range for local use.
+NODE = 0x02_00_00_00_00_01
+UMASK = 0o022
+#: Signals that Python ignores in every process.
+_IGNORED_BY_PYTHON = frozenset({signal.SIGPIPE, signal.SIGXFSZ})
+
+
+def install() -> None:
+    """Replace the functions of the standard library through which a program asks about the machine."""
+    even_inherited()
+    _install_processors()
+    _install_user()
+    _install_host()
+    _install_names()
+    _install_folders()
+
+
+def even_inherited() -> None:
+    """Undo what a process inherits from the shell of whoever grades: its umask, and ignored or blocked signals."""
+    os.umask(UMASK)
+    for number in signal.valid_signals():
+        if signal.getsignal(number) is signal.SIG_IGN and number not in _IGNORED_BY_PYTHON:
+            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+
+
+def _install_processors() -> None:
+    chosen = frozenset(range(PROCESSORS))
+    affinity = {0: chosen}
+    get, choose = os.sched_getaffinity, os.sched_setaffinity
+
+    def sched_getaffinity(pid: int, /) -> set[int]:
+        return set(affinity[0]) if pid in (0, os.getpid()) else get(pid)
+
+    def sched_setaffinity(pid: int, mask: Any, /) -> None:
+        if pid not in (0, os.getpid()):
+            choose(pid, mask)
+            return
+        wanted = chosen & frozenset(mask)
+        if not wanted:
+            raise OSError(22, os.strerror(22))
+        affinity[0] = wanted
+
+    os.sched_getaffinity, os.sched_setaffinity = sched_getaffinity, sched_setaffinity
+    os.cpu_count = lambda: PROCESSORS
+    if hasattr(os, "process_cpu_count"):  # Python 3.13
+        os.process_cpu_count = lambda: len(affinity[0])
+    os.getloadavg = lambda: (0.0, 0.0, 0.0)
+    page = os.sysconf("SC_PAGE_SIZE")
+    answers: dict[object, int] = {}
+    for name, answer in (
+        ("SC_NPROCESSORS_CONF", PROCESSORS),
+        ("SC_NPROCESSORS_ONLN", PROCESSORS),
+        ("SC_PHYS_PAGES", MEMORY_BYTES // page),
+        ("SC_AVPHYS_PAGES", MEMORY_BYTES // page),
+    ):
+        answers[name] = answers[os.sysconf_names.get(name)] = answer
+    sysconf = os.sysconf
+
+    def fixed_sysconf(name: str | int, /) -> int:
+        return answers[name] if name in answers else sysconf(name)
+
+    os.sysconf = fixed_sysconf
+
+
+def _install_user() -> None:
+    for name in ("getuid", "geteuid", "getgid", "getegid"):
+        setattr(os, name, lambda: USER_ID)
+    os.getresuid = os.getresgid = lambda: (USER_ID, USER_ID, USER_ID)
+    os.getgroups = lambda: [USER_ID]
+    os.getlogin = lambda: USER
+    groups = [grp.struct_group((name, "x", number, [])) for name, number in (("root", 0), (USER, USER_ID))]
+
+    def users() -> list[pwd.struct_passwd]:
+        home = os.environ.get("HOME") or "/"
+        rows = (("root", "x", 0, 0, "root", "/root", SHELL), (USER, "x", USER_ID, USER_ID, USER, home, SHELL))
+        return [pwd.struct_passwd(row) for row in rows]
+
+    pwd.getpwall = users
+    pwd.getpwuid = _looked_up(pwd.getpwuid, users, "pw_uid", "getpwuid(): uid not found: {}")
+    pwd.getpwnam = _looked_up(pwd.getpwnam, users, "pw_name", "getpwnam(): name not found: {!r}")
+    grp.getgrall = lambda: list(groups)
+    grp.getgrgid = _looked_up(grp.getgrgid, grp.getgrall, "gr_gid", "getgrgid(): gid not found: {}")
+    grp.getgrnam = _looked_up(grp.getgrnam, grp.getgrall, "gr_name", "getgrnam(): name not found: {!r}")
+
+
+def _looked_up(original: Any, rows: Callable[[], list[Any]], key: str, missing: str) -> Any:
+    """Return a function that finds a row by one of its fields, and checks its argument as the original does."""
+
+    @functools.wraps(original)
+    def find(wanted: Any) -> Any:
+        for row in rows():
+            if getattr(row, key) == wanted:
+                return row
+        with contextlib.suppress(KeyError):
+            original(wanted)  # raises what it raises for an argument of another type
+        raise KeyError(missing.format(wanted))
+
+    return find
+
+
+def _install_host() -> None:
+    uname = os.uname
+    os.uname = lambda: os.uname_result(("Linux", HOST_NAME, RELEASE, VERSION, uname().machine))
+    platform._uname_cache = None  # type: ignore[attr-defined]
+    platform._platform_cache.clear()  # type: ignore[attr-defined]
+    socket.gethostname = lambda: HOST_NAME
+    socket.if_nameindex = lambda: [(1, "lo")]
+    for name in ("gethostbyname", "getaddrinfo", "gethostbyname_ex", "gethostbyaddr"):
+        setattr(socket, name, _resolving(name, getattr(socket, name)))
+
+
+def _resolving(name: str, original: Any) -> Any:
+    """Return a function of `socket` that knows this host's names without reading any file of the machine."""
+
+    @functools.wraps(original)
+    def resolve(host: Any = None, *arguments: Any, **named: Any) -> Any:
+        plain = host.decode("ascii", "replace") if isinstance(host, (bytes, bytearray)) else host
+        if name == "gethostbyaddr" and plain in (*LOCAL_NAMES, ADDRESS, ADDRESS_6):
+            own = plain if plain in LOCAL_NAMES else "localhost"
+            return own, [], [ADDRESS_6 if plain == ADDRESS_6 else ADDRESS]
+        if name == "gethostbyname_ex" and plain in LOCAL_NAMES:
+            return plain, [], [ADDRESS]
+        if plain in LOCAL_NAMES:
+            family = named.get("family", arguments[1] if len(arguments) > 1 else 0)
+            host = ADDRESS_6 if name == "getaddrinfo" and family == socket.AF_INET6 else ADDRESS
+        return original(host, *arguments, **named)
+
+    return resolve
+
+
+def _install_names() -> None:
+    """Let `uuid.uuid1` use the clock and the randomness of this process, and a fixed hardware address."""
+    import uuid
+
+    fixed: Any = uuid
+    fixed._node = NODE  # what getnode() keeps of its first call
+    fixed._generate_time_safe = fixed._UuidCreate = None
+    if hasattr(uuid, "_load_system_functions"):
+        uuid._load_system_functions = lambda: None
+
+
+class _Sorted:
+    """What `os.scandir` returns, in the order of the names.
+
+    Args:
+        entries: The iterator of the system.
+    """
+
+    def __init__(self, entries: Any) -> None:
+        self._entries = entries
+        self._sorted: Iterator[Any] | None = None
+
+    def __iter__(self) -> _Sorted:
+        return self
+
+    def __next__(self) -> Any:
+        if self._sorted is None:
+            self._sorted = iter(sorted(self._entries, key=lambda entry: entry.name))
+        return next(self._sorted)
+
+    def __enter__(self) -> _Sorted:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the folder."""
+        self._entries.close()
+        self._sorted = iter(())
+
+
+def _install_folders() -> None:
+    """List folders in the order of names; file systems keep entries in an order of their own."""
+    listdir, scandir = os.listdir, os.scandir
+
+    @functools.wraps(listdir)
+    def sorted_listdir(path: Any = None) -> Any:
+        return sorted(listdir(path))
+
+    @functools.wraps(scandir)
+    def sorted_scandir(path: Any = None) -> Any:
+        return _Sorted(scandir(path))
+
+    os.listdir, os.scandir = sorted_listdir, sorted_scandir
+    pathlib = sys.modules.get("pathlib")
+    accessor = getattr(pathlib, "_NormalAccessor", None)  # Python 3.10 keeps its own references
+    if accessor is not None:
+        accessor.listdir, accessor.scandir = staticmethod(sorted_listdir), staticmethod(sorted_scandir)

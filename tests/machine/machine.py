@@ -1,0 +1,115 @@
+"""Prints what a program can see of the machine, a row of docs/reference/machine.md in each log record."""
+
+import concurrent.futures
+import datetime
+import getpass
+import glob
+import grp
+import locale
+import multiprocessing
+import os
+import pathlib
+import platform
+import pwd
+import random
+import resource
+import secrets
+import shutil
+import signal
+import socket
+import sys
+import tempfile
+import threading
+import time
+import uuid
+
+import rclpy
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+
+LIMITS = ("RLIMIT_STACK", "RLIMIT_AS", "RLIMIT_NOFILE", "RLIMIT_FSIZE", "RLIMIT_CORE", "RLIMIT_CPU")
+SYSTEM = ("SC_NPROCESSORS_ONLN", "SC_NPROCESSORS_CONF")
+
+
+def folders():
+    place = tempfile.mkdtemp()
+    for name in ("b", "a", "d", "c", "B"):
+        pathlib.Path(place, name).touch()
+    found = [os.listdir(place), [p.name for p in pathlib.Path(place).iterdir()], next(os.walk(place))[2]]
+    with os.scandir(place) as entries:
+        found.append([entry.name for entry in entries])
+    found.append([os.path.basename(path) for path in glob.glob(os.path.join(place, "*"))])
+    return found
+
+
+def chosen():
+    os.sched_setaffinity(0, {0, 1})
+    fewer = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, range(4))
+    return fewer, os.sched_getaffinity(0)
+
+
+def ignored():
+    return [s.name for s in signal.valid_signals() if isinstance(s, signal.Signals) and signal.getsignal(s) is signal.SIG_IGN]
+
+
+def environment():
+    by_place = ("ROS_DOMAIN_ID", "HOME", "TMPDIR", "PWD", "ROS_LOG_DIR")
+    return sorted(
+        (name, "" if name in by_place or "PATH" in name or value.startswith("/") else value)
+        for name, value in os.environ.items()
+    )
+
+
+ROWS = {
+    "processors": lambda: (
+        os.cpu_count(), os.sched_getaffinity(0), multiprocessing.cpu_count(), [os.sysconf(n) for n in SYSTEM],
+        getattr(os, "process_cpu_count", lambda: 4)(), concurrent.futures.ThreadPoolExecutor()._max_workers,
+        MultiThreadedExecutor()._executor._max_workers, chosen(),
+    ),
+    "load": os.getloadavg,
+    "memory of the machine": lambda: os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"),
+    "user and group": lambda: (
+        getpass.getuser(), os.environ["USER"], os.getuid(), os.geteuid(), os.getgid(), os.getgroups(), os.getlogin(),
+        pwd.getpwuid(os.getuid())[:5], pwd.getpwnam("student").pw_name, [row.pw_name for row in pwd.getpwall()],
+        grp.getgrgid(os.getgid()), pathlib.Path("/tmp").home().name,
+    ),
+    "home": lambda: (pathlib.Path.home(), os.path.expanduser("~/x"), os.path.expanduser("~student"), os.environ["HOME"]),
+    "host name": lambda: (socket.gethostname(), platform.node(), os.uname().nodename, platform.uname().node),
+    "names of hosts": lambda: (
+        socket.gethostbyname("localhost"), socket.gethostbyname(socket.gethostname()), socket.getfqdn(),
+        socket.getaddrinfo("localhost", 80, type=socket.SOCK_STREAM), socket.gethostbyaddr("127.0.0.1"),
+        socket.gethostbyname_ex("student"),
+    ),
+    "kernel": lambda: (os.uname()[2:4], platform.release(), platform.system(), platform.version()),
+    "network interfaces": socket.if_nameindex,
+    "hardware address": lambda: (hex(uuid.getnode()), uuid.uuid1().node),
+    "time zone": lambda: (time.tzname, time.timezone, datetime.datetime.now().astimezone().tzinfo),
+    "locale": lambda: (locale.getlocale(), sys.getfilesystemencoding(), sys.stdout.encoding, f"{1234.5:n}"),
+    "terminal": lambda: (sys.stdin.read(), sys.stdout.isatty(), shutil.get_terminal_size(), os.environ.get("TERM")),
+    "environment": environment,
+    "limits": lambda: [resource.getrlimit(getattr(resource, name))[0] for name in LIMITS],
+    "umask and signals": lambda: (os.umask(0o022), ignored(), signal.pthread_sigmask(signal.SIG_BLOCK, ())),
+    "hash seed": lambda: (hash("text"), list({"a", "b", "c", "d"})),
+    "randomness": lambda: (
+        random.random(), secrets.token_hex(8), os.urandom(8), os.getrandom(8), uuid.uuid4(), random.SystemRandom().random(),
+    ),
+    "temporary names": lambda: (tempfile.gettempdir(), tempfile.mkdtemp(), os.path.basename(tempfile.mktemp())),
+    "order of folders": folders,
+    "Python flags": lambda: (
+        sys.flags, [os.path.basename(a) for a in (*sys.argv, *sys.orig_argv[1:])], sys._xoptions, sys.getrecursionlimit(),
+        sys.getswitchinterval(), sys.warnoptions,
+    ),
+    "free threading": lambda: (getattr(sys, "_is_gil_enabled", lambda: True)(), threading.active_count() > 0),
+}
+
+
+def main():
+    rclpy.init()
+    node = Node("machine")
+    for name, look in ROWS.items():
+        node.get_logger().info(f"{name} = {look()!r}")
+
+
+if __name__ == "__main__":
+    main()

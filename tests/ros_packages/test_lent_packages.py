@@ -1,0 +1,482 @@
+"""The Python packages of ROS that the grader lends: what their documentation promises, and programs that use them."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+pytest.importorskip("rclpy")
+
+from builtin_interfaces.msg import Time as Stamp
+from geometry_msgs.msg import TransformStamped
+from rclpy.clock import ClockType
+from rclpy.duration import Duration
+from rclpy.time import Time
+from sensor_msgs.msg import Image, PointField
+from std_msgs.msg import Header
+
+from grader.app.observe import ObserveRequest, observe
+from grader.app.ros_packages import LENDABLE, LENT, lent_to
+from grader.core.quantities import NS_PER_S
+
+
+@pytest.fixture(autouse=True, scope="module")
+def lent() -> Iterator[None]:
+    """Make the packages importable, as in a node."""
+    sys.path.append(str(LENT))
+    yield
+    sys.path.remove(str(LENT))
+
+
+# --- which programs get what ---
+
+
+def test_only_what_a_program_names_is_lent_with_what_that_needs() -> None:
+    """And nothing that is installed."""
+    assert {folder.name for folder in LENT.iterdir() if (folder / "__init__.py").is_file()} == set(LENDABLE)
+    assert lent_to((), lambda name: False).names == ()
+    assert lent_to(["tf2_ros"], lambda name: False).names == ("tf2_py", "tf2_ros")
+    assert b"tf2_msgs" in lent_to(["tf2_ros"], lambda name: False).text
+    assert lent_to(["tf2_geometry_msgs"], lambda name: name == "tf2_py").names == ("tf2_geometry_msgs", "tf2_ros")
+    assert lent_to(["cv_bridge"], lambda name: True).names == ()
+
+
+# --- tf2_py ---
+
+
+def transform(parent: str, child: str, t_s: float = 0, x: float = 0, yaw: float = 0) -> TransformStamped:
+    found = TransformStamped(child_frame_id=child)
+    found.header.frame_id = parent
+    found.header.stamp = Stamp(sec=int(t_s), nanosec=round((t_s % 1) * 1e9))
+    found.transform.translation.x = float(x)
+    found.transform.rotation.z, found.transform.rotation.w = math.sin(yaw / 2), math.cos(yaw / 2)
+    return found
+
+
+def at(t_s: float) -> Time:
+    return Time(nanoseconds=round(t_s * NS_PER_S), clock_type=ClockType.ROS_TIME)
+
+
+def filled(*transforms: TransformStamped, **options: Any) -> Any:
+    from tf2_py import BufferCore
+
+    buffer = BufferCore(**options)
+    for one in transforms:
+        buffer.set_transform(one, "test")
+    return buffer
+
+
+def x_of(found: TransformStamped) -> float:
+    return float(found.transform.translation.x)
+
+
+def test_a_chain_is_multiplied_and_turned() -> None:
+    """The laser is a metre ahead of a base that looks to the left."""
+    buffer = filled(transform("odom", "base", 1, x=2, yaw=math.pi / 2), transform("base", "laser", 1, x=1))
+    found = buffer.lookup_transform_core("odom", "laser", at(1))
+    shift, turn = found.transform.translation, found.transform.rotation
+    assert [shift.x, shift.y, shift.z] == pytest.approx([2, 1, 0])
+    assert [turn.z, turn.w] == pytest.approx([math.sqrt(0.5)] * 2)
+    assert (found.header.frame_id, found.child_frame_id, found.header.stamp.sec) == ("odom", "laser", 1)
+    back = buffer.lookup_transform_core("laser", "odom", at(1)).transform.translation
+    assert [back.x, back.y] == pytest.approx([-1, 2])
+
+
+def test_between_two_samples_it_is_interpolated() -> None:
+    """Linearly, and along the shortest rotation."""
+    buffer = filled(transform("odom", "base", 1), transform("odom", "base", 2, x=1, yaw=math.pi / 2))
+    found = buffer.lookup_transform_core("odom", "base", at(1.25))
+    assert x_of(found) == pytest.approx(0.25)
+    assert 2 * math.atan2(found.transform.rotation.z, found.transform.rotation.w) == pytest.approx(math.pi / 8)
+
+
+def test_zero_is_the_latest_common_time() -> None:
+    """Of the frames in between; static ones are known at all times."""
+    buffer = filled(transform("odom", "base", 1, x=1), transform("odom", "base", 3, x=3), transform("base", "arm", 2))
+    buffer.set_transform_static(transform("arm", "hand", x=10), "test")
+    found = buffer.lookup_transform_core("odom", "hand", Time())
+    assert (x_of(found), found.header.stamp.sec) == (pytest.approx(12), 2)
+    assert buffer.get_latest_common_time("odom", "hand").nanoseconds == 2 * NS_PER_S
+    assert buffer.get_latest_common_time("arm", "hand").nanoseconds == 0
+
+
+@pytest.mark.parametrize(
+    ("target", "source", "t_s", "error", "said"),
+    [
+        ("map", "base", 1, "LookupException", '"map" passed to lookupTransform argument target_frame does not exist'),
+        ("odom", "cam", 1, "LookupException", '"cam" passed to lookupTransform argument source_frame does not exist'),
+        ("odom", "other", 1, "ConnectivityException", "'odom' and 'other'"),
+        ("odom", "base", 5, "ExtrapolationException", "into the future.  Requested time 5.000000"),
+        ("odom", "base", 0.5, "ExtrapolationException", "into the past.  Requested time 0.500000"),
+        ("world", "other", 5, "ExtrapolationException", "only time 1.000000 is in the buffer"),
+        ("", "base", 1, "InvalidArgumentException", "cannot be empty"),
+        ("/odom", "base", 1, "InvalidArgumentException", "cannot start with a '/'"),
+    ],
+)
+def test_what_is_not_known_raises(target: str, source: str, t_s: float, error: str, said: str) -> None:
+    """Each by its own exception, all of which are TransformExceptions; `can_transform` says the same."""
+    import tf2_py
+
+    buffer = filled(transform("odom", "base", 1), transform("odom", "base", 2), transform("world", "other", 1))
+    with pytest.raises(getattr(tf2_py, error)) as raised:
+        buffer.lookup_transform_core(target, source, at(t_s))
+    assert said in str(raised.value)
+    assert isinstance(raised.value, tf2_py.TransformException)
+    assert buffer.can_transform_core(target, source, at(t_s)) == (False, str(raised.value))
+
+
+def test_old_samples_are_forgotten() -> None:
+    """Ten seconds, or as long as the buffer is told."""
+    times = [transform("odom", "base", t, x=t) for t in range(1, 20)]
+    assert not filled(*times).can_transform_core("odom", "base", at(8.5))[0]
+    assert filled(*times, cache_time=Duration(seconds=15)).can_transform_core("odom", "base", at(8.5))[0]
+
+
+def test_what_makes_no_sense_is_left_out(capfd: pytest.CaptureFixture[str]) -> None:
+    """With a line on stderr: the commonest is a rotation that was never set to w = 1."""
+    zero = transform("odom", "base", 1)
+    zero.transform.rotation.w = 0.0
+    nan = transform("odom", "base", 1, x=math.nan)
+    buffer = filled(zero, nan, transform("base", "base"), transform("", "base"), transform("odom", ""))
+    assert buffer.all_frames_as_string() == ""
+    told = capfd.readouterr().err.splitlines()
+    assert [line.split("because ")[1].split(" in the")[0] for line in told] == [
+        "of an invalid quaternion",
+        "of a nan value",
+        "it has the same frame_id and child_frame_id",
+        "frame_id is not set",
+        "child_frame_id is not set",
+    ]
+
+
+def test_between_two_times_a_fixed_frame_helps() -> None:
+    """Where the base was, seen from where it is now."""
+    buffer = filled(transform("odom", "base", 1, x=1), transform("odom", "base", 2, x=4))
+    found = buffer.lookup_transform_full_core("base", at(2), "base", at(1), "odom")
+    assert x_of(found) == pytest.approx(-3)
+
+
+# --- tf_transformations ---
+
+
+angles = st.floats(-1.5, 1.5)
+
+
+@given(angles, angles, angles)
+def test_euler_angles_and_quaternions_agree(roll: float, pitch: float, yaw: float) -> None:
+    """There and back, also over a matrix; a quaternion is x, y, z, w."""
+    import tf_transformations as tf
+
+    q = tf.quaternion_from_euler(roll, pitch, yaw)
+    assert tf.euler_from_quaternion(q) == pytest.approx((roll, pitch, yaw), abs=1e-6)
+    assert np.allclose(tf.quaternion_matrix(q), tf.euler_matrix(roll, pitch, yaw))
+    about = tf.quaternion_multiply(
+        tf.quaternion_about_axis(yaw, (0, 0, 1)),
+        tf.quaternion_multiply(tf.quaternion_about_axis(pitch, (0, 1, 0)), tf.quaternion_about_axis(roll, (1, 0, 0))),
+    )
+    assert np.allclose(np.abs(np.dot(q, about)), 1)
+    assert np.allclose(tf.quaternion_multiply(q, tf.quaternion_inverse(q)), [0, 0, 0, 1])
+
+
+def test_matrices_do_what_their_names_say() -> None:
+    """Points are columns with a 1 at the end."""
+    import tf_transformations as tf
+
+    point = np.array([1.0, 2.0, 3.0, 1.0])
+    assert np.allclose(tf.translation_matrix([1, 1, 1]) @ point, [2, 3, 4, 1])
+    assert np.allclose(tf.rotation_matrix(math.pi / 2, [0, 0, 1]) @ point, [-2, 1, 3, 1])
+    assert np.allclose(tf.rotation_matrix(math.pi, [0, 0, 1], [1, 0, 0]) @ point, [1, -2, 3, 1])
+    assert np.allclose(tf.scale_matrix(2) @ point, [2, 4, 6, 1])
+    assert np.allclose(tf.reflection_matrix([0, 0, 0], [1, 0, 0]) @ point, [-1, 2, 3, 1])
+    whole = tf.concatenate_matrices(tf.translation_matrix([1, 0, 0]), tf.rotation_matrix(0.3, [0, 0, 1]))
+    assert np.allclose(tf.inverse_matrix(whole) @ whole, tf.identity_matrix())
+    assert tf.is_same_transform(whole, tf.compose_matrix(angles=(0, 0, 0.3), translate=(1, 0, 0)))
+    assert tf.decompose_matrix(whole)[2] == pytest.approx((0, 0, 0.3))
+    angle, axis, _ = tf.rotation_from_matrix(tf.rotation_matrix(0.4, [0, 1, 0]))
+    assert angle * axis[1] == pytest.approx(0.4)
+    halfway = tf.quaternion_slerp(tf.quaternion_from_euler(0, 0, 0), tf.quaternion_from_euler(0, 0, 1), 0.5)
+    assert tf.euler_from_quaternion(halfway)[2] == pytest.approx(0.5)
+    assert tf.vector_norm([3, 4]) == pytest.approx(5)
+    assert np.allclose(tf.unit_vector([0, 2, 0]), [0, 1, 0])
+
+
+# --- sensor_msgs_py ---
+
+
+def test_points_come_back_as_they_were_put_in() -> None:
+    """As structured arrays, plain arrays and tuples."""
+    from sensor_msgs_py import point_cloud2
+
+    points = [[1.0, 2.0, 3.0], [4.0, 5.0, math.nan]]
+    cloud = point_cloud2.create_cloud_xyz32(Header(frame_id="laser"), points)
+    assert (cloud.height, cloud.width, cloud.point_step, cloud.row_step) == (1, 2, 12, 24)
+    assert point_cloud2.read_points(cloud)["y"].tolist() == [2.0, 5.0]
+    assert point_cloud2.read_points_list(cloud, skip_nans=True)[0]._asdict() == {"x": 1.0, "y": 2.0, "z": 3.0}
+    assert len(point_cloud2.read_points_list(cloud, skip_nans=True)) == 1
+    assert point_cloud2.read_points_numpy(cloud, field_names=("x", "y")).tolist() == [[1, 2], [4, 5]]
+    assert point_cloud2.read_points_numpy(cloud, uvs=[1])[0, 0] == 4
+
+
+def test_fields_may_have_gaps_counts_and_types() -> None:
+    """Numbered names for a field with a count, and an organised cloud keeps its rows."""
+    from sensor_msgs_py import point_cloud2
+
+    fields = [
+        PointField(name="x", offset=0, datatype=PointField.FLOAT32, count=1),
+        PointField(name="rgb", offset=8, datatype=PointField.UINT8, count=3),
+    ]
+    layout = point_cloud2.dtype_from_fields(fields, point_step=16)
+    assert (layout.names, layout.itemsize) == (("x", "rgb_0", "rgb_1", "rgb_2"), 16)
+    points = np.zeros((2, 3), dtype=layout)
+    points["x"] = [[0, 1, 2], [3, 4, 5]]
+    cloud = point_cloud2.create_cloud(Header(), fields, points, step=16)
+    assert (cloud.height, cloud.width) == (2, 3)
+    assert point_cloud2.read_points(cloud, reshape_organized_cloud=True)["x"][1, 2] == 5
+    with pytest.raises(AssertionError, match="same datatype"):
+        point_cloud2.read_points_numpy(cloud)
+
+
+# --- cv_bridge ---
+
+
+def test_an_image_comes_back_as_it_was() -> None:
+    """With its encoding, or in another one."""
+    from cv_bridge import CvBridge
+
+    bridge = CvBridge()
+    blue = np.zeros((2, 3, 3), dtype=np.uint8)
+    blue[:, :, 0] = 255
+    message = bridge.cv2_to_imgmsg(blue, "bgr8", Header(frame_id="camera"))
+    assert (message.height, message.width, message.step, message.encoding) == (2, 3, 9, "bgr8")
+    assert message.header.frame_id == "camera"
+    assert np.array_equal(bridge.imgmsg_to_cv2(message), blue)
+    assert bridge.imgmsg_to_cv2(message, "rgb8")[0, 0].tolist() == [0, 0, 255]
+    assert bridge.imgmsg_to_cv2(message, "mono8")[0, 0] == 29  # 0.114 of 255
+    assert bridge.imgmsg_to_cv2(message, "bgra8")[0, 0].tolist() == [255, 0, 0, 255]
+    assert bridge.imgmsg_to_cv2(message, "rgb16")[0, 0].tolist() == [0, 0, 65535]
+    depth = np.array([[1.5, math.inf]], dtype=np.float32)
+    assert bridge.cv2_to_imgmsg(depth).encoding == "32FC1"
+    assert np.array_equal(bridge.imgmsg_to_cv2(bridge.cv2_to_imgmsg(depth, "32FC1"), "32FC1"), depth)
+    assert bridge.encoding_to_cvtype2("bgr8") == 16
+
+
+def test_images_that_do_not_fit_are_refused() -> None:
+    """A wrong type, a wrong conversion, too few bytes."""
+    from cv_bridge import CvBridge, CvBridgeError
+
+    bridge = CvBridge()
+    with pytest.raises(CvBridgeError, match="incompatible type 8UC1"):
+        bridge.cv2_to_imgmsg(np.zeros((2, 2), dtype=np.uint8), "bgr8")
+    with pytest.raises(TypeError, match="not a numpy array"):
+        bridge.cv2_to_imgmsg([[0]])  # type: ignore[arg-type]
+    with pytest.raises(CvBridgeError, match="not a color format"):
+        bridge.imgmsg_to_cv2(bridge.cv2_to_imgmsg(np.zeros((2, 2), dtype=np.float32)), "bgr8")
+    with pytest.raises(CvBridgeError, match="Unrecognized image encoding"):
+        bridge.imgmsg_to_cv2(Image(encoding="nonsense"))
+    with pytest.raises(CvBridgeError, match="wrongly formed"):
+        bridge.imgmsg_to_cv2(Image(encoding="mono8", height=2, width=2, step=2, data=[0, 0, 0]))
+
+
+# --- message_filters ---
+
+
+def stamped(t_ms: int) -> Any:
+    found = Header()
+    found.stamp = Stamp(sec=t_ms // 1000, nanosec=t_ms % 1000 * 1_000_000)
+    return type("Message", (), {"header": found, "t": t_ms, "__repr__": lambda self: str(self.t)})()
+
+
+def synchronised(make: Callable[[list[Any]], Any], *sent: tuple[int, int]) -> list[list[int]]:
+    """Return the groups of stamps that pass, of messages sent as (filter, stamp in ms)."""
+    from message_filters import SimpleFilter
+
+    filters = [SimpleFilter() for _ in range(1 + max(number for number, _ in sent))]
+    passed: list[list[int]] = []
+    make(filters).registerCallback(lambda *messages: passed.append([m.t for m in messages]))
+    for number, t_ms in sent:
+        filters[number].signalMessage(stamped(t_ms))
+    return passed
+
+
+def test_equal_stamps_belong_together() -> None:
+    """In whatever order they come; of a full queue, the oldest is dropped."""
+    from message_filters import TimeSynchronizer
+
+    def make(filters: list[Any]) -> Any:
+        return TimeSynchronizer(filters, 2)
+
+    assert synchronised(make, (0, 10), (0, 20), (1, 20), (1, 10)) == [[20, 20], [10, 10]]
+    assert synchronised(make, (0, 10), (0, 20), (0, 30), (1, 10), (1, 20)) == [[20, 20]]
+    assert synchronised(make, (0, 10), (1, 11)) == []
+
+
+def test_near_stamps_belong_together() -> None:
+    """The nearest within the slop, each message once."""
+    from message_filters import ApproximateTimeSynchronizer
+
+    def make(filters: list[Any]) -> Any:
+        return ApproximateTimeSynchronizer(filters, 10, 0.05)
+
+    assert synchronised(make, (0, 100), (1, 140)) == [[100, 140]]
+    assert synchronised(make, (0, 100), (1, 151)) == []
+    assert synchronised(make, (0, 100), (0, 130), (1, 135)) == [[130, 135]]
+    assert synchronised(make, (0, 100), (1, 100), (1, 101)) == [[100, 100]]
+    assert synchronised(make, (0, 100), (1, 60), (2, 140), (1, 120)) == [[100, 120, 140]]
+
+
+def test_a_cache_finds_messages_by_time() -> None:
+    """Both ends of an interval are in it."""
+    from message_filters import Cache, SimpleFilter
+
+    source = SimpleFilter()
+    cache = Cache(source, 3)
+    assert (cache.getLast(), cache.getOldestTime()) == (None, None)
+    for t_ms in (100, 200, 300, 400):
+        source.signalMessage(stamped(t_ms))
+    assert [m.t for m in cache.getInterval(at(0.2), at(0.3))] == [200, 300]
+    assert cache.getElemBeforeTime(at(0.35)).t == 300
+    assert cache.getElemAfterTime(at(0.35)).t == 400
+    assert [m.t for m in cache.getSurroundingInterval(at(0.25), at(0.26))] == [200, 300]
+    assert (cache.getLast().t, cache.getLatestTime()) == (400, at(0.4))
+
+
+# --- in nodes ---
+
+
+HEAD = """
+import rclpy
+from rclpy.clock import ClockType
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.time import Time
+from geometry_msgs.msg import PointStamped, TransformStamped, PoseStamped
+rclpy.init()
+node = rclpy.create_node('n')
+log = node.get_logger().info
+
+def frame(parent, child, x=0.0, stamp=None):
+    t = TransformStamped(child_frame_id=child)
+    t.header.frame_id = parent
+    t.header.stamp = stamp or node.get_clock().now().to_msg()
+    t.transform.translation.x = x
+    t.transform.rotation.w = 1.0
+    return t
+"""
+TF = """
+from tf2_ros import Buffer, TransformBroadcaster, StaticTransformBroadcaster, TransformListener, TransformException
+buffer = Buffer()
+"""
+PROGRAMS = {
+    "listener": (
+        TF
+        + "listener = TransformListener(buffer, node)\nsend = TransformBroadcaster(node)\n"
+        + "both = lambda: [frame('odom', 'base', 1.0), frame('base', 'cam', 2.0)]\n"
+        + "node.create_timer(0.1, lambda: send.sendTransform(both()))\n"
+        + "look = lambda: buffer.lookup_transform('odom', 'cam', Time()).transform.translation.x\n"
+        + "node.create_timer(0.55, lambda: log(str(look())))\nrclpy.spin(node)",
+        ["3.0"],
+    ),
+    "thread": (
+        TF
+        + "other = rclpy.create_node('sender')\nlistener = TransformListener(buffer, node, spin_thread=True)\n"
+        + "StaticTransformBroadcaster(other).sendTransform(frame('a', 'b', 4.0))\n"
+        + "log(str(buffer.lookup_transform('a', 'b', Time(), timeout=Duration(seconds=1)).transform.translation.x))",
+        ["4.0"],
+    ),
+    "timeout": (
+        TF
+        + "listener = TransformListener(buffer, node, spin_thread=True)\nstart = node.get_clock().now()\n"
+        + "print(buffer.can_transform('a', 'b', Time(), timeout=Duration(seconds=0.5)))\n"
+        + "log(f'{(node.get_clock().now() - start).nanoseconds / 1e9:.1f}')",
+        ["0.5"],
+    ),
+    "async": (
+        TF
+        + "listener = TransformListener(buffer, node)\nsend = TransformBroadcaster(node)\n"
+        + "async def look():\n    timer.cancel()\n    found = await buffer.lookup_transform_async('a', 'b', Time())\n"
+        + "    log(str(found.transform.translation.x))\n"
+        + "from rclpy.callback_groups import ReentrantCallbackGroup\n"
+        + "timer = node.create_timer(0.1, look, callback_group=ReentrantCallbackGroup())\n"
+        + "later = node.create_timer(0.5, lambda: (later.cancel(), send.sendTransform(frame('a', 'b', 5.0))))\n"
+        + "rclpy.spin(node)",
+        ["5.0"],
+    ),
+    "static": (
+        TF
+        + "send = StaticTransformBroadcaster(node)\n"
+        + "send.sendTransform(frame('a', 'b', 1.0))\nsend.sendTransform(frame('b', 'c', 1.0))\n"
+        + "late = TransformListener(buffer, node)\n"
+        + "look = lambda: buffer.lookup_transform('a', 'c', Time()).transform.translation.x\n"
+        + "node.create_timer(0.5, lambda: log(str(look())))\n"
+        + "rclpy.spin_once(node)\nrclpy.spin_once(node)\nrclpy.spin_once(node)",
+        ["2.0"],
+    ),
+    "point": (
+        TF
+        + "import tf2_geometry_msgs\nbuffer.set_transform_static(frame('odom', 'cam', 3.0), 'me')\n"
+        + "p = PointStamped()\np.header.frame_id = 'cam'\np.point.x = 1.0\n"
+        + "log(str(buffer.transform(p, 'odom').point.x))\n"
+        + "q = PoseStamped()\nq.header.frame_id = 'cam'\nq.pose.orientation.w = 1.0\n"
+        + "log(str(buffer.transform(q, 'odom').pose.position.x))",
+        ["4.0", "3.0"],
+    ),
+    "submodules": (
+        "from tf2_ros.buffer import Buffer\nfrom tf2_ros.transform_listener import TransformListener\n"
+        "from tf2_ros.transform_broadcaster import TransformBroadcaster\n"
+        "from tf2_ros.static_transform_broadcaster import StaticTransformBroadcaster\n"
+        "from tf2_ros import LookupException\n"
+        "try:\n    Buffer().lookup_transform('a', 'b', Time())\nexcept LookupException as error:\n    log(str(error))",
+        ['"a" passed to lookupTransform argument target_frame does not exist. '],
+    ),
+    "angles": (
+        "from tf_transformations import euler_from_quaternion, quaternion_from_euler\n"
+        "log(' '.join(f'{a:.2f}' for a in euler_from_quaternion(quaternion_from_euler(0.1, 0.2, 0.3))))",
+        ["0.10 0.20 0.30"],
+    ),
+    "filters": (
+        "from message_filters import ApproximateTimeSynchronizer, Subscriber\n"
+        "ends = [Subscriber(node, PointStamped, name) for name in 'ab']\n"
+        "both = ApproximateTimeSynchronizer(ends, 10, 0.1)\n"
+        "both.registerCallback(lambda a, b: log(f'{a.point.x} {b.point.x}'))\n"
+        "pubs = [node.create_publisher(PointStamped, name, 10) for name in 'ab']\n"
+        "def tick():\n"
+        "    for number, pub in enumerate(pubs):\n"
+        "        m = PointStamped()\n        m.header.stamp = node.get_clock().now().to_msg()\n"
+        "        m.point.x = float(number)\n        pub.publish(m)\n"
+        "node.create_timer(0.6, tick)\nrclpy.spin(node)",
+        ["0.0 1.0"],
+    ),
+    "cloud": (
+        "from sensor_msgs_py import point_cloud2 as pc2\nfrom std_msgs.msg import Header\n"
+        "cloud = pc2.create_cloud_xyz32(Header(), [(1, 2, 3), (4, 5, 6)])\n"
+        "log(str([tuple(p) for p in pc2.read_points(cloud, field_names=('x', 'z'))]).replace('np.float32', ''))",
+        ["[((1.0), (3.0)), ((4.0), (6.0))]", "[(1.0, 3.0), (4.0, 6.0)]"],
+    ),
+    "image": (
+        "from cv_bridge import CvBridge\nimport numpy as np\n"
+        "m = CvBridge().cv2_to_imgmsg(np.full((2, 2, 3), 7, dtype=np.uint8), encoding='bgr8')\n"
+        "log(f\"{m.encoding} {CvBridge().imgmsg_to_cv2(m, 'mono8').tolist()}\")",
+        ["bgr8 [[7, 7], [7, 7]]"],
+    ),
+}
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+@pytest.mark.parametrize(("program", "logged"), PROGRAMS.values(), ids=PROGRAMS)
+def test_programs_use_them(tmp_path: Path, program: str, logged: list[str], clock: str) -> None:
+    """As where ROS brings them, on both clocks."""
+    file = tmp_path / "node.py"
+    file.write_text(HEAD + program)
+    summary = observe(ObserveRequest((file,), NS_PER_S, clock=clock), lambda _: None)
+    assert [fault.text for fault in summary.faults if fault.exit_code != 0] == []
+    texts = [record.text for record in summary.records]
+    assert texts == logged or (len(texts) == 1 and texts[0] in logged), (texts, summary.lines)
