@@ -1,9 +1,11 @@
 """Judges the whole set of test submissions on each clock, with and without load, and prints where the outcomes differ.
 
-Usage: python benchmarks/agreement.py RESULTS [--jobs N] [--only TEXT] [--isolation TIER] MODE...
-       MODE is virtual, wall, auto, auto-load (two busy loops per core), or auto-executed (every student's process is
-       executed, none is forked from a starter); RESULTS is a JSON file that is added to, so that a run that was stopped
-       goes on. Without a MODE only the table of what RESULTS holds is printed.
+Usage: python benchmarks/agreement.py RESULTS [--jobs N] [--parts N] [--only TEXT] [--isolation TIER] MODE...
+       MODE is virtual, wall, auto, auto-load (two busy loops per core), auto-checked (every submission is spot-checked,
+       as a class is), or auto-executed (every student's process is executed, none is forked from a starter); RESULTS is
+       a JSON file that is added to, so that a run that was stopped goes on. Without a MODE only the table of what
+       RESULTS holds is printed. With --parts the submissions are shared out among so many processes, each with its own
+       jobs: auto-checked mostly waits, and takes 30 minutes with --jobs 1 --parts 6 on two processors.
 
 The reports, without their duration, are kept in the folder RESULTS.reports, by mode. If there are some of auto and of
 auto-executed, the table also says which differ; `diff -r` shows how. Those on the wall clock hold measured times and
@@ -17,6 +19,8 @@ import collections
 import json
 import multiprocessing
 import os
+import re
+import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -41,8 +45,10 @@ from grader.reporting.delivery import write_whole
 from grader.reporting.json_report import dumps
 
 SUBMISSIONS = ROOT / "tests" / "submissions"
-FORKED, EXECUTED = "auto", "auto-executed"
-MODES = ("virtual", "wall", FORKED, "auto-load", EXECUTED)
+FORKED, EXECUTED, CHECKED = "auto", "auto-executed", "auto-checked"
+MODES = ("virtual", "wall", FORKED, "auto-load", CHECKED, EXECUTED)
+#: Numbers in reasons, which differ from run to run.
+NUMBERS = re.compile(r"\d+(\.\d+)?")
 Results = dict[str, dict[str, Any]]
 
 
@@ -147,6 +153,13 @@ def table(expected: Mapping[str, Any], results: Results) -> None:
         for kind, count in sorted(counts.items()):
             print(f"{mode:14} {kind:10} {count['folders']:8} {count['same']:12} {count['wall']:18}")
     for mode, found in results.items():
+        reasons = collections.Counter(
+            (folder.split("/")[0], NUMBERS.sub("N", reason))
+            for folder, result in found.items()
+            for reason in result["wall"]
+        )
+        for (kind, reason), times in sorted(reasons.items()):
+            print(f"{mode}: {kind}: {times} on the wall clock: {reason}")
         for folder, result in sorted(found.items()):
             if result["outcomes"] != expected[folder]["expected"]:
                 print(f"\n{mode}: {folder}\n  expected {expected[folder]['expected']}\n  found    {result['outcomes']}")
@@ -172,6 +185,36 @@ def ways_of_starting(results: Results, path: Path) -> int:
     return 1 if others else 0
 
 
+def in_parts(arguments: argparse.Namespace, results: Results) -> None:
+    """Run the modes in several processes, each with a share of the submissions, and add what they found."""
+    files = [arguments.results.with_suffix(f".part{number}.json") for number in range(arguments.parts)]
+    options = ["--jobs", str(arguments.jobs), "--only", arguments.only, "--isolation", arguments.isolation]
+    running = [
+        subprocess.Popen(
+            [sys.executable, __file__, str(file), *options, "--part", f"{number}/{len(files)}", *arguments.modes]
+        )
+        for number, file in enumerate(files)
+    ]
+    for process in running:
+        process.wait()
+    for number, file in enumerate(files):
+        for mode, found in what_is_known(file)[1].items():
+            results.setdefault(mode, {}).update(found)
+            for report in reports_of(file, mode).rglob("*.json"):
+                kept = reports_of(arguments.results, mode) / report.relative_to(reports_of(file, mode))
+                kept.parent.mkdir(parents=True, exist_ok=True)
+                report.replace(kept)
+        if running[number].returncode not in (0, 1):
+            raise SystemExit(f"part {number} ended with exit code {running[number].returncode}")
+    write_whole(arguments.results, json.dumps(results, indent=1).encode())
+
+
+def shared_out(folders: Mapping[str, Any], part: str) -> dict[str, Any]:
+    """Return the share of the folders that a part such as `0/4` has."""
+    number, parts = map(int, part.split("/"))
+    return {folder: entry for at, (folder, entry) in enumerate(folders.items()) if at % parts == number}
+
+
 def what_is_known(path: Path) -> tuple[dict[str, Any], Results]:
     """Return what every folder should be given, and the results so far."""
     expected = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
@@ -186,16 +229,24 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", default="")
     parser.add_argument("--isolation", default="auto")
+    parser.add_argument("--parts", type=int, default=1)
+    parser.add_argument("--part", default="0/1", help=argparse.SUPPRESS)
     arguments = parser.parse_intermixed_args()
     if unknown := set(arguments.modes) - set(MODES):
         parser.error(f"expected modes of {', '.join(MODES)}, found {', '.join(sorted(unknown))}")
     expected, results = what_is_known(arguments.results)
     chosen = {folder: entry for folder, entry in expected.items() if arguments.only in folder}
-    for mode in arguments.modes:
-        how = GradeRequest("", clock=mode.partition("-")[0], isolation=arguments.isolation)
+    chosen = shared_out(chosen, arguments.part)
+    if arguments.parts > 1:
+        in_parts(arguments, results)
+    for mode in arguments.modes if arguments.parts == 1 else ():
+        checks = 1.0 if mode == CHECKED else 0.0
+        how = GradeRequest("", clock=mode.partition("-")[0], isolation=arguments.isolation, spot_checks=checks)
         run(mode, how, chosen, results, arguments.results, jobs=arguments.jobs)
-    table(expected, results)
-    return ways_of_starting(results, arguments.results)
+    if arguments.part == "0/1":
+        table(expected, results)
+    wrong = [f for f, r in results.get(CHECKED, {}).items() if r["outcomes"] != expected[f]["expected"]]
+    return max(int(bool(wrong)), ways_of_starting(results, arguments.results))
 
 
 if __name__ == "__main__":

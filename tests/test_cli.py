@@ -562,3 +562,17 @@ def test_pictures_are_drawn_where_a_report_shows_them(run_session: Session, tmp_
     assert run_session.pictures is False
     grade("ada", "-o", f"html={tmp_path / 'r.html'}")
     assert run_session.pictures is True
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        (("batch", "in"), "grade batch --help lists the options"),
+        (("rubric", "check", "--nope"), "grade rubric check --help lists the options"),
+        (("--nope",), "grade --help lists the options"),
+    ],
+)
+def test_a_wrong_option_leads_to_the_help_of_its_command(arguments: tuple[str, ...], hint: str) -> None:
+    """Not to that of another one."""
+    result = grade(*arguments)
+    assert (result.exit_code, result.stderr.splitlines()[-1]) == (2, f"hint: {hint}")

@@ -16,6 +16,7 @@ from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S
 from grader.execution.byte_code import byte_code
 from grader.execution.machine import software, system, weaknesses
+from grader.execution.memory_groups import group_fact
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.bubblewrap import ENTERABLE
 from grader.execution.sandbox.choose import inspect_tiers, sandbox_memory
@@ -46,7 +47,7 @@ def examine(progress: Progress) -> Checkup:
     if ros is None:
         return Checkup(facts, None, (), "", "", Limits())
     progress("looking at the byte code")
-    facts += (byte_code(ros.runtime), sandbox_memory(ros))
+    facts += (byte_code(ros.runtime), group_fact(), sandbox_memory(ros))
     progress("trying every sandbox")
     tiers = inspect_tiers(ros)
     used = next((tier.name for tier in tiers if tier.usable), "")

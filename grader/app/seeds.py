@@ -26,7 +26,7 @@ LEAST_BYTES, MOST_BYTES = 16, 4096
 #: Environment variable with the seed key itself, for a CI that stores it as a secret.
 VARIABLE = "GRADER_SEED_KEY"
 #: Shown in reports when anyone can compute the seed.
-PRACTICE_NOTE = "drawn values follow from the public practice key; --seed-key FILE draws values that nobody can predict"
+PRACTICE_NOTE = "the inputs were drawn with the public practice key; with --seed-key FILE, nobody can predict them"
 #: Most characters in the id of a student.
 MOST_ID = 200
 _SEED_SCHEME = b"grader/seed/v1\n"
@@ -110,7 +110,7 @@ def _close_to_others(path: Path) -> None:
     try:
         found = path.lstat()
         if not stat.S_ISREG(found.st_mode):
-            raise KeyFileError(f"{path}: expected a file with the seed key, found something that is no plain file")
+            raise KeyFileError(f"{path}: expected a file with the seed key, found something that is not a regular file")
         if stat.S_IMODE(found.st_mode) & 0o077:
             path.chmod(0o600)
     except OSError as error:

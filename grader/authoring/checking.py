@@ -58,25 +58,25 @@ def oddities(exercise: Exercise, tree: YamlTree) -> list[Mistake]:
 def _of_exercise(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
     total = sum((criterion.points for criterion in exercise.criteria), Fraction(0))
     if total % ROUND:
-        text = f"the points add up to {float(total):g}, which is no multiple of {ROUND}"
+        text = f"the points add up to {float(total):g}, which is not a multiple of {ROUND}"
         yield tree.at_key(("criteria",)).mistake(text)
     judged = {criterion.scenario for criterion in exercise.criteria}
     for index, scenario in enumerate(exercise.scenarios):
         if scenario.id not in judged:
-            text = f"the scenario {scenario.id} is recorded, but no criterion looks at it"
+            text = f"the scenario {scenario.id} is recorded, but no criterion uses it"
             yield tree.at(("scenarios", index, "id")).mistake(text)
     yield from _misspelt(exercise, tree)
     run = {process for scenario in exercise.scenarios for process in scenario.handed_in}
     for index, name in enumerate(exercise.files):
         if name not in run:
-            yield tree.at(("files", index)).mistake(f"{name} is asked for, but no scenario runs it")
+            yield tree.at(("files", index)).mistake(f"{name} is in `files`, but no scenario runs it")
 
 
 def _of_criterion(criterion: Criterion, exercise: Exercise, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
     where = tree.at((*path, "id"))
     kind = type(criterion.check)
     if not criterion.hint:
-        yield where.mistake(f"{criterion.id} has no hint: a student who misses it may not be told what to do")
+        yield where.mistake(f"{criterion.id} has no hint: a student who does not meet it may get no advice")
     if kind not in CHECKS.values() and not manual_of(kind).summary:
         yield where.mistake(f"{criterion.id} is judged by {kind.__name__}, which has no docstring to explain it")
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
@@ -138,7 +138,7 @@ def _misspelt(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
             for name in sorted(own - named):
                 hint = _did_you_mean(name, named - used)
                 if hint:
-                    yield tree.at(place).mistake(f"no criterion looks at {shown(name)}{hint}")
+                    yield tree.at(place).mistake(f"no criterion uses {shown(name)}{hint}")
 
 
 def _heard(scenario: Scenario) -> set[str]:

@@ -203,7 +203,7 @@ def _reaction(topic: TopicSummary, seen: Seen, needs: str) -> DraftCriterion:
     given = next((delivery.topic for delivery in seen.driven.of(Delivery)), topic.name)
     cases = cases_seen(seen.driven, given, topic.name)
     asked = {"input": given, "output": topic.name, "within": in_seconds(1), "cases": cases}
-    comment = "seen: nothing is published until something comes in; decide: what follows from what, and how soon?"
+    comment = "seen: it publishes only after it receives something; decide: which output follows which input, how soon?"
     hint = f"publish on {topic.name} in the callback of the subscription"
     title = f"Answers on {topic.name}"
     return DraftCriterion(f"{as_id(topic.name)}_reaction", title, "reaction", asked, hint, needs, comment)
@@ -300,9 +300,9 @@ def _services(seen: Seen) -> Iterator[DraftCriterion]:
 def _parameters(seen: Seen) -> Iterator[DraftCriterion]:
     for node, name, value in parameters(seen.alone):
         asked: dict[str, object] = {"name": name, **({"node": node} if node else {})}
-        comment = "decide: is this default asked for?"
+        comment = "decide: does the task ask for this default?"
         if value is None:
-            comment = "its value is no number, text or truth value; decide: is it asked for at all?"
+            comment = "its value is not a number, text or truth value; decide: does the task ask for it at all?"
         else:
             asked["value"] = value
         title, hint = f"Has the parameter {name}", f'declare_parameter("{name}", ...) before anybody asks for it'

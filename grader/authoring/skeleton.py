@@ -104,7 +104,7 @@ def _lines(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]]) -> Iter
         yield from _criterion(criterion, scenario_id(draft))
         yield ""
     if left_out:
-        asked = "decide: what of this is asked as well? The reference does not meet it as it stands here."
+        asked = "decide: does the task ask for any of these? The reference does not meet them as they stand here."
         yield from _comment(asked, "  ")
     for criterion, reason in left_out:
         yield from _comment(reason, "  ")

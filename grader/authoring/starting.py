@@ -73,11 +73,11 @@ def _messages(topic: str, type_: str, duration_s: float) -> DraftStimulus:
     left_s = duration_s - FIRST_S
     if type_ == ODOMETRY:
         played = {"topic": topic, "start": start, "duration": in_seconds(max(1.0, left_s - 1))}
-        return DraftStimulus("odometry", played, "decide: how long is nobody to publish before and after?")
+        return DraftStimulus("odometry", played, "decide: how long is it silent before and after?")
     if carries_number(type_):
         times = {"period": DraftQuantity("200 ms"), "hold": in_seconds(max(0.5, left_s // len(_VALUES)))}
         numbers = {"topic": topic, "type": type_, "values": list(_VALUES), **times, "start": start}
-        return DraftStimulus("numbers", numbers, "decide: which values tell right from wrong?")
+        return DraftStimulus("numbers", numbers, "decide: which values tell a right program from a wrong one?")
     repeated = {"period": in_seconds(1), "repeats": max(1, int(left_s) - 1)}
     messages = {"topic": topic, "type": type_, "values": [{}], **repeated, "start": start}
     return DraftStimulus("messages", messages, "decide: which fields? {} leaves all at their defaults")
@@ -87,7 +87,7 @@ def _named(topic: str, type_: str, duration_s: float, values: Sequence[Mapping[s
     """Spread the author's messages over the available time."""
     times = {"period": in_seconds(period_s(duration_s, len(values))), "start": in_seconds(FIRST_S)}
     sent = {"topic": topic, "type": type_, "values": list(values), **times}
-    return DraftStimulus("messages", sent, "decide: what else tells right from wrong?")
+    return DraftStimulus("messages", sent, "decide: which other messages tell a right program from a wrong one?")
 
 
 def _services(trace: Trace, simulated: frozenset[str]) -> Iterator[DraftStimulus]:
@@ -104,7 +104,7 @@ def _services(trace: Trace, simulated: frozenset[str]) -> Iterator[DraftStimulus
 def _parameters(trace: Trace) -> Iterator[DraftStimulus]:
     for node, name, _ in parameters(trace):
         asked = {"name": name, **({"node": node} if node else {}), "start": in_seconds(1)}
-        yield DraftStimulus("parameter", asked, f"asks for the value of {name}; decide: is it to be set as well?")
+        yield DraftStimulus("parameter", asked, f"asks for the value of {name}; decide: should it be set too?")
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,7 @@ from grader.classroom.last_run import RUN, LastRun, dump_last_run, read_last_run
 from grader.classroom.local import LocalScheduler, MakeScheduler
 from grader.classroom.outputs import CHANGES, CLASS, Graded, class_files, exports, reveals, summary_json
 from grader.classroom.renaming import with_renamed_files
-from grader.classroom.roster import RosterMatch, match, read_roster
+from grader.classroom.roster import RosterMatch, Table, match, read_roster
 from grader.classroom.store import BEFORE, REPORT, SEED_KEY, Conditions, Store, open_store
 from grader.classroom.watching import Watcher
 from grader.classroom.worker import GRADESCOPE, HANDED_BACK, HANDED_BACK_PAGE, PAGE
@@ -99,7 +99,7 @@ def grade_class(
         before = len(intake.entries) - len(due)
         watcher.begin(len(due), before, recorded=run.from_recordings)
         extra = sum((exercise.bonus for exercise in exercises), Fraction(0))
-        book = partial(_book, store, intake, matching, adjustments, keys, extra)
+        book = partial(_book, store, intake, matching, adjustments, keys, extra, course.platforms.moodle)
         store.write(RUN, dump_last_run(_kept_options(course, adjustments)))
         began = time.monotonic()
         try:
@@ -182,6 +182,7 @@ def _book(  # noqa: PLR0913  each comes from a different source
     adjustments: Adjustments,
     keys: Mapping[str, str],
     extra: Fraction,
+    worksheet: Table | None,
 ) -> Gradebook:
     names = {entry.name for entry in intake.entries}
     return make_gradebook(
@@ -194,6 +195,7 @@ def _book(  # noqa: PLR0913  each comes from a different source
         handed_back_of=lambda name: _report(store.place(name) / HANDED_BACK),
         foreign=[name for name in store.names() if name not in names],
         extra=extra,
+        worksheet=worksheet,
     )
 
 

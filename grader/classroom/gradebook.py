@@ -21,7 +21,7 @@ from grader.classroom.adjustments import (
     unknown_student,
 )
 from grader.classroom.intake import HandedInEntry, Intake
-from grader.classroom.roster import Person, RosterMatch, fold_handle, late_by, late_days
+from grader.classroom.roster import Person, RosterMatch, Table, fold_handle, late_by, late_days
 from grader.classroom.store import Kept, ResultStatus, State
 from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
@@ -143,12 +143,13 @@ def make_gradebook(  # noqa: PLR0913  each comes from a different source
     handed_back_of: Callable[[str], ReportData | None],
     foreign: Sequence[str] = (),
     extra: Fraction = Fraction(0),
+    worksheet: Table | None = None,
 ) -> Gradebook:
     """Assemble the gradebook; raises ClassError for a decision about somebody who is not in this class.
 
-    Rubrics allow `extra` points above the maximum. Stored results and the keys that current results have, empty if
-    unknown, are given by name. The two functions read the complete report of a submission, and the one with what
-    students may see.
+    Rubrics allow `extra` points above the maximum. A worksheet of Moodle may say who was late. Stored results and the
+    keys that current results have, empty if unknown, are given by name. The two functions read the complete report of a
+    submission, and the one with what students may see.
     """
     decisions = decisions_for(intake.entries, matching, adjustments)
     twins = {name: tuple(n for n in group if n != name) for group in matching.duplicates for name in group}
@@ -164,7 +165,15 @@ def make_gradebook(  # noqa: PLR0913  each comes from a different source
         most = None if highest is None else highest + extra
         adjusted = adjust(raw, decision, adjustments, marked=marked, criteria=criteria, most=most)
         handed_back = handed_back_of(entry.name) if report is not None else None
-        rows[-1] = replace(rows[-1], handed_back=handed_back, adjusted=adjusted, twin_of=twins.get(entry.name, ()))
+        late = late_by(rows[-1].person, worksheet)
+        rows[-1] = replace(
+            rows[-1],
+            handed_back=handed_back,
+            adjusted=adjusted,
+            twin_of=twins.get(entry.name, ()),
+            marked_late=entry.late or bool(late),
+            late=late,
+        )
     rows += [_missing(person, adjustments) for person in matching.missing]
     odd = [entry.name for entry in intake.entries if not entry.recognised]
     remarks = [*_late_remarks(rows), *_excess(rows, extra)]
@@ -274,8 +283,7 @@ def _row(entry: HandedInEntry, matching: RosterMatch, kept: Kept, report: Report
         problem="" if last is None else last.problem,
         result=result,
         report=report,
-        marked_late=entry.late or bool(late_by(matching.people.get(entry.name))),
-        late=late_by(matching.people.get(entry.name)),
+        marked_late=entry.late,
         outdated=result is not None and bool(key) and result.state is not State.FAILED and result.key != key,
     )
 

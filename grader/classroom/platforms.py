@@ -10,7 +10,7 @@ from dataclasses import field
 
 from grader.classroom.final_marks import criteria_of, decisions
 from grader.classroom.gradebook import Gradebook, Row, exercises_of, number, table, text_cell
-from grader.classroom.roster import Person, Table, columns_of, fold_handle, person_of
+from grader.classroom.roster import Person, Table, row_of
 from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError
 from grader.reporting.escape import shown as safe
@@ -79,7 +79,7 @@ def export_moodle(book: Gradebook, users: Table) -> Export:
     refused = [row for row in book.refused if not row.twin_of]
     names = {row.name for row in refused}
     for row in (*_counted(book, left_out, but=names), *refused):
-        found_row = _user(row, users)
+        found_row = row_of(row.person, users)
         value = "" if found_row is None else found_row[by_name[column.casefold()]].strip()
         if not value:
             left_out.append(f"{row.shown_name}: nobody with this name, address or number in {users.path.name}")
@@ -176,23 +176,9 @@ def _canvas_title(assignment: str, gradebook: Table | None) -> str:
 def _canvas_row(row: Row, gradebook: Table | None) -> Mapping[str, str] | None:
     """Return a person's row in the Canvas gradebook, or on the roster if there is no gradebook."""
     if gradebook is not None:
-        return _user(row, gradebook)
+        return row_of(row.person, gradebook)
     person = row.person
     return person.row if person is not None else None
-
-
-def _user(row: Row, users: Table) -> Mapping[str, str] | None:
-    """Find the row of a person by unique ids, then by name; None unless exactly one row matches."""
-    columns = columns_of(users.header)
-    person = row.person
-    if person is None:
-        return None
-    handles = person.handles | {fold_handle(t) for t in (person.user, person.email, person.id) if t}
-    exact = [name for kind in ("email", "user", "id", "canvas", "identifier") for name in columns.get(kind, ())]
-    found = [r for r in users.rows if any(r[name].strip() and fold_handle(r[name]) in handles for name in exact)]
-    if not found:
-        found = [r for r in users.rows if person_of(r, columns).names & person.names]
-    return found[0] if len(found) == 1 else None
 
 
 def _possible(gradebook: Table | None, title: str) -> str:

@@ -105,7 +105,7 @@ def read_table(path: Path) -> Table:
     try:
         rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter))
     except csv.Error as error:
-        raise ClassError(f"{path}: expected CSV, found a file that is none: {error}") from None
+        raise ClassError(f"{path}: expected CSV, found another kind of file: {error}") from None
     rows = [row for row in rows if any(cell.strip() for cell in row)]
     if len(rows) < 2:
         raise ClassError(f"{path}: expected a header and rows, found {len(rows)} lines")
@@ -181,9 +181,29 @@ def person_of(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> P
     )
 
 
-def late_by(person: Person | None) -> str:
-    """Return how late somebody handed in, as a grading worksheet of Moodle in English says; empty if it does not."""
-    row = {} if person is None or person.row is None else person.row
+def row_of(person: Person | None, table: Table | None) -> Mapping[str, str] | None:
+    """Find the row of a person in a table by unique ids, then by name; None unless exactly one row matches."""
+    if person is None or table is None:
+        return None
+    columns = columns_of(table.header)
+    handles = person.handles | {fold_handle(t) for t in (person.user, person.email, person.id) if t}
+    exact = [name for kind in ("email", "user", "id", "canvas", "identifier") for name in columns.get(kind, ())]
+    found = [r for r in table.rows if any(r[name].strip() and fold_handle(r[name]) in handles for name in exact)]
+    if not found:
+        found = [r for r in table.rows if person_of(r, columns).names & person.names]
+    return found[0] if len(found) == 1 else None
+
+
+def late_by(person: Person | None, worksheet: Table | None = None) -> str:
+    """Return how late somebody handed in, as a grading worksheet of Moodle in English says; empty if it does not.
+
+    The worksheet may be the roster, or a table of its own.
+    """
+    rows = [None if person is None else person.row, row_of(person, worksheet)]
+    return next((late for row in rows if row is not None and (late := _late_in(row))), "")
+
+
+def _late_in(row: Mapping[str, str]) -> str:
     status = next((value for name, value in row.items() if name.strip().casefold() == _STATUS), "")
     found = _LATE.search(status)
     return " ".join(found[1].split()) if found else ""

@@ -479,7 +479,9 @@ def _guarded(run: Callable[[], object]) -> int:
 
         known = hint_for(error)
         message = error.message if known else error.format_message()
-        _fail(message.rstrip("."), hint=known or "grade --help lists the options")
+        context = error.ctx if isinstance(error, click.UsageError) else None
+        path = context.command_path.partition(_DEFAULT)[0].strip() if context is not None else "grade"
+        _fail(message.rstrip("."), hint=known or f"{path} --help lists the options")
         return UNUSABLE
     except GraderError as error:
         # A RubricError lists one mistake per line; in any other message a line break comes from a hostile name.

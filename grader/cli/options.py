@@ -135,7 +135,7 @@ def _parse_output(value: str) -> Output:
         likely = f"; did you mean {meant}" if meant else ""
         raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}{likely}")
     if format_ not in (*FORMATS, EVIDENCE):
-        raise click.BadParameter(f"{format_!r} is no format{nearest(format_, [*FORMATS, EVIDENCE])}")
+        raise click.BadParameter(f"{format_!r} is not a format{nearest(format_, [*FORMATS, EVIDENCE])}")
     if format_ == EVIDENCE and path == "-":
         raise click.BadParameter("evidence is a folder: expected evidence=FOLDER, found evidence=-")
     from grader.reporting.delivery import Output

@@ -137,7 +137,7 @@ class RepeatingCommand(click.Command):
                 complain(f"{now}; the last run had {then}", kind="note")
 
     def _said(self, name: str, texts: tuple[str, ...], last: LastRun | None = None) -> str:
-        values = [os.path.relpath(text) if self._is_path(name) else text for text in texts]
+        values = [_near(text) if self._is_path(name) else text for text in texts]
         option = f"--{_name(self._kept[name])}"
         holds = f" ({_decisions(last.decisions)})" if last is not None and name == "adjustments" else ""
         return " ".join([option, *values]) + holds
@@ -145,7 +145,7 @@ class RepeatingCommand(click.Command):
     def _words(self, repeated: _Texts) -> Iterator[str]:
         for name, texts in repeated.items():
             option = f"--{_name(self._kept[name])}"
-            yield from [f"{option}={text}" for text in texts] or [option]
+            yield from [f"{option}={_near(text) if self._is_path(name) else text}" for text in texts] or [option]
 
     def _absolute(self, name: str, texts: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(os.path.abspath(text) for text in texts) if self._is_path(name) else texts  # noqa: PTH100  no link is followed
@@ -157,6 +157,12 @@ class RepeatingCommand(click.Command):
 def _name(param: click.Parameter) -> str:
     """Return the name of an option without dashes."""
     return param.opts[0].removeprefix("--")
+
+
+def _near(path: str) -> str:
+    """Return a path as people write it: relative to this folder if it is below it."""
+    relative = os.path.relpath(path)
+    return path if relative.startswith("..") else relative
 
 
 def _left_out(param: click.Parameter) -> str:

@@ -273,6 +273,15 @@ Observation = Message | Delivery | Request | Response | LogRecord | OutputLine |
 
 
 @dataclass(frozen=True, slots=True)
+class WrittenFile:
+    """A small file that a program wrote beside itself, as its process reports it; no check reads it."""
+
+    process: str
+    name: str  # relative to the submission, or to the working directory
+    content: str  # base64
+
+
+@dataclass(frozen=True, slots=True)
 class Trace:
     """The recording of one scenario."""
 
@@ -293,6 +302,7 @@ class Trace:
     most_starved_ns: int = 0
     # What a launch file asks for and the grader cannot do, as sentences: what is not met may be due to it
     left_out: tuple[str, ...] = ()
+    written: tuple[WrittenFile, ...] = ()  # of programs that ended in time
     # Whether a wait for the middleware timed out, so that something may be missing: a reason to record again
     incomplete: bool = False
     # The mistake in a simulation of the rubric's author that prevents judging, as `harness_problem` does; None without

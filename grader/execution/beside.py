@@ -1,8 +1,9 @@
-"""Finds the files beside a loose program, of which its working directory holds copies, as if it were started there."""
+"""Finds the files that a student's process gets copies of: those of a small submission, or those beside its program."""
 
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +12,35 @@ from grader.student_host.packages import PackageLayout, layout_of
 
 #: How many files are copied at most, and how many bytes in all: a program reads settings and small tables.
 MOST_FILES, MOST_BYTES = 64, MIB
+
+
+#: A submission with more files, or with more bytes, is only read: each process would need a copy of it in memory.
+MOST_OF_SUBMISSION, MOST_BYTES_OF_SUBMISSION = 200, 4 * MIB
+
+
+def whole_submission(root: Path, most_bytes: int) -> tuple[str, ...] | None:
+    """Return all files of a submission, sorted, relative to its folder; None if it is too large to be copied.
+
+    Args:
+        root: The staged submission.
+        most_bytes: What the folder of the copy may hold; at least half of it stays free.
+    """
+    found: list[str] = []
+    left = min(MOST_BYTES_OF_SUBMISSION, most_bytes // 2)
+    for folder, _, names in os.walk(root):
+        for name in names:
+            path = Path(folder, name)
+            status = path.lstat()
+            left -= status.st_size
+            if left < 0 or len(found) == MOST_OF_SUBMISSION or not stat.S_ISREG(status.st_mode):
+                return None
+            found.append(path.relative_to(root).as_posix())
+    return tuple(sorted(found))
+
+
+def is_loose(root: Path, file: str) -> bool:
+    """Return whether a program is in no package, so that it is started in its own folder."""
+    return layout_of(str(root), file) == PackageLayout()
 
 
 def files_beside(root: Path, file: str) -> tuple[str, ...]:
@@ -23,7 +53,7 @@ def files_beside(root: Path, file: str) -> tuple[str, ...]:
         root: The staged submission.
         file: The program, relative to `root`.
     """
-    if layout_of(str(root), file) != PackageLayout():
+    if not is_loose(root, file):
         return ()
     found: list[str] = []
     left = MOST_BYTES

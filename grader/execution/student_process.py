@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
+import itertools
 import json
 import os
 import re
@@ -18,12 +20,13 @@ from typing import Any
 from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.quantities import size
-from grader.core.trace import Fault, FaultKind, LogRecord, OutputLine, Start
+from grader.core.trace import Fault, FaultKind, LogRecord, OutputLine, Start, WrittenFile
 from grader.execution.ending import ended_by, exited, graders_fault, limit_behind
 from grader.execution.notes import Places, hidden_notes, note_of, start_of
 from grader.execution.sandbox.protocol import Command
 from grader.execution.sandbox.starter import StartedProcess
 from grader.execution.workload import Workload
+from grader.student_host.written import ALL_BYTES, FILE_BYTES, FILES
 
 #: The format of log records on standard error. Each process has its own token, known only to the logging library and
 #: the worker, so a program cannot write log records itself.
@@ -44,8 +47,12 @@ NOTES, NOTE_CHARACTERS = 100, 500
 REACHED, NAME_CHARACTERS = 20, 60
 #: Where a process with a view of files of its own has its home and its temporary files.
 OWN_FOLDER = "/tmp"  # noqa: S108
+#: Where such a process sees its submission.
+SUBMISSION = "/submission"
 #: How much one read takes at most, and milliseconds after which a wait for a report looks at the time.
 READ_BYTES, LOOK_MS = 1 << 16, 1000
+#: The maximum length of the name of a file that a program wrote.
+WRITTEN_NAME_CHARACTERS = 200
 #: How much of the end of standard error is kept to find out why a process ended.
 LAST_BYTES = 16_000
 #: Longer lines and log messages are cut.
@@ -91,6 +98,7 @@ class NodeProcess:
         own_folder: The folder of its home and its temporary files; empty if it has none.
         start_told: How its file is started, as it reported before it ran any of the student's code.
         grader_failed: What failed in the grader's own code in the process, as it reports; empty if nothing did.
+        written: Small files that its program wrote, as it reports.
         reached: Names of audit events that its program raised, as it reports.
     """
 
@@ -127,6 +135,7 @@ class NodeProcess:
     own_folder: str = ""
     start_told: Start | None = None
     grader_failed: str = ""
+    written: tuple[WrittenFile, ...] = ()
     reached: list[str] = field(default_factory=list)
     _pending: bytes = b""
     _streams: dict[str, bytearray] = field(default_factory=lambda: {"stdout": bytearray(), "stderr": bytearray()})
@@ -221,12 +230,36 @@ class NodeProcess:
             self.notes.append(text[:NOTE_CHARACTERS])
 
     def report(self) -> dict[str, Any] | None:
-        """Wait for the next report, as `_next_report` does, and record reports of audit events on the way."""
+        """Wait for the next report, as `_next_report` does, and record what no runner has to know on the way."""
         report = self._next_report()
-        while report is not None and report.get("kind") == "reached" and len(self.reached) < REACHED:
-            self.reached.append(str(report.get("what"))[:NAME_CHARACTERS])
+        while report is not None and self._is_aside(report):
             report = self._next_report()
         return report
+
+    def _is_aside(self, report: Mapping[str, Any]) -> bool:
+        """Record a report of an audit event or of written files; return whether it was one."""
+        if report.get("kind") == "reached" and len(self.reached) < REACHED:
+            self.reached.append(str(report.get("what"))[:NAME_CHARACTERS])
+            return True
+        if report.get("kind") == "written" and not self.written:
+            self.written = written_files(self.name, report.get("files"))
+            return True
+        return False
+
+    def last_report(self) -> None:
+        """Wait briefly for what a process reports when it is told to stop at the end of a recording."""
+        deadline = time.monotonic() + GRACE_S
+        while (left_s := deadline - time.monotonic()) > 0 and len(self._pending) <= REPORT_BYTES:
+            for descriptor, _ in self._poll.poll(left_s * 1000):
+                stream = self._sources[descriptor]
+                if stream:
+                    self._read_all(stream)
+                elif not self._receive():
+                    return
+            while b"\n" in self._pending:
+                report = self._parsed_report()
+                if report is not None and not self._is_aside(report) and report.get("kind") == "exited":
+                    return
 
     def _next_report(self) -> dict[str, Any] | None:
         """Wait for the next report and read output meanwhile; None if the process has ended or timed out."""
@@ -267,7 +300,9 @@ class NodeProcess:
             return [None]
         found: list[dict[str, Any] | None] = []
         while b"\n" in self._pending:
-            found.append(self._parsed_report())
+            report = self._parsed_report()
+            if report is None or not self._is_aside(report):
+                found.append(report)
         return [*found, None] if gone and not any(r and r.get("kind") == "exited" for r in found) else found
 
     def _receive(self) -> bool:
@@ -366,7 +401,10 @@ class NodeProcess:
         """
         text = text.replace(f"{self.prefix}/", "") if self.prefix else text
         text = text.replace(f"{self.root}/", "")
-        return text.replace(self.own_folder, OWN_FOLDER) if self.own_folder else text
+        if not self.own_folder:
+            return text
+        text = text.replace(self.root, SUBMISSION) if self.root.startswith(f"{self.own_folder}/") else text
+        return text.replace(self.own_folder, OWN_FOLDER)
 
     def death(self, t_ns: int) -> Fault:
         """End a process that died or stopped reporting, and return its fault."""
@@ -422,6 +460,22 @@ class NodeProcess:
                 source.close()
         if isinstance(self.process, StartedProcess):
             self.process.close()
+
+
+def written_files(process: str, data: Any) -> tuple[WrittenFile, ...]:
+    """Return the files that a process reports to have written, without those that are too large or oddly named."""
+    found: list[WrittenFile] = []
+    for file in data[:FILES] if isinstance(data, list) else ():
+        name, content = (file.get("name"), file.get("content")) if isinstance(file, dict) else (None, None)
+        if not isinstance(name, str) or not isinstance(content, str) or len(content) > FILE_BYTES * 4 // 3 + 4:
+            continue
+        parts = name.split("/")
+        odd = len(name) > WRITTEN_NAME_CHARACTERS or not name.isprintable() or {"", ".", ".."} & {*parts}
+        with contextlib.suppress(ValueError):
+            if not odd and base64.b64encode(base64.b64decode(content, validate=True)).decode() == content:
+                found.append(WrittenFile(process, name, content))
+    sizes = itertools.accumulate(len(file.content) for file in found)
+    return tuple(file for file, size in zip(found, sizes, strict=True) if size <= ALL_BYTES * 4 // 3 + 4 * FILES)
 
 
 def _signal_name(number: int) -> str:

@@ -31,8 +31,10 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S, size
+from grader.core.scenario import is_launch_file
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
 from grader.execution.codec import to_json
+from grader.execution.memory_groups import MemoryGroup, make_group
 from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.environment import worker_environment
@@ -107,6 +109,7 @@ class Worker(ABC):
         self._domains = domains
         self._interfaces: tuple[str, ...] = ()
         self._pid = 0
+        self._group: MemoryGroup | None = None
         self.worn = self.shares = self.gone = False
         self.forked: list[ForkedWorker] = []
 
@@ -130,6 +133,9 @@ class Worker(ABC):
         own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
         request = json.dumps({"plan": to_json(plan), **own}) + "\n"
         expected = f"worker: expected a trace of {plan.scenario}, found none"
+        if self._group is not None:
+            launches = any(is_launch_file(name) for name, _ in plan.processes)
+            self._group.make_room(plan.limits, plan.limits.participants if launches else len(plan.processes))
         try:
             self._line.settimeout(MARGIN_S)  # a plan with a recording is larger than the socket buffer
             self._await_start()
@@ -255,8 +261,11 @@ class ExecutedWorker(Worker):
         argv = [str(runtime.executable), "-s", "-S", "-u", "-m", MODULE.decode(), json.dumps(request)]
         environment, view = _environment(runtime, scratch), worker_view(runtime, scratch)
         command = isolation.worker_command(argv, environment, numbers, view)
+        self._group = make_group(len(lines))
+        for fork in self.forked:
+            fork.join(self._group)
         self._process = subprocess.Popen(
-            command.argv,
+            command.argv if self._group is None else self._group.inside(command.argv),
             env=dict(command.environment),
             pass_fds=command.pass_fds,
             stdin=subprocess.DEVNULL,
@@ -297,6 +306,8 @@ class ExecutedWorker(Worker):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, 9)
         self._process.wait()
+        if self._group is not None:
+            self._group.remove()
         self._line.close()  # last, so that a thread waiting for an answer is woken by the end of the worker
 
 
@@ -308,6 +319,10 @@ class ForkedWorker(Worker):
         self.shares = True
         self._process: int | None = None  # a descriptor of the process, because its pid may be given to another one
         line.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
+
+    def join(self, group: MemoryGroup | None) -> None:
+        """Tell in which group of the kernel it is."""
+        self._group = group
 
     def _await_start(self) -> None:
         """Receive the first message, with which the kernel tells the sender's pid."""

@@ -38,7 +38,7 @@ class WallRunner(Runner):
     """Runs one plan on the real clock; see `Runner`."""
 
     clock = ClockKind.WALL
-    clock_reason = "it was asked for"
+    clock_reason = "it was requested"
     #: See `PAUSE_S` and `LONGEST_PAUSE_NS`.
     pause_s: ClassVar[float] = PAUSE_S
     longest_pause_ns: ClassVar[int] = LONGEST_PAUSE_NS

@@ -9,6 +9,7 @@ import math
 import os
 import re
 import resource
+import secrets
 import socket
 import sys
 import time
@@ -16,7 +17,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from grader.core.errors import HarnessError
@@ -26,7 +27,7 @@ from grader.core.scenario import is_launch_file
 from grader.core.trace import ClockKind, FaultKind, Mark, Trace
 from grader.execution import late_numpy
 from grader.execution.bare_start import BareProcess, bare_arguments
-from grader.execution.beside import files_beside
+from grader.execution.beside import files_beside, is_loose, whole_submission
 from grader.execution.codec import from_json, observation_to_json, trace_to_json
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.execution.launching import Launched, evaluated, expanded, renamed, unstarted
@@ -177,6 +178,10 @@ class Worker:
             if plan.clock == ClockKind.WALL.value:
                 stack.enter_context(OutputWatch(students, observer.wake))
             trace = monitor.reviewed(runner(plan, students, observer).run())
+            if not plan.bare:
+                end_in_order(students)
+            written = tuple(file for student in students for file in student.written)
+            trace = replace(trace, written=written)
             return replace(trace, reached=tuple(dict.fromkeys(what for s in students for what in s.reached)))
 
     def _account(self, monitor: ResourceMonitor) -> None:
@@ -189,7 +194,21 @@ class Worker:
     def _execute(self, plan: Plan, name: str, file: str, domain: int, told: Mapping[str, Any]) -> NodeProcess:
         """Start a process of the host with a request; one that evaluates a launch file is told so."""
         ours, theirs = socket.socketpair()
-        root = self._isolation.submission_seen_at or plan.root
+        process = StudentProcess(
+            runtime=_with_packages(self._runtime, plan),
+            host_folder=Path(__file__).resolve().parents[1] / "student_host",
+            submission=Path(plan.root),
+            arguments=(),
+            environment={
+                "ROS_DOMAIN_ID": str(domain),
+                "RCUTILS_COLORIZED_OUTPUT": "0",
+                **quick_discovery(self._isolation.host_seen_at, self._runtime),
+                "PYTHONHASHSEED": str(plan.hash_seed),
+            },
+            pass_fds=(theirs.fileno(),),
+        )
+        process = process if told else with_copies(process, file, plan.limits)
+        root = self._isolation.submission_of(process)
         start = plan.start_of(name)
         request = {
             "root": root,
@@ -211,21 +230,7 @@ class Worker:
         }
         launcher = f"{self._isolation.host_seen_at}/launcher.py"
         arguments = ("-s", "-u", "-B", "-X", "utf8", launcher, json.dumps({**request, "fd": theirs.fileno()}))
-        process = StudentProcess(
-            runtime=_with_packages(self._runtime, plan),
-            host_folder=Path(__file__).resolve().parents[1] / "student_host",
-            submission=Path(plan.root),
-            arguments=arguments,
-            environment={
-                "ROS_DOMAIN_ID": str(domain),
-                "RCUTILS_COLORIZED_OUTPUT": "0",
-                **quick_discovery(self._isolation.host_seen_at, self._runtime),
-                "PYTHONHASHSEED": str(plan.hash_seed),
-            },
-            pass_fds=(theirs.fileno(),),
-            beside=Path(plan.root, file).parent,
-            copied=files_beside(Path(plan.root), file),
-        )
+        process = replace(process, arguments=arguments)
         try:
             # a fork of the starter has imported rclpy, which takes no part, and has the hashes of the starter
             if told or not self._isolation.can_fork or str(plan.hash_seed) != HASH_SEED:
@@ -255,29 +260,45 @@ class Worker:
 
     def _start_bare(self, plan: Plan, name: str, file: str, domain: int) -> NodeProcess:
         """Start a file without the grader's code in its process."""
-        root = self._isolation.submission_seen_at or plan.root
         runtime = _with_packages(self._runtime, plan)
         own = MACHINE if self._isolation.submission_seen_at == IN_PLACE else Path(self._isolation.host_seen_at)
         # nothing in its process could add to sys.path, so these folders come before the installed packages
         searched = (*runtime.python_paths, *plan.interfaces, own)
-        command = self._isolation.student_command(
-            StudentProcess(
-                runtime=runtime,
-                host_folder=MACHINE,  # nothing else of the grader
-                submission=Path(plan.root),
-                arguments=bare_arguments(Path(plan.root), root, file, plan.start_of(name), plan.scripts_of(file)),
-                environment={"ROS_DOMAIN_ID": str(domain), "PYTHONPATH": os.pathsep.join(map(str, searched))},
-                pass_fds=(),
-                beside=Path(plan.root, file).parent,
-                copied=files_beside(Path(plan.root), file),
-            ),
-            plan.limits,
+        process = StudentProcess(
+            runtime=runtime,
+            host_folder=MACHINE,  # nothing else of the grader
+            submission=Path(plan.root),
+            arguments=(),
+            environment={"ROS_DOMAIN_ID": str(domain), "PYTHONPATH": os.pathsep.join(map(str, searched))},
+            pass_fds=(),
         )
+        process = with_copies(process, file, plan.limits)
+        root = self._isolation.submission_of(process)
+        arguments = bare_arguments(Path(plan.root), root, file, plan.start_of(name), plan.scripts_of(file))
+        command = self._isolation.student_command(replace(process, arguments=arguments), plan.limits)
         student = BareProcess.begin(name, root, command, plan.limits)
         student.own_folder = _own_folder(command.environment)
         student.file, student.places = file, Places(Path(plan.root))
         student.prefix = next(iter(plan.prefixes), "")
         return student
+
+
+def with_copies(process: StudentProcess, file: str, limits: Limits) -> StudentProcess:
+    """Return a process that may write to a copy of its submission; of a large one, to copies of the files beside it.
+
+    Args:
+        process: The process.
+        file: The program that it runs, relative to the submission.
+        limits: How much the copy may hold.
+    """
+    root = process.submission
+    folder = str(PurePosixPath(file).parent)
+    whole = whole_submission(root, limits.scratch_bytes)
+    if whole is None:
+        return replace(process, beside=root / folder, copied=files_beside(root, file))
+    working = folder.removeprefix(".") if is_loose(root, file) else None
+    own = secrets.token_hex(8)
+    return replace(process, beside=root, copied=whole, writable=True, working=working, own=own)
 
 
 def _own_folder(environment: Mapping[str, str]) -> str:
@@ -355,6 +376,15 @@ def _last_words(student: NodeProcess) -> str:
     student.drain()
     words = [getattr(line, "text", "") for line in student.output(0, final=True)]
     return " | ".join(words[-3:])[:500] or "no output"
+
+
+def end_in_order(students: list[NodeProcess]) -> None:
+    """Send the stop signal to every running process, and take what it reports at its end."""
+    running = [student for student in students if not student.ended]
+    for student in running:
+        student.tell({"stop": True})
+    for student in running:
+        student.last_report()
 
 
 def stop(students: list[NodeProcess]) -> None:

@@ -212,12 +212,10 @@ class Workload:
         Args:
             report: `paused`: whether a pause or a timer's period began in this step; `counted`: whether one did after
                 no look at a clock; `moved`: the number of pauses or polls in the step; `charged`: whether the process
-                waits for as long as it has worked.
+                waits for as long as it has worked; `threads`: whether another thread than the first ran.
             passed_ns: The virtual time that has passed in the step; it bounds the number of polls.
         """
-        taken_ns, used_ns = self._taken()
-        self.used_ns += used_ns
-        self.waited_ns += taken_ns - used_ns
+        taken_ns = self._taken(threads=bool(report.get("threads")))
         moved = report.get("moved")
         moves = min(max(moved, 0), MOST_POLLS, passed_ns // YIELD_NS) if isinstance(moved, int) else 0
         self.delay.work(max(0, taken_ns - POLL_NS * moves))
@@ -235,7 +233,7 @@ class Workload:
         try:
             yield
         finally:
-            taken_ns, _ = self._taken()
+            taken_ns = self._taken()
             self.delay.work(max(0, taken_ns - BESIDE_NS))
             self.delay.take(taken_ns - BESIDE_FREE_NS)
 
@@ -243,14 +241,17 @@ class Workload:
         self.delay.work(real_ns)
         self.delay.take(real_ns)
 
-    def _taken(self) -> tuple[int, int]:
-        """Return what the process has taken since the last beginning, and how much of it was processor time."""
+    def _taken(self, *, threads: bool = True) -> int:
+        """Return what the process has taken since the last beginning, and add it to the sums."""
         real_ns = time.monotonic_ns() - self._began_ns
         before_ns, self._used_before_ns = self._used_before_ns, self._used()
         used_ns = max(0, self._used_before_ns - before_ns)
         if real_ns - used_ns > UNEXPLAINED_NS:
-            real_ns -= min(self._starved(), real_ns)
-        return max(used_ns, real_ns), used_ns
+            real_ns -= min(self._starved(threads=threads), real_ns)
+        taken_ns = max(used_ns, real_ns)
+        self.used_ns += used_ns
+        self.waited_ns += taken_ns - used_ns
+        return taken_ns
 
     def _used(self) -> int:
         """Return the processor time of the process, in nanoseconds; 0 once it has ended."""
@@ -259,16 +260,17 @@ class Workload:
         except OSError:
             return 0
 
-    def _starved(self) -> int:
+    def _starved(self, *, threads: bool = True) -> int:
         """Return how long the process and this thread were ready but waited for a processor, since the last time.
 
-        One thread of the program runs at a time, so only the one that waited longest counts: many threads together
-        could have waited for longer than the step took.
+        One thread of the program runs at a time. If it was not the first, only the one that waited longest counts: many
+        threads together could have waited for longer than the step took.
         """
         before, own_ns = self._threads_ns, self._own_ns
         self._threads_ns = threads_starved_ns([self._pid])
         self._own_ns = thread_starved_ns(os.getpid(), threading.get_native_id())
-        longest_ns = max((now_ns - before.get(name, 0) for name, now_ns in self._threads_ns.items()), default=0)
+        names = self._threads_ns.keys() if threads else {str(self._pid)}
+        longest_ns = max((self._threads_ns.get(name, 0) - before.get(name, 0) for name in names), default=0)
         return max(0, longest_ns) + max(0, self._own_ns - own_ns)
 
 

@@ -209,9 +209,9 @@ def _package_name(home: Path) -> str:
         try:
             name = (ET.fromstring(text).findtext("name") or name).strip()  # noqa: S314 - without entities
         except ET.ParseError as error:
-            raise DefinitionError(name, "package.xml", error.position[0], "it is no XML", "correct it") from None
+            raise DefinitionError(name, "package.xml", error.position[0], "it is not XML", "correct it") from None
     if not _PACKAGE_NAME.fullmatch(name):
-        problem = f"{name!r} is no name of a ROS package"
+        problem = f"{name!r} is not a valid package name"
         raise DefinitionError(name, "", 0, problem, "use small letters, digits and single underscores")
     if name in sys.stdlib_module_names or keyword.iskeyword(name):
         raise DefinitionError(name, "", 0, "Python has a module or word of this name", "choose another name")
@@ -324,7 +324,7 @@ def read_definition(package: str, definition: Definition) -> Interface:
     """Read one definition; types of other files are not looked up. Raises DefinitionError."""
     file = _file(definition)
     if not _TYPE_NAME.fullmatch(definition.name):
-        problem = f"{definition.name!r} is no name of a type"
+        problem = f"{definition.name!r} is not a valid type name"
         raise DefinitionError(package, file, 0, problem, "begin with a capital, then letters and digits only")
     sections: list[list[tuple[int, str]]] = [[]]
     for number, line in enumerate(definition.text.replace("\t", " ").splitlines(), start=1):
@@ -375,7 +375,7 @@ class _Reader:
     def _type(self, text: str) -> FieldType:
         match = _TYPE.fullmatch(text)
         if match is None:
-            raise self._error(f"{text!r} is no type", _FIX_TYPE)
+            raise self._error(f"{text!r} is not a type", _FIX_TYPE)
         base, bound, size = match["base"], match["bound"], match["size"]
         if bound is not None and base not in {"string", "wstring"}:
             raise self._error(f"{base} cannot have a greatest length", f"write {base} or {base}[<={bound}]")
@@ -395,12 +395,12 @@ class _Reader:
         near = difflib.get_close_matches(base, (*PRIMITIVES, "float64", "int32"), n=1, cutoff=0.6)
         usual = {"int": "int32", "float": "float32", "double": "float64", "boolean": "bool", "str": "string"}.get(base)
         fix = f"did you mean {usual or near[0]}?" if usual or near else _FIX_TYPE
-        raise self._error(f"{base!r} is no type", fix)
+        raise self._error(f"{base!r} is not a type", fix)
 
     def _field(self, type_: FieldType, rest: str) -> Member:
         name, _, default = rest.partition(" ")
         if not _PACKAGE_NAME.fullmatch(name):
-            raise self._error(f"{name!r} is no name of a field", "use small letters, digits and single underscores")
+            raise self._error(f"{name!r} is not a valid field name", "use small letters, digits and single underscores")
         if keyword.iskeyword(name):
             raise self._error(f"{name!r} is a word of Python", "choose another name")
         return Member(type_, name, self._default(type_, default.strip()) if default.strip() else None, self._line)
@@ -409,7 +409,7 @@ class _Reader:
         name, _, value = rest.partition("=")
         name = name.rstrip()
         if not _CONSTANT_NAME.fullmatch(name):
-            raise self._error(f"{name!r} is no name of a constant", "use capitals, digits and single underscores")
+            raise self._error(f"{name!r} is not a valid constant name", "use capitals, digits and single underscores")
         if not type_.primitive or type_.array or type_.string_bound:
             raise self._error("a constant cannot have this type", "use a number, a bool or a string")
         return Member(type_, name, self._value(type_.base, value.strip(), None), self._line)
@@ -420,7 +420,7 @@ class _Reader:
         if not type_.array:
             return self._value(type_.base, text, type_.string_bound)
         if not (text.startswith("[") and text.endswith("]")):
-            raise self._error(f"{text!r} is no list", "write the default as [1, 2, 3]")
+            raise self._error(f"{text!r} is not a list", "write the default as [1, 2, 3]")
         parts = (
             self._strings(text[1:-1]) if "string" in type_.base else [each.strip() for each in text[1:-1].split(",")]
         )
@@ -438,7 +438,7 @@ class _Reader:
         while position < len(text.rstrip()):
             match = pattern.match(text, position)
             if match is None:
-                raise self._error(f"[{text}] is no list of strings", 'write ["one", "two"]')
+                raise self._error(f"[{text}] is not a list of strings", 'write ["one", "two"]')
             parts.append(match[1])
             position = match.end()
         return parts
@@ -446,7 +446,7 @@ class _Reader:
     def _value(self, base: str, text: str, bound: int | None) -> Value:
         if base == "bool":
             if text.lower() not in {"true", "false", "1", "0"}:
-                raise self._error(f"{text!r} is no bool", "write true or false")
+                raise self._error(f"{text!r} is not a bool", "write true or false")
             return text.lower() in {"true", "1"}
         if base in {"string", "wstring"}:
             return self._string(text, bound)
@@ -459,7 +459,7 @@ class _Reader:
         except ValueError:
             number = high + 1
         if not low <= number <= high:
-            raise self._error(f"{text!r} is no {base}", f"write a whole number from {low} to {high}")
+            raise self._error(f"{text!r} is not of type {base}", f"write a whole number from {low} to {high}")
         return number
 
     def _float(self, text: str) -> float:
@@ -468,7 +468,7 @@ class _Reader:
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            raise self._error(f"{text!r} is no number", "write a number such as 0.5")
+            raise self._error(f"{text!r} is not a number", "write a number such as 0.5")
         return number
 
     def _string(self, text: str, bound: int | None) -> str:

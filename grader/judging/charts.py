@@ -131,7 +131,7 @@ def gaps_panel(
     """Return the time from each event to the next, in seconds or milliseconds."""
     scale = 1e-6 if unit == "ms" else 1e-9
     points = [(seconds(b), (b - a) * scale) for a, b in pairwise(times_ns)]
-    dots = series(f"since the {title} before", points, look=Look.DOTS, tone=Tone.SECOND)
+    dots = series(f"since the previous {title}", points, look=Look.DOTS, tone=Tone.SECOND)
     return Panel("interval", unit, (dots,), tuple(bands), tuple(levels))
 
 

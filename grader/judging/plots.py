@@ -185,10 +185,10 @@ def drawn(drawing: Drawing, trace: Trace) -> Chart | None:
 
 
 def _title(came: Sequence[str], went: Sequence[str], asked: Sequence[str], processes: Sequence[str]) -> str:
-    parts = [f"what came on {' and '.join(came[:2])}"] if came else []
-    parts += [f"what was published on {' and '.join(went[:2])}"] if went else []
+    parts = [f"messages received on {' and '.join(came[:2])}"] if came else []
+    parts += [f"messages published on {' and '.join(went[:2])}"] if went else []
     parts += [listed(asked)] if asked else []
-    parts += [f"what {listed(processes)} wrote"] if processes else []
+    parts += [f"output of {listed(processes)}"] if processes else []
     text = f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else "".join(parts)
     return text[:1].upper() + text[1:]
 
@@ -219,7 +219,7 @@ def _cases_said(cases: Sequence[Case]) -> str:
 
 def _topic_panels(plot: Plot, items: Sequence[Item], verb: str, *, several: bool) -> _Panels:
     timed = [(item.t_ns, item.value) for item in items]
-    how = {"came": "came on", "published": "published on"}[verb]
+    how = {"came": "received on", "published": "published on"}[verb]
     head = f"{counted(len(items), 'message')} {how} {plot.topic}"
     return value_panels(plot, timed, head, plot.topic if several else "", steps=verb == "came")
 

@@ -168,7 +168,7 @@ def _stale(groups: Sequence[Group], track: Track) -> Cause | None:
             fine = all(n.step <= 0.1 for e in group.entries for n in _pair(e, pair))
             if fine and len(known) >= max(3, _SURE * len(lags)) and statistics.median(known) > STALE_NS:
                 late = span(round(statistics.median(known)))
-                hint = "process messages as they come: a slow loop or a long queue delays them"
+                hint = "process messages as they arrive: a slow loop or a long queue delays them"
                 return Cause("stale", f"the logged positions are {late} old", hint)
     return None
 

@@ -125,7 +125,7 @@ def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sourc
     hint = f"grade again where {lack.name} is installed, or leave the import out if the program does not need it"
     if lack.name.endswith(INTERFACES):
         hint = f"grade again with --interfaces and the folder of {lack.name}, which has its definitions"
-    return Answer(problem=f"{text}, which is no fault of the program", hint=hint, fault=lack.fault)
+    return Answer(problem=f"{text}, which is not the program's fault", hint=hint, fault=lack.fault)
 
 
 def _without_waiting(trace: Trace) -> Iterator[Trace]:

@@ -168,7 +168,7 @@ _REPEATS = (2, 3, 5, 10)
 _MOST_DECIMALS = 5
 _COUNT_HINT = "count the messages: n grows by 1 with each"
 _FIRST_HINT = "publish first and count afterwards: the first message is n = 0"
-_PACE_HINT = "compare the factor of n with the one asked for"
+_PACE_HINT = "compare the factor of n with the one in the task"
 _RADIAN_HINT = "sine and cosine take radians here: convert nothing"
 
 
@@ -230,7 +230,7 @@ def _ways(wanted: Curve) -> Iterator[tuple[Instead, _Wanted]]:
         yield Instead(fast, _PACE_HINT), partial(_at, wanted, pace=factor)
         yield Instead(slow, _PACE_HINT), partial(_at, wanted, pace=1 / factor)
     for repeats in _REPEATS:
-        yield Instead(f"each value comes {repeats} times", _COUNT_HINT), partial(_at, wanted, repeats=repeats)
+        yield Instead(f"each value is published {repeats} times", _COUNT_HINT), partial(_at, wanted, repeats=repeats)
     if wanted.mistaken is not None:
         hint = "sine and cosine are taken for each other"
         yield Instead(f"the values follow {wanted.mistaken.text}", hint), partial(_at, wanted.mistaken)

@@ -129,9 +129,9 @@ def _outline(page: Page, exercise: ExerciseReport, first: Verdict | None) -> Non
             undecided.add(verdict.reason)
             page.put(shown(verdict.hint), prefix=Text.assemble(_DETAIL, ("hint: ", "cyan")), style="cyan")
     if blocked:
-        what = "what it needs is" if len(blocked) == 1 else "what they need is"
+        what = "the criterion that it needs is" if len(blocked) == 1 else "the criteria that they need are"
         page.put(
-            f"{len(blocked)} more, judged once {what} met",
+            f"{len(blocked)} more: judged once {what} met",
             prefix=_prefix(Outcome.BLOCKED, left.rjust(column)),
             style="dim",
         )

@@ -35,7 +35,7 @@ _WHAT_HAPPENED = {
     "syntax_error": "could not be compiled",
     "exception": "raised an exception",
     "exited": "ended by itself",
-    "hung": "did not come back",
+    "hung": "did not return",
     "killed": "was ended",
 }
 # The first frames show where the failure began, the last where it ended; deep recursion repeats in between.
@@ -145,7 +145,7 @@ def opening(report: Report) -> list[str]:
         headline(report),
         *warnings(report),
         summary(report),
-        *(["Blocked criteria are judged once what they need is met."] if blocked else []),
+        *(["Blocked criteria are judged once the criteria that they need are met."] if blocked else []),
         *notes(report),
     ]
 

@@ -400,7 +400,7 @@ def _content(path: Path) -> bytes:
         if stat.S_ISDIR(mode):
             raise RubricError(f"{where}: expected a rubric file, found a folder", "name the YAML file inside it")
         if not stat.S_ISREG(mode):
-            raise RubricError(f"{where}: expected a rubric file, found something that is no plain file")
+            raise RubricError(f"{where}: expected a rubric file, found something that is not a regular file")
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except (FileNotFoundError, NotADirectoryError):

@@ -131,7 +131,7 @@ class FeedbackShape(Shape):
     """How much a student is shown, and the last day on which that holds."""
 
     show: _Words
-    until: _Until = Field(default=None, description="afterwards all is shown; without, that never comes")
+    until: _Until = Field(default=None, description="the last day of this policy; without it, the policy has no end")
 
     @model_validator(mode="after")
     def _has_a_meaning(self) -> Self:
@@ -210,8 +210,10 @@ class RubricShape(Shape):
     provided: tuple[ProvidedFile, ...] = Field(
         default=(), description="launch files and parameter files of the rubric's own, beside it"
     )
-    checks: tuple[CheckFile, ...] = Field(default=(), description="files of checks of one's own, beside the rubric")
-    simulations: tuple[CheckFile, ...] = Field(default=(), description="files of simulations of one's own, as above")
+    checks: tuple[CheckFile, ...] = Field(default=(), description="files with your own checks, beside the rubric")
+    simulations: tuple[CheckFile, ...] = Field(
+        default=(), description="Python files with your own simulations, beside the rubric"
+    )
     interfaces: tuple[InterfaceFolder, ...] = Field(
         default=(), description="folders beside the rubric with interface packages: msg, srv and action definitions"
     )

@@ -200,7 +200,7 @@ def _problems(
             wrong = "expected a name of small letters, digits and _, a letter first"
             yield f"{where}:{line}: {wrong}, found `{shown(str(name))}`"
         elif name in taken:
-            yield f"{where}:{line}: expected a name of its own, found `{name}`, which is taken"
+            yield f"{where}:{line}: expected a new name, found `{name}`, which is taken"
         elif wrong := unfit(kind):
             class_line = lines.get(f"class {kind.__name__}", line) if isinstance(kind, type) else line
             yield f"{where}:{class_line}: `{name}`: {wrong}"

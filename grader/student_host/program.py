@@ -25,6 +25,7 @@ from .quick_imports import import_without_needless
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
+from .written import Written, flush_open_files
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -101,19 +102,37 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
         install_processes(functools.partial(watchdog.give_up_outside, "process"))
         time.give_up_outside = watchdog.give_up_outside
         Watch(link, request["root"]).install()
+    home = os.environ.get("HOME", "")
+    written = Written((request["root"], os.getcwd(), home), os.path.join(home, "log"))
     ending = play(request, describer, link, install_ros)
     try:
-        time.finish()
-        with contextlib.suppress(BaseException):
-            forget_modules(request["root"])
-        if watchdog is not None:
-            watchdog.stop()
-        ending = {"left": time.end(), **ending, **time.summary()}
-    except Exception as error:  # no code of the student runs here that could raise
+        ending |= clean_up(request["root"], time, watchdog)
+    except Exception as error:  # no code of the student runs there that could raise
         ending = {"fault": describer.exception(error), **ending, "code": 1, "left": False}
     flush()
+    with contextlib.suppress(Exception):
+        if found := written.files():
+            link.send({"kind": "written", "files": found})
     link.send({"kind": "exited", **ending})
     originals.exit_now(0)
+
+
+def clean_up(root: str, time: VirtualTime | WallTime, watchdog: Watchdog | None) -> dict[str, Any]:
+    """Do what the interpreter does after the end of a program, and return what the last report says of it.
+
+    Args:
+        root: The submission's folder.
+        time: The clock.
+        watchdog: Stopped, because nothing can hang any more.
+    """
+    time.finish()
+    with contextlib.suppress(BaseException):
+        flush_open_files()
+    with contextlib.suppress(BaseException):
+        forget_modules(root)
+    if watchdog is not None:
+        watchdog.stop()
+    return {"left": time.end(), **time.summary()}
 
 
 def evaluate(request: dict[str, Any]) -> None:

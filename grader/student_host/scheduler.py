@@ -43,7 +43,8 @@ class Scheduler:
         self._parked: list[GreenThread] = []
         self._runnable: deque[GreenThread] = deque()
         self._round = 0
-        self.current = self._adopt()
+        self.current = self._main = self._adopt()
+        self._others_ran = False
 
     def _adopt(self) -> GreenThread:
         """Register the calling thread as a green thread that runs."""
@@ -69,6 +70,11 @@ class Scheduler:
     def has_others(self) -> bool:
         """Return whether the program has more than one thread."""
         return len(self._green_threads) > 1
+
+    def others_ran(self) -> bool:
+        """Return whether another thread than the first has run since the last time that this was asked."""
+        others, self._others_ran = self._others_ran, self.current is not self._main
+        return others
 
     def progress(self) -> None:
         """Note that something happened that may have made a wait set ready."""
@@ -136,7 +142,7 @@ class Scheduler:
         following = self._choose()
         if following is green_thread:
             return
-        self.current = following
+        self.current, self._others_ran = following, True
         following.gate.release()
         try:
             green_thread.gate.acquire()

@@ -153,6 +153,8 @@ class VirtualTime:
             report["moved"] = self._moved
         if self._charges:
             report["charged"] = True
+        if self.scheduler.others_ran():
+            report["threads"] = True
         self._charges = False
         self.clock.paused = self.clock.counted = False
         self._moved = 0

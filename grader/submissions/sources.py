@@ -235,6 +235,10 @@ def _timing(source: Source) -> Iterator[str]:
             yield "a loop that counts"
 
 
+#: Operators after which a time is no date any more: a difference, or what is left over.
+_LESS = (ast.Sub, ast.Mod, ast.BitAnd)
+
+
 class Times:
     """The expressions of a file that hold a time that was read from a clock, also by the names that they are given.
 
@@ -256,7 +260,7 @@ class Times:
         self._names = _reached([(value, name) for value, name in given if self.holds(value)], given)
         differences = [(value, name) for value, name in given if self.holds(value) and not _is_scaled(value)]
         self._in_ns = _reached([(value, name) for value, name in differences if self.holds_ns(value)], differences)
-        less = [(value, name) for value, name in given if any(isinstance(n, ast.Sub) for n in ast.walk(value))]
+        less = [(value, name) for value, name in given if any(isinstance(n, _LESS) for n in ast.walk(value))]
         self._differences = _reached([(value, name) for value, name in less if self.holds(value)], given)
 
     def holds(self, node: ast.AST) -> bool:
@@ -272,12 +276,12 @@ class Times:
     def is_date(self, node: ast.AST) -> bool:
         """Return whether an expression holds a time since 1970, or since the start of a clock, and no difference."""
         return self.holds(node) and not any(
-            isinstance(n, (ast.Sub, ast.Compare)) or chain(n) in self._differences for n in ast.walk(node)
+            isinstance(n, (*_LESS, ast.Compare)) or chain(n) in self._differences for n in ast.walk(node)
         )
 
     def is_difference(self, node: ast.AST) -> bool:
         """Return whether an expression is a difference of times, or what is left over of one."""
-        inexact = isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Sub, ast.Mod, ast.BitAnd))
+        inexact = isinstance(node, ast.BinOp) and isinstance(node.op, _LESS)
         return (inexact and self.holds(node)) or (isinstance(node, ast.Name) and node.id in self._differences)
 
     def _reads(self, node: ast.AST) -> bool:

@@ -106,7 +106,7 @@ def test_a_mistake_in_the_rubric_is_told_with_its_place(tmp_path: Path, old: str
             '"starts_early": StartsEarly',
             '"publishes": StartsEarly',
             35,
-            "expected a name of its own, found `publishes`",
+            "expected a new name, found `publishes`",
         ),
         ('"starts_early": StartsEarly', '"Starts-Early": StartsEarly', 35, "expected a name of small letters"),
         ('"starts_early": StartsEarly', '"starts_early": 5', 35, "expected a frozen dataclass, found something else"),

@@ -80,7 +80,7 @@ def test_every_mistake_is_told_and_the_other_files_are_checked_too(tmp_path: Pat
             "8:10",
             "idle is recorded, but no",
         ),
-        ("files: [pump.py]", "files: [pump.py, spare.py]", "3:18", "spare.py is asked for, but no scenario runs it"),
+        ("files: [pump.py]", "files: [pump.py, spare.py]", "3:18", "spare.py is in `files`, but no scenario runs it"),
         ("", RATE.replace("2.5", "5"), "21:71", "window is 10 s, but alone is observed for 5 s only"),
     ],
 )
@@ -145,7 +145,7 @@ def test_a_misspelt_topic_of_a_stimulus_is_odd(tmp_path: Path) -> None:
         "    observe: {duration: 5 s}\n    stimuli:\n      - simulation: {differential_drive: {commands: /cmd_vell}}\n",
     )
     found = rubric("check", written(tmp_path, text)).stderr
-    assert "9:9: no criterion looks at /cmd_vell: did you mean /cmd_vel?\n" in found
+    assert "9:9: no criterion uses /cmd_vell: did you mean /cmd_vel?\n" in found
     assert rubric("check", written(tmp_path, text.replace("/cmd_vell", "/cmd_vel"))).stderr == ""
 
 

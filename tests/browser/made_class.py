@@ -67,7 +67,8 @@ class MadeUp:
         report = replace(class_reports.drawn_report(number, task.label), digest=digest)
         task.into.mkdir()
         (task.into / "report.json").write_text(dumps(report), encoding="utf-8")
-        (task.into / "report.html").write_text(render_html(report, assets="../../assets"), encoding="utf-8")
+        for name in ("report.html", "feedback.html"):
+            (task.into / name).write_text(render_html(report, assets="../../assets"), encoding="utf-8")
         state = State.GRADED if report.final else State.UNDECIDED
         usage = {"processor_s": 2.5, "peak_bytes": 90 << 20}
         score, most = float(report.score), float(report.max_score)

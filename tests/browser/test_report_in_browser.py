@@ -140,9 +140,8 @@ def test_a_pointer_over_answers_is_told_what_was_expected(visit: Open) -> None:
     """What was said long ago and still holds is in the tooltip as well."""
     page, _, _ = visit(render_html(graded.perfect()))
     unfold(page)
-    figure = page.locator(
-        "figure", has=page.get_by_role("heading", name="What came on /temperature and what was published on /fan_speed")
-    )
+    title = "Messages received on /temperature and messages published on /fan_speed"
+    figure = page.locator("figure", has=page.get_by_role("heading", name=title))
     figure.locator(".drawing").focus()
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")

@@ -12,7 +12,8 @@ import pytest
 
 pytestmark = pytest.mark.ros
 SUBMISSIONS = Path(__file__).resolve().parent.parent / "submissions"
-ONE = ("--exercise", "velocity_publisher", "--jobs", "1")
+#: Without spot checks, which tests of their own are about.
+ONE = ("--exercise", "velocity_publisher", "--jobs", "1", "--spot-checks", "0%")
 GRADE = (sys.executable, "-c", "from grader.cli.main import main; main()")
 CLASS = {"ada": "correct/velocity_class", "bob": "wrong/velocity_10_hz", "cleo": "broken/syntax_error"}
 
@@ -75,8 +76,9 @@ def test_results_are_whole(class_: Path, tmp_path: Path) -> None:
     for name in CLASS:
         place = results / "students" / name
         assert {p.name for p in place.iterdir()} == {
-            "report.json", "report.html", "feedback.json", "feedback.html", "gradescope.json", "evidence", "result.json"
-        }  # fmt: skip
+            *("report.json", "report.html", "feedback.json", "feedback.html", "gradescope.json"),
+            *("evidence", "result.json", "mark.json"),
+        }
         page = (place / "report.html").read_text(encoding="utf-8")
         script = page.split('src="../../')[1].split('"')[0]
         assert (results / script).is_file()
@@ -96,3 +98,68 @@ def test_a_download_is_graded_where_a_student_hides_modules(class_: Path, tmp_pa
     assert points(tmp_path / "out")["ada"] == "30"
     report = json.loads((tmp_path / "out" / "students" / "ada" / "report.json").read_text(encoding="utf-8"))
     assert report["submission"]["path"] == "out/unpacked/hw.zip/ada"
+
+
+#: What a hostile submission adds to its package, and the line of setup.py that it replaces.
+BOMBS = {
+    "list": ("setup.py", "x = [" + "0," * 3_000_000 + "]\n"),
+    "loops": ("setup.py", f"for a in {list(range(1000))}:\n  for b in {list(range(1000))}:\n    pass;pass;pass\n"),
+    "name": ("setup.py", f"setup(data_files=[('share/\\0', ['\\udcff']), ('share/{'x' * 300}', ['a'])])\n"),
+    "toml": ("pyproject.toml", "a" + ".a" * 18_000 + " = 1\n"),
+    "width": ("setup.py", "setup(name='{:>1500000000}'.format('x'))\n"),
+    "xml": ("package.xml", "<package>" + "<name>x</name>" * 500_000),
+}
+
+
+@pytest.mark.long
+def test_project_files_that_do_harm_cost_a_class_nothing(tmp_path: Path) -> None:
+    """Each submission gets its score, with a note about the file; the process that grades them all stays small."""
+    for name, bomb in (("honest", None), *BOMBS.items()):
+        folder = tmp_path / "class" / name
+        shutil.copytree(SUBMISSIONS / "correct/velocity_package", folder)
+        if bomb is not None:
+            (folder / "src/my_robot" / bomb[0]).write_text(bomb[1])
+    code = """
+import resource, sys
+from grader.cli.main import main
+try:
+    main()
+finally:
+    print("bytes", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10, file=sys.stderr)
+"""
+    command = [sys.executable, "-c", code, "batch", str(tmp_path / "class"), "-o", str(tmp_path / "out"), *ONE]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert points(tmp_path / "out") == dict.fromkeys(("honest", *BOMBS), "30")
+    assert int(done.stderr.rpartition("bytes ")[2]) < 400 << 20
+    for name in ("honest", *BOMBS):
+        report = json.loads((tmp_path / "out" / "students" / name / "report.json").read_text(encoding="utf-8"))
+        notes = report["exercises"][0]["notes"]
+        told = [note for note in notes if "not read" in note or "left out" in note]
+        assert len(told) == (name not in ("honest", "width")), (name, notes)
+
+
+def test_every_submission_of_a_class_is_checked(tmp_path: Path) -> None:
+    """Without asking for it: one that is right in virtual time only is found among honest ones, and only that one."""
+    honest = (SUBMISSIONS / "correct" / "velocity_class" / "velocity_publisher.py").read_text(encoding="utf-8")
+    cheat = SUBMISSIONS.parent / "spot_checks" / "cheats" / "drawn_fraction.py"
+    for name, text in {
+        "ada": f"{honest}\n# ada\n",
+        "bob": f"{honest}\n# bob\n",
+        "cleo": cheat.read_text(encoding="utf-8"),
+    }.items():
+        (tmp_path / "class" / name).mkdir(parents=True)
+        (tmp_path / "class" / name / "velocity_publisher.py").write_text(text, encoding="utf-8")
+    results = tmp_path / "out"
+    done = run(tmp_path / "class", "-o", results, "--exercise", "velocity_publisher", "--jobs", "1")
+    assert done.returncode == 0, done.stderr
+    assert points(results) == {"ada": "30", "bob": "30", "cleo": "20"}
+    reports = {
+        name: json.loads((results / "students" / name / "report.json").read_text(encoding="utf-8"))["exercises"][0]
+        for name in ("ada", "bob", "cleo")
+    }
+    assert [reports[name]["clock"] for name in ("ada", "bob", "cleo")] == ["virtual", "virtual", "wall"]
+    assert reports["cleo"]["clock_reason"].startswith('the node behaved differently on the wall clock: "')
+    quick = tmp_path / "quick"
+    run(tmp_path / "class", "-o", quick, "--exercise", "velocity_publisher", "--jobs", "1", "--spot-checks", "0%")
+    assert points(quick)["cleo"] == "30"

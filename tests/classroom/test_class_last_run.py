@@ -162,6 +162,9 @@ def test_a_mistake_leaves_what_is_remembered(scheduler: FakeScheduler) -> None:
     run(*FIRST)
     Path("bad.yaml").write_text("students:\n  zoe: {score: 1, reason: x}\n", encoding="utf-8")
     run("--adjust", "bad.yaml", code=2)
+    Path("adjust.yaml").write_text("students:\n  zoe: {score: 1, reason: x}\n", encoding="utf-8")
+    assert "error: adjust.yaml:2:3: expected a submission or a person of the class" in run(code=2).stderr
+    Path("adjust.yaml").write_text(DECISIONS, encoding="utf-8")
     run()
     assert marks()["Ada"] == "8"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.classroom.intake import HandedInEntry, safe_name
-from grader.classroom.roster import Person, RosterMatch, late_by, late_days, match, read_roster
+from grader.classroom.roster import Person, RosterMatch, late_by, late_days, match, read_roster, read_table
 from grader.core.errors import ClassError
 
 CANVAS = """Student,ID,SIS User ID,SIS Login ID,Section,Homework (12345)
@@ -160,6 +160,8 @@ def test_a_worksheet_of_moodle_says_how_late(tmp_path: Path, status: str, late: 
     """Days are rounded up, because a started day counts in full."""
     text = f"Identifier,Full name,Status\nParticipant 1,Ada,{status}\n"
     assert late_by(roster(tmp_path, text)[0]) == late
+    assert late_by(Person("Ada", names=frozenset({"ada"})), read_table(tmp_path / "roster.csv")) == late
+    assert late_by(Person("Eve", names=frozenset({"eve"})), read_table(tmp_path / "roster.csv")) == ""
     assert late_days(late) == days
 
 

@@ -223,6 +223,7 @@ class ScriptedObserver:
         self._world = world
         self._watched: set[tuple[str, str, bool]] = set()
         self.published: list[tuple[str, Any]] = []
+        self.crowded = ""
         self.advertised: list[tuple[str, str, bool]] = []
         self.services: Any = None
 

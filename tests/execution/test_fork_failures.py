@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 import secrets
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hostile import hostile, record
 from sandboxes import DOMAIN, Sandbox, finish, said, sandbox_or_skip
 
+from grader.core.limits import Limits
 from grader.execution.codec import to_json
+from grader.execution.recording_session import RecordingSession
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox import start
 from grader.execution.sandbox.bubblewrap import Bubblewrap
@@ -153,3 +157,13 @@ def test_each_call_that_sets_up_a_fork_ends_it_when_it_fails(sandbox: Sandbox) -
     assert usual[::2] == ["ran -1\n", 0]
     assert {call: result for call, result in results.items() if result[0] or result[2] == 0} == {}
     assert {"w 1", "s 20", *(f"{role} {most}" for role, most in told["beside"].items())} <= set(results)
+
+
+def test_a_fork_that_cannot_be_sandboxed_is_no_fault_of_the_node(studio: RecordingSession, tmp_path: Path) -> None:
+    """Nothing is judged; the reason is the grader's, and the next recording is as usual."""
+    tmp_path.chmod(0o755)
+    impossible = replace(Limits(), file_bytes="much")  # type: ignore[arg-type]  # no number for the kernel
+    trace = record(studio, tmp_path / "s", hostile(), limits=impossible)
+    assert "a student's process did not start" in trace.harness_problem
+    assert trace.observations == ()
+    assert len(record(studio, tmp_path / "s", hostile()).messages("/cmd_vel")) == 199

@@ -138,3 +138,28 @@ def test_the_guard_ends_with_its_block(machine: dict[int, Usage]) -> None:
     with ResourceMonitor(processes(Watched()), Limits()):
         assert threading.active_count() == before + 1
     assert threading.active_count() == before
+
+
+def test_children_are_looked_for_only_if_something_was_started(
+    machine: dict[int, Usage], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Searching all processes of a machine takes long; where the kernel does not tell, each time is needed."""
+    searched = []
+    last = iter(["7", "7", "7", "8", "8", "", "", "9", *["9"] * 100_000])
+    ended = threading.Event()
+
+    def families(pids: Sequence[int]) -> dict[int, set[int]]:
+        searched.append(1)
+        return {pid: {pid} for pid in pids}
+
+    def last_pid() -> str:
+        asked = next(last)
+        if asked == "9":
+            ended.set()
+        return asked
+
+    monkeypatch.setattr(module, "families", families)
+    monkeypatch.setattr(module, "last_pid", last_pid)
+    with ResourceMonitor(processes(Watched()), Limits()):
+        assert ended.wait(60)
+    assert len(searched) in (4, 5)  # 7, 8, twice nothing, and 9 unless the monitor ended first

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from grader.core.quantities import MIB, NS_PER_S
-from grader.execution.usage import families, threads_starved_ns, usage
+from grader.execution.usage import families, last_pid, threads_starved_ns, usage
 
 WAIT = "import sys; sys.stdout.write('x'); sys.stdout.flush(); sys.stdin.read()"
 
@@ -75,6 +75,14 @@ def test_a_process_that_is_gone_uses_nothing() -> None:
         pass
     assert usage([process.pid]) == usage([])
     assert threads_starved_ns([process.pid]) == {}
+
+
+def test_the_last_pid_tells_that_something_was_started(run: Callable[[str], subprocess.Popen[bytes]]) -> None:
+    """A process or a thread, by whomever; so as long as it stays the same, nothing was."""
+    before = last_pid()
+    started = run("print(flush=True); input()")
+    assert last_pid() != before
+    assert int(last_pid()) >= started.pid or int(last_pid()) < int(before)
 
 
 def test_a_family_is_a_process_with_all_below_it(run: Callable[[str], subprocess.Popen[bytes]]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, cast
 
 import pytest
@@ -112,6 +113,42 @@ def test_a_machine_that_did_not_keep_up_is_no_judge(clock: Clock) -> None:
     assert Run(quiet).trace.harness_problem.startswith("the machine was too busy")
     clock.now_ns, clock.held_up = 10**12, {300: 150}
     assert Run(quiet).trace.harness_problem == ""
+
+
+class RarelyLooking(WallRunner):
+    """Looks less often at a graph that does not change, as a run without the host does."""
+
+    rarest_graph_ns = 200 * MS
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self.looks: list[int] = []
+
+    def _look_at_graph(self, now_ns: int) -> bool:
+        self.looks.append(now_ns // MS)
+        return super()._look_at_graph(now_ns)
+
+
+def test_a_graph_that_does_not_change_is_looked_at_less_often(clock: Clock) -> None:
+    """Up to the longest interval; a change is followed by a look as soon as in any other run."""
+    world = World()
+
+    def late(me: ScriptedStudent, world: World) -> Program:
+        for _ in range(700):
+            yield SILENT
+        world.have(me.name, claim("publisher", "/late", FLOAT))
+        while True:
+            yield SILENT
+
+    student, observer = ScriptedStudent("a.py", late, world), ScriptedObserver(world)
+    runner = RarelyLooking(plan(clock="wall"), [cast("NodeProcess", student)], cast("Observer", observer))
+    trace = runner.run()
+    gaps = [after - before for before, after in pairwise(runner.looks[:-1])]
+    assert max(gaps) <= 201
+    assert len(gaps) < 10
+    (seen_ms,) = {g.t_ns // MS for g in trace.graphs() if any(e.topic == "/late" for e in g.endpoints)}
+    assert 700 <= seen_ms <= 901
+    assert runner.looks[runner.looks.index(seen_ms) + 1] - seen_ms <= 51
 
 
 def test_numbers_are_published_when_they_are_due(clock: Clock) -> None:

@@ -218,10 +218,17 @@ def test_one_message_of_a_step_forgives_a_wait_and_only_where_messages_were_anno
 def test_only_the_thread_that_waited_longest_is_taken_to_have_run(clocks: Clocks) -> None:
     """A hundred threads that each wait for a millisecond do not excuse a step of 100 ms."""
     clocks.starved_ns = {str(n): MS for n in range(100)}
-    clocks.step(100, 100)
+    clocks.step(100, 100, threads=True)
     assert clocks.workload.waited_ns == 99 * MS
     clocks.starved_ns = {"1": 1000 * MS}
-    clocks.step(150, 100)
+    clocks.step(150, 100, threads=True)
+    assert clocks.workload.waited_ns == 99 * MS
+
+
+def test_threads_of_the_middleware_excuse_nothing(clocks: Clocks) -> None:
+    """As long as the program has one thread, only its waits count."""
+    clocks.starved_ns = {"1": MS, "2": 100 * MS}
+    clocks.step(100, 100)
     assert clocks.workload.waited_ns == 99 * MS
 
 

@@ -101,6 +101,36 @@ def test_a_rare_block_that_delays_other_timers_is_noticed(run: Callable[..., Tra
     assert run("", "if self.count % 20 == 0: __import__('ctypes').CDLL(None).usleep(200_000)").clock_reason == OUTSIDE
 
 
+HOST = """
+kept = [cell.cell_contents for cell in time.sleep.__closure__]
+self.time = next(one._ask_for_time.__self__ for one in kept if hasattr(one, "_ask_for_time"))
+"""
+ARRIVED = """
+import ctypes
+for _ in range(10):
+    ctypes.CDLL(None).usleep(10_000)
+    self.time.running = False
+    self.time._link.send({"kind": "arrived"})
+"""
+MATCHING = """
+self.ledger = self.time._ledger
+wait = self.ledger.await_matches
+def slowly(*args):
+    __import__("ctypes").CDLL(None).usleep(450_000)
+    return wait(*args)
+self.ledger.await_matches = slowly
+"""
+AN_ENDPOINT = "self.made = self.create_publisher(Twist, f'/x{self.count % 2}', 10)"
+
+
+@pytest.mark.parametrize(
+    ("once", "later"), [(HOST, ARRIVED), (HOST + MATCHING, AN_ENDPOINT)], ids=["arrived", "matching"]
+)
+def test_what_a_process_says_hides_no_work(run: Callable[..., Trace], once: str, later: str) -> None:
+    """That messages arrived, or that it waits for matches: neither takes as long as this."""
+    assert run(once, later).clock_reason == OUTSIDE
+
+
 LOOP = """
 import threading
 def run():

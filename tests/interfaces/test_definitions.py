@@ -116,18 +116,18 @@ def test_reads_types_values_and_comments() -> None:
 @pytest.mark.parametrize(
     ("text", "line", "problem", "fix"),
     [
-        ("int32 a\nflaot64 x", 2, "'flaot64' is no type", "did you mean float64?"),
-        ("int x", 1, "'int' is no type", "did you mean int32?"),
+        ("int32 a\nflaot64 x", 2, "'flaot64' is not a type", "did you mean float64?"),
+        ("int x", 1, "'int' is not a type", "did you mean int32?"),
         ("\n\ngeometry_msgs/Piont p", 3, "no message geometry_msgs/Piont", "did you mean geometry_msgs/Point?"),
         ("Header h", 1, "no message my_interfaces/Header", "did you mean std_msgs/Header?"),
         ("nav2_msgs/Costmap c", 1, "no message nav2_msgs/Costmap", "bring the package"),
         ("int32", 1, "has no name", "a type and a name"),
-        ("int32 Name", 1, "'Name' is no name of a field", "small letters"),
-        ("int32 a__b", 1, "no name of a field", "single underscores"),
+        ("int32 Name", 1, "'Name' is not a valid field name", "small letters"),
+        ("int32 a__b", 1, "valid field name", "single underscores"),
         ("int32 a\nint32 a", 2, "used twice", "another"),
-        ("uint8 A=256", 1, "'256' is no uint8", "from 0 to 255"),
-        ("int32 a b", 1, "'b' is no int32", "whole number"),
-        ("float64 X=nan", 1, "no number", "0.5"),
+        ("uint8 A=256", 1, "'256' is not of type uint8", "from 0 to 255"),
+        ("int32 a b", 1, "'b' is not of type int32", "whole number"),
+        ("float64 X=nan", 1, "not a number", "0.5"),
         ("int32[2] a [1, 2, 3]", 1, "3 elements", "says 2"),
         ("int32<=5 a", 1, "greatest length", "int32[<=5]"),
         ("int32[0] a", 1, "length of 0", "from 1"),
@@ -137,8 +137,8 @@ def test_reads_types_values_and_comments() -> None:
         ('string A="a', 1, "quotes", "close"),
         ("string A=a\\nb", 1, "control characters", "leave"),
         ("int32 lambda", 1, "word of Python", "another"),
-        ("@{import os}", 1, "is no type", "such as float64"),
-        ("int32 a');import_os", 1, "no name of a field", "small letters"),
+        ("@{import os}", 1, "is not a type", "such as float64"),
+        ("int32 a');import_os", 1, "valid field name", "small letters"),
     ],
 )
 def test_a_mistake_is_told_with_line_and_fix(text: str, line: int, problem: str, fix: str) -> None:
@@ -155,7 +155,7 @@ def test_parts_of_services_and_actions_are_counted(kind: str, text: str) -> None
 
 
 def test_names_of_types_are_checked() -> None:
-    assert "no name of a type" in refusal(of("", name="foo")).problem
+    assert "valid type name" in refusal(of("", name="foo")).problem
 
 
 def test_nested_arrays_that_no_program_can_create_are_refused() -> None:

@@ -60,7 +60,7 @@ def one(**kw: Any) -> Recording:
         (RESULT, one(), 1, "/fibonacci: 1 goal succeeded, sequence [0, 1, 1, 2, 3, 5]"),
         (RESULT, goal(one(), 2, 5.0), 1, "2 goals succeeded"),
         (RESULT, one(took=5.0), 1, ""),
-        (RESULT, one(took=5.1), 0, "its result came after 5.100 s, expected within 5 s"),
+        (RESULT, one(took=5.1), 0, "its result took 5.100 s, expected within 5 s"),
         (RESULT, one(result=[0, 1, 1, 2]), 0, "in its result sequence is [0, 1, 1, 2], expected [0, 1, 1, 2, 3, 5]"),
         (RESULT, one(status=6), 0, "goal 1: aborted, expected that it succeeds"),
         (RESULT, one(status=0), 0, "status 0, expected"),

@@ -112,7 +112,7 @@ def test_numbers_that_are_written_whatever_comes_show_no_speed(write: Write) -> 
     """The reason counts the other numbers, and the hint tells what to do; printing does not help."""
     finding = SPEED.judge(speeds(write).trace())
     assert finding.credit == 0
-    assert "values of /fan_speed are not told from other numbers" in finding.reason
+    assert "values of /fan_speed are lost among other numbers" in finding.reason
     assert "numbers written in its time" in finding.reason
     assert finding.hint.startswith("log the number that came on /fan_speed")
     assert SPEED.judge(speeds(write, printed=True).trace()).credit == 0
@@ -160,4 +160,4 @@ def test_numbers_that_are_written_whatever_comes_show_no_angle(write: Write) -> 
     """In as many records as it takes."""
     finding = ANGLE.judge(angles(write).trace())
     assert finding.credit == 0
-    assert "12 of 12 messages of /joint_commands are not told from other numbers" in finding.reason
+    assert "12 of 12 messages of /joint_commands are lost among other numbers" in finding.reason

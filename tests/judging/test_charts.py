@@ -51,7 +51,7 @@ def titled(figures: Iterable[Figure], start: str) -> Chart:
 
 def test_a_rate_is_drawn_with_its_bands_and_its_intervals() -> None:
     """The rate over the last second, the accepted bands, and every interval with the expected one."""
-    chart = titled(figures_of(ONE, {"alone": velocity().trace()}), "How often")
+    chart = titled(figures_of(ONE, {"alone": velocity().trace()}), "Rate of")
     rate, interval = chart.panels
     assert {(b.low, b.high) for b in rate.bands} == {(19, 21), (18, 22)}
     assert all(math.isclose(y, 20) for _, y in rate.series[0].points)
@@ -66,7 +66,7 @@ def test_a_rate_that_changes_is_seen() -> None:
     rec = Recording(10.05, process="velocity_publisher.py")
     for k in range(100):
         rec.message(0.05 + k / 20 + (k > 50) * (k - 50) / 40, "/cmd_vel", twist(), TWIST)
-    rates = [y for _, y in titled(figures_of(ONE, {"alone": rec.trace()}), "How often").panels[0].series[0].points]
+    rates = [y for _, y in titled(figures_of(ONE, {"alone": rec.trace()}), "Rate of").panels[0].series[0].points]
     assert max(rates) > 19.9
     assert min(rates) < 14
 
@@ -128,7 +128,7 @@ def test_answers_stand_under_what_they_answer() -> None:
         value = held_at(0.5 + 0.2 * k) or 0.0
         rec.number(0.51 + 0.2 * k, "/fan_speed", 100.0 if value > 25 else 0.0)
     figures = figures_of(THREE, {"controller_alone": rec.trace("controller_alone")})
-    chart = titled(figures, "What came on /temperature")
+    chart = titled(figures, "Messages received on /temperature")
     assert len([f for f in figures if f.title == chart.title]) == 1
     upper, lower = chart.panels
     assert chart.criteria == ("fan_on_above_25", "fan_off_at_or_below_25")
@@ -235,7 +235,7 @@ def test_a_picture_that_fails_costs_only_itself(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(CHECKS["topic_rate"], "chart", broken)
     titles = [f.title for f in figures_of(ONE, {"alone": velocity().trace()})]
-    assert not any(t.startswith("How often") for t in titles)
+    assert not any(t.startswith("Rate of") for t in titles)
     assert len(titles) == 4
 
 

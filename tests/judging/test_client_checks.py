@@ -131,19 +131,19 @@ def looks_later_at_a_refusal(answer: Answer) -> Said:
 @pytest.mark.parametrize(
     ("write", "check", "said"),
     [
-        (silent_go, ABOVE, "nothing is written but what follows low numbers too after 84.5"),
-        (silent_go, BELOW, "so it does not show that it aborts"),
-        (silent_go, STILL, "('the answer: Battery: 15.0% remaining' follows 15)"),
-        (warns_and_goes, ABOVE, "nothing is written but what follows low numbers too"),
-        (warns_and_goes, BELOW, "('charge is fine, off it goes' follows 15)"),
+        (silent_go, ABOVE, "only text that also follows low numbers after 84.5"),
+        (silent_go, BELOW, "so nothing shows that it aborts"),
+        (silent_go, STILL, "('the answer: Battery: 15.0% remaining' also follows 15)"),
+        (warns_and_goes, ABOVE, "only text that also follows low numbers"),
+        (warns_and_goes, BELOW, "('charge is fine, off it goes' also follows 15)"),
         (goes_at_the_second_low, BELOW, "'charge is fine, off it goes' at t = "),
-        (same_for_all, ABOVE, "nothing is written but what follows low numbers too"),
-        (same_for_all, STILL, "so it does not show that it keeps still after a response without success"),
+        (same_for_all, ABOVE, "only text that also follows low numbers"),
+        (same_for_all, STILL, "so nothing shows that it does not go on after a response without success"),
         (deciding(lambda v: f"{v}" > "20.0"), BELOW, "no record of severity WARN after 7.5"),
         (looks_later_at_a_refusal, STILL, "'off it goes' after a response without success (request 4)"),
-        (deciding(lambda v: v >= 20), BELOW, "no record of severity WARN after 20, expected that it warns"),
+        (deciding(lambda v: v >= 20), BELOW, "no record of severity WARN after 20; expected it to log a warning"),
         (deciding(lambda v: v > 10), BELOW, "no record of severity WARN after 20"),
-        (deciding(lambda v: v > 30), ABOVE, "WARN at t = 4.450 s: low, it stays after 20.1, expected that it goes on"),
+        (deciding(lambda v: v > 30), ABOVE, "WARN at t = 4.450 s: low, it stays after 20.1; expected it to go on"),
         (deciding(lambda v: v <= 20), REACTS, "WARN at t = 3.350 s: low, it stays after 84.5"),
         (deciding(lambda v: False), ABOVE, "after 84.5"),
         (low_is_info, BELOW, "no record of severity WARN after 20"),
@@ -277,7 +277,7 @@ def test_what_was_never_asked_is_not_judged_by_guesses() -> None:
         assert check.judge(ended.trace()).blocked_by == "service_calls"
         assert FAULT_KEY in check.judge(crashed.trace()).evidence
         idle = check.judge(asking(chapter, only_good).trace())
-        assert (idle.blocked_by, "then asked no more" in idle.reason) == ("service_calls", True)
+        assert (idle.blocked_by, "then stopped asking" in idle.reason) == ("service_calls", True)
         with pytest.raises(HarnessError):
             check.judge(dataclasses.replace(asking(chapter, only_good).trace(), stop_ns=7_000_000_000))
     assert BELOW.judge(hangs.trace()).blocked_by == "service_calls"
@@ -363,9 +363,9 @@ def test_giving_up_is_not_waiting() -> None:
     ended = WAITS.judge(waiting_only().mark(2.0, "exited", CLIENT).trace())
     assert "ended at t = 2.000 s" in ended.reason
     never = WAITS.judge(waiting_only().trace())
-    assert "no request came, expected one within 5.0 s" in never.reason
+    assert "no request was sent, expected one within 5.0 s" in never.reason
     late = WAITS.judge(waiting_only().request(9.0, BATTERY, 1, "student").trace())
-    assert "the first request came at t = 9.000 s" in late.reason
+    assert "the first request was sent at t = 9.000 s" in late.reason
     deaf = Recording(20.0, process=CLIENT).log(0.5, "waiting").mark(3.0, "server_starts", BATTERY)
     assert WAITS.judge(deaf.trace()).blocked_by == "service_calls"
 

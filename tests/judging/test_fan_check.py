@@ -194,7 +194,7 @@ def test_answers_that_come_late_are_called_late(lag: float) -> None:
     for finding in both(rec):
         assert finding.credit == 0
         assert f"right for what was published {lag} s before" in finding.reason
-        assert finding.hint == "answer what has just come on /temperature"
+        assert finding.hint == "answer the newest message on /temperature"
 
 
 @pytest.mark.parametrize("rule", [lambda v: 100.0 if v >= 25 else 0.0, lambda v: 100.0 if v > 26 else 0.0])

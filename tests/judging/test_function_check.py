@@ -74,7 +74,7 @@ def test_right_values_are_met_however_they_are_computed(rec: Recording) -> None:
         (lambda n: math.sin(0.11 * n), "1.1 times too fast", "factor of n"),
         (lambda n: math.cos(0.1 * n), "follow cos(0.1 * n)", "sine and cosine"),
         (lambda n: round(math.sin(0.1 * n), 2), "rounded to 2 decimals", "as it is"),
-        (lambda n: math.sin(0.1 * (n // 2)), "each value comes 2 times", "grows by 1"),
+        (lambda n: math.sin(0.1 * (n // 2)), "each value is published 2 times", "grows by 1"),
         (lambda n: 0.1 * n, "", ""),
         (lambda n: math.nan, "", ""),
         (lambda n: math.inf, "", ""),

@@ -36,7 +36,7 @@ def test_the_missing_edge_is_named(left_out: tuple[int, ...], said: str) -> None
     finding = CHECK.judge(graph(*left_out).trace())
     assert finding.credit == 0
     assert said in finding.reason
-    assert "only one direction" in finding.reason
+    assert "one direction only" in finding.reason
     assert len(finding.evidence["edges"]) == 1
 
 

@@ -75,7 +75,7 @@ def test_a_printed_text_is_half_of_it() -> None:
 def test_nothing_to_log_is_the_graders_fault_unless_the_node_crashed() -> None:
     """A recording without messages decides nothing."""
     rec = Recording().endpoint("subscription", "/topic", TEXT)
-    with pytest.raises(HarnessError, match="/topic: no message came"):
+    with pytest.raises(HarnessError, match="/topic: no message was sent"):
         TEXTS.judge(rec.trace())
     assert TEXTS.judge(rec.crashed(0.5).trace()).credit == 0
 

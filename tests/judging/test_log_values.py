@@ -113,7 +113,7 @@ def test_one_message_behind_is_named() -> None:
     before = dict(zip(angles, [0.0, *angles], strict=False))
     both = CHECK.judge(hearing(lambda a: chapter(before[a]), angles=angles).trace())
     assert both.credit == 0
-    assert "each log has the number of the message before" in both.reason
+    assert "each log has the number of the previous message" in both.reason
     assert "store the number before you log it" in both.hint
     mixed = hearing(lambda a: f"{a:.3f} rad ({math.degrees(before[a]):.1f} deg)", angles=angles)
     assert CHECK.judge(mixed.trace()).credit == 0
@@ -138,7 +138,7 @@ def test_units_that_are_swapped_are_no_conversion(write: Callable[[float], str],
     check = LogsValues("simple_subscriber.py", "/joint_commands", unit_factors=(DEGREES,), units=units)
     finding = check.judge(hearing(write, angles=ANGLES[2:]).trace())
     assert finding.credit == credit, finding.reason
-    assert credit == 1 or "have each other's units" in finding.reason
+    assert credit == 1 or "are swapped at every message" in finding.reason
 
 
 def test_messages_that_are_left_out_are_counted() -> None:
@@ -146,7 +146,7 @@ def test_messages_that_are_left_out_are_counted() -> None:
     rec = hearing(chapter, when=lambda k: k % 2 == 0)
     finding = CHECK.judge(rec.trace())
     assert finding.credit == 0
-    assert "20 of 40 messages of /joint_commands are not logged rightly" in finding.reason
+    assert "20 of 40 messages of /joint_commands are not logged correctly" in finding.reason
     assert "once for each message" in CHECK.judge(hearing(chapter, when=lambda k: k % 10 == 0).trace()).hint
     half = LogsValues("simple_subscriber.py", "/joint_commands", unit_factors=(1.0, DEGREES), share=0.5)
     assert half.judge(rec.trace()).credit == 1

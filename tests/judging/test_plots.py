@@ -205,7 +205,7 @@ def test_a_check_of_an_author_is_drawn_by_what_its_parameters_name() -> None:
     """The field of the topic, and what the process wrote."""
     rec = published({"a": 1, "b": 2}, {"a": 3, "b": 4}).log(1, "hello", "WARN")
     chart = made(Own("/state", "b", "node.py"), rec)
-    assert chart.title == "What was published on /state and what node.py wrote"
+    assert chart.title == "Messages published on /state and output of node.py"
     assert [s.name for s in chart.panels[0].series] == ["b"]
     assert chart.panels[1].lanes == ("node.py: logged", "node.py: WARN")
 

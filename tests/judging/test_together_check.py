@@ -115,7 +115,7 @@ def test_the_first_wrong_answer_is_named() -> None:
 
 
 def test_types_that_differ_are_said_exactly() -> None:
-    """Each file alone is right, together they cannot talk."""
+    """Each file alone is right, together so no message arrives."""
     rec, _ = sensor()
     rec.endpoint("publisher", "/temperature", FLOAT32, "/temperature_sensor", 1)
     rec.endpoint("subscription", "/temperature", FLOAT64, "/controller", 2)
@@ -124,7 +124,7 @@ def test_types_that_differ_are_said_exactly() -> None:
     assert finding.credit == 0
     assert finding.reason == (
         "/temperature: temperature_sensor.py publishes std_msgs/msg/Float32, "
-        "fan_controller.py subscribes std_msgs/msg/Float64: they cannot talk"
+        "fan_controller.py subscribes std_msgs/msg/Float64, so no message arrives"
     )
 
 
@@ -134,7 +134,7 @@ def test_policies_that_differ_are_said_exactly() -> None:
     rec.endpoint("publisher", "/temperature", node="/a", participant=1, reliability="best_effort")
     rec.endpoint("subscription", "/temperature", node="/b", participant=2)
     reason = CHECK.judge(rec.trace()).reason
-    assert "/a offers best_effort reliability, /b asks for reliable: they cannot talk" in reason
+    assert "/a offers best_effort reliability, /b asks for reliable, so no message arrives" in reason
 
 
 def answered(values: list[float]) -> Recording:
@@ -165,8 +165,14 @@ def test_a_slow_random_walk_need_not_reach_the_threshold(seed: int, step: float)
 @pytest.mark.parametrize(
     ("offered", "said"),
     [
-        ({"reliability": "best_effort"}, "/b offers best_effort reliability, /a asks for reliable: they cannot talk"),
-        ({"type_": FLOAT64}, "/b publishes std_msgs/msg/Float64, /a subscribes std_msgs/msg/Float32: they cannot talk"),
+        (
+            {"reliability": "best_effort"},
+            "/b offers best_effort reliability, /a asks for reliable, so no message arrives",
+        ),
+        (
+            {"type_": FLOAT64},
+            "/b publishes std_msgs/msg/Float64, /a subscribes std_msgs/msg/Float32, so no message arrives",
+        ),
     ],
 )
 def test_right_answers_that_the_sensor_cannot_hear_are_not_enough(offered: dict[str, Any], said: str) -> None:
@@ -199,7 +205,7 @@ def test_silence_is_explained() -> None:
     assert "carries no number" in CHECK.judge(rec.trace()).reason
 
 
-@pytest.mark.parametrize(("behind", "said"), [(2, "2 messages before"), (7, "7 messages before")])
+@pytest.mark.parametrize(("behind", "said"), [(2, "2 messages earlier"), (7, "7 messages earlier")])
 def test_answers_to_an_earlier_value_are_recognised(behind: int, said: str) -> None:
     """A controller that compares the previously stored value gets a hint."""
     rec, sent = sensor()
@@ -209,7 +215,7 @@ def test_answers_to_an_earlier_value_are_recognised(behind: int, said: str) -> N
         )
     finding = CHECK.judge(rec.trace())
     assert finding.credit == 0
-    assert f"the answers are right for what came {said}" in finding.reason
+    assert f"the answers fit the input of {said}" in finding.reason
     assert finding.evidence["behind"] == behind
 
 

@@ -65,6 +65,7 @@ SUSPICIOUS = {
     "a long file": "x = 1\n" * 60_000,
     "parts of a microsecond": "def f(self):\n    if self.get_clock().now().nanoseconds % 1000:\n        return 1",
     "parts of a microsecond, by name": "def f(c):\n    n = c.now().nanoseconds\n    return n % 1000 == 0",
+    "parts of a microsecond, if any": "def f(c, us):\n    part = c.now().nanoseconds % us\n    return 1 if part else 2",
     "parts of a microsecond, by divmod": "def f(n):\n    q, r = divmod(n.get_clock().now().nanoseconds, 1000)",
     "parts of a microsecond, by bits": "import time\nx = time.time_ns() & 7",
     "parts of a microsecond, by digits": "import time\nx = str(time.time_ns())[-3:]",

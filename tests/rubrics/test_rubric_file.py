@@ -248,7 +248,7 @@ def test_a_path_that_cannot_be_read_is_one_line(tmp_path: Path, monkeypatch: pyt
         "no\nsuch.yaml": "no\\nsuch.yaml: expected a rubric file, found nothing there",
         "file/x.yaml": "file/x.yaml: expected a rubric file, found nothing there",
         "folder": "folder: expected a rubric file, found a folder",
-        "pipe": "pipe: expected a rubric file, found something that is no plain file",
+        "pipe": "pipe: expected a rubric file, found something that is not a regular file",
         "a\0b": "a\\x00b: expected a path, found one with a null character",
         "x" * 300: "cannot be read: File name too long",
     }.items():

@@ -153,7 +153,7 @@ def test_a_mistake_in_the_rubric_is_told_with_its_place(tmp_path: Path, old: str
     [
         ("SIMULATIONS = {", "SIMULATIONS = [", "world.py:30: expected a file that can be imported, found SyntaxError"),
         ('SIMULATIONS = {"echo": Echo}', "", "expected a table SIMULATIONS"),
-        ('{"echo": Echo}', '{"turtle": Echo}', "expected a name of its own, found `turtle`, which is taken"),
+        ('{"echo": Echo}', '{"turtle": Echo}', "expected a new name, found `turtle`, which is taken"),
         ('{"echo": Echo}', '{"echo": Simulation}', "expected a dataclass, found another class"),
         ('{"echo": Echo}', '{"echo": dataclass}', "expected a class derived from grader.simulation.Simulation"),
         ("count: int = 1", "count: bytes = b''", "no rubric syntax for a parameter annotated"),

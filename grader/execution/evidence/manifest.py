@@ -94,7 +94,7 @@ def read(path: Path, most: int) -> bytes:
         with os.fdopen(descriptor, "rb") as file:
             status = os.fstat(descriptor)
             if not stat.S_ISREG(status.st_mode):
-                raise EvidenceError(f"{path}: expected a file, found something that is no plain one")
+                raise EvidenceError(f"{path}: expected a regular file, found something else")
             # one byte more than its size shows whether it grows; reading `most` bytes would allocate that much memory
             data = file.read(min(status.st_size, most) + 1)
     except OSError as error:

@@ -31,6 +31,7 @@ from grader.core.trace import (
     ServiceEnd,
     Start,
     Trace,
+    WrittenFile,
 )
 from grader.execution.codec import FORMAT, TAGS, trace_to_json
 
@@ -122,6 +123,9 @@ def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: An
 _START = _row_of(Start, "arguments", "launched_by", last=("given", tuple[str, str], ("", "")))
 
 
+_WRITTEN = _row_of(WrittenFile)
+
+
 def _start(row: Any) -> Start:
     *values, given = msgspec.structs.astuple(row)
     return Start(*values, *given)
@@ -141,6 +145,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("may_drift", bool, False),
         ("most_starved_ns", int, 0),
         ("left_out", tuple[str, ...], ()),
+        ("written", tuple[_WRITTEN, ...], ()),  # type: ignore[valid-type]
         ("author_mistake", AuthorMistake | None, None),
     ]
     return msgspec.defstruct("Trace", written)
@@ -162,6 +167,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         may_drift=row.may_drift,
         most_starved_ns=row.most_starved_ns,
         left_out=row.left_out,
+        written=tuple(_same(WrittenFile, file) for file in row.written),
         author_mistake=row.author_mistake,
     )
 

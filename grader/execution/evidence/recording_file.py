@@ -47,6 +47,8 @@ from grader.execution.evidence.packed import pack, unpack, unpack_exactly
 
 #: The attachment with everything that judging reads.
 TRACE = "trace.json.zst"
+#: The name of an attachment with a file that a program wrote begins so.
+WRITTEN = "written"
 #: Name of the metadata record about the run.
 FACTS = "grader"
 #: Version of rosbag2's metadata format in Jazzy.
@@ -285,6 +287,9 @@ def recording_bytes(
     for message in messages:
         channels.add(message)
     writer.add_attachment(0, 0, TRACE, "application/zstd", zstandard.compress(packed))
+    for file in trace.written:
+        name = f"{WRITTEN}/{file.process}/{file.name}"
+        writer.add_attachment(0, 0, name, "application/octet-stream", base64.b64decode(file.content))
     writer.add_metadata(FACTS, {key: _fact(value) for key, value in about.items()})
     information = _yaml(_information(messages, channels, name, json.loads(facts["environment"])["ros_distro"]))
     writer.add_metadata("rosbag2", {"serialized_metadata": information})

@@ -86,6 +86,11 @@ class Bubblewrap:
             can_forbid_userns=b"--disable-userns" in told.stdout + told.stderr,
         )
 
+    def submission_of(self, process: StudentProcess) -> str:
+        """Return where a process sees its submission; see `Isolation.submission_of`."""
+        del process
+        return self.submission_seen_at
+
     @property
     def name(self) -> str:
         """Short name that reports show."""
@@ -167,7 +172,7 @@ class Bubblewrap:
         accounts, account_fds = _account_files(*user)
         options = [
             *self._namespaces(TO_CHANGE_USER),
-            *("--clearenv", "--chdir", str(WORK), "--seccomp", str(filter_fd)),
+            *("--clearenv", "--chdir", str(_working(process)), "--seccomp", str(filter_fd)),
             *(word for setting in environment.items() for word in ("--setenv", *setting)),
             *self._files(process, limits, (*copies, *accounts)),
         ]
@@ -196,12 +201,12 @@ class Bubblewrap:
         argv = (str(self.bwrap), "--args", str(options_fd), "--", str(PLACEHOLDER))
         own = {"RLIMIT_NPROC": limits.processes, "RLIMIT_CPU": [limits.processor_s, 1]}
         restrictions = start_request(
-            str(WORK),
+            str(_working(process)),
             limits={**by_resource(limits), **own},
             user=list(user) if self.as_root else None,
             filter=seccomp.student_filter().hex(),
         )
-        environment = {**student_environment(process, HOME), "PWD": str(WORK)}  # bubblewrap sets it
+        environment = {**student_environment(process, HOME), "PWD": str(_working(process))}  # bubblewrap sets it
         placeholder = Placeholder(Command(argv, {}, opened, opened), status_read)
         return PreparedSandbox(restrictions, environment, placeholder)
 
@@ -257,7 +262,10 @@ class Bubblewrap:
             options += ["--symlink", target, str(where)]
         for folder in hidden:
             options += ["--size", "4096", "--tmpfs", str(folder), "--remount-ro", str(folder)]
-        options += ["--ro-bind", str(process.submission), str(SUBMISSION)]
+        if process.writable:
+            options += ["--perms", "0777", "--size", size, "--tmpfs", str(SUBMISSION)]
+        else:
+            options += ["--ro-bind", str(process.submission), str(SUBMISSION)]
         options += ["--ro-bind", str(process.host_folder), str(HOST)] if process.host_folder else []
         options += more
         # bubblewrap's /dev is a tmpfs without a size limit, which its owner could fill.
@@ -275,17 +283,23 @@ def _view(paths: tuple[Path, ...], python_paths: tuple[Path, ...]) -> tuple[View
 
 
 def _copies(process: StudentProcess) -> tuple[list[str], list[int]]:
-    """Return the options that copy files into the working directory, and the descriptors that they name."""
+    """Return the options that copy the files that a process may write to, and the descriptors that they name."""
+    place = SUBMISSION if process.writable else WORK
     options: list[str] = []
     opened: list[int] = []
     for folder in sorted(
         {parent for file in process.copied for parent in PurePosixPath(file).parents} - {PurePosixPath()}
     ):
-        options += ["--perms", "0777", "--dir", str(WORK / folder)]
+        options += ["--perms", "0777", "--dir", str(place / folder)]
     for file in process.copied:
         opened.append(os.open(process.beside / file, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC))
-        options += ["--perms", "0666", "--file", str(opened[-1]), str(WORK / file)]
+        options += ["--perms", "0666", "--file", str(opened[-1]), str(place / file)]
     return options, opened
+
+
+def _working(process: StudentProcess) -> Path:
+    """Return the working directory of a process, as it sees it."""
+    return WORK if process.working is None else SUBMISSION / process.working
 
 
 def _account_files(user: int, group: int, home: Path = HOME) -> tuple[list[str], list[int]]:

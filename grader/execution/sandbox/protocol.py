@@ -25,9 +25,14 @@ class StudentProcess:
     arguments: tuple[str, ...]
     environment: Mapping[str, str]  # variables beyond those of the sandbox and the runtime
     pass_fds: tuple[int, ...]  # descriptors that the process inherits besides 0, 1 and 2, with the same numbers
-    # The folder whose files the working directory holds copies of, and these files, relative to it
+    # The folder whose files the process gets copies of that it may write to, and these files, relative to it
     beside: Path = Path()
     copied: tuple[str, ...] = ()
+    # Whether the copies stand in for the submission; otherwise they are in the working directory
+    writable: bool = False
+    # The working directory, relative to a submission that may be written to; None for an empty folder of its own
+    working: str | None = None
+    own: str = ""  # part of the name of its own folder, in tiers without a view of files for each process
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +81,7 @@ class PreparedSandbox:
 def start_request(folder: str, **further: object) -> dict[str, object]:
     """Return the request of `start.prepare` that enters a folder, and puts further restrictions on the process."""
     nothing: dict[str, object] = {"made": False, "scratch": 0, "limits": {}, "user": None, "processes": 0}
-    nothing |= {"beside": "", "copied": ()}
+    nothing |= {"beside": "", "copied": (), "into": "work", "working": "work"}
     return {"folder": folder, **nothing, "confinement": None, "filter": "", **further}
 
 
@@ -116,6 +121,9 @@ class Isolation(Protocol):
     @property
     def submission_seen_at(self) -> str:
         """Absolute folder at which a student process sees its submission; empty if that is the real path."""
+
+    def submission_of(self, process: StudentProcess) -> str:
+        """Return the absolute folder at which a process sees its submission, or its own copy of it."""
 
     @property
     def host_seen_at(self) -> str:

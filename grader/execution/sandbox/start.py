@@ -2,12 +2,12 @@
 
 Usage: start.py JSON PROGRAM [ARGUMENT ...]. The object has `folder`, the working directory; `made`, whether to create
 it before the start and delete it after the end; `beside` and `copied`, a folder, and files in it that it gets copies of
-when it is created; `scratch`, its maximum size in bytes if it is created, 0 for unlimited;
-`limits`, by their names in `resource`; `user`, [user, group] to run as, or null; `processes`, how many processes and
-threads may be added to those that the user has already, 0 for unlimited; and `confinement`, null or an object of `read`
-and `devices`, paths that may be read, or also written; `hidden`, folders among them that may not be read; `tcp`,
-whether TCP is allowed; `reach`, whether the paths lead through folders that are closed to the user; `filter`, a seccomp
-program in hexadecimal.
+when it is created; `into` and `working`, folders in it: that of the copies, and the working directory; `scratch`, its
+maximum size in bytes if it is created, 0 for unlimited; `limits`, by their names in `resource`; `user`, [user, group]
+to run as, or null; `processes`, how many processes and threads may be added to those that the user has already, 0 for
+unlimited; and `confinement`, null or an object of `read` and `devices`, paths that may be read, or also written;
+`hidden`, folders among them that may not be read; `tcp`, whether TCP is allowed; `reach`, whether the paths lead
+through folders that are closed to the user; `filter`, a seccomp program in hexadecimal.
 
 It does not import grader, because it runs before grader can be found. For Landlock's calls and rights see Linux,
 Documentation/userspace-api/landlock.rst; for the filter Documentation/userspace-api/seccomp_filter.rst.
@@ -145,14 +145,15 @@ def enter_folder(request: dict[str, Any]) -> None:
     if not request["made"]:
         os.chdir(folder)
         return
-    for part in ("", "home", "home/log", "work"):
+    for part in dict.fromkeys(("", "home", "home/log", "work", request["into"])):
         os.mkdir(os.path.join(folder, part), mode=0o700)
         if request["user"]:
             os.chown(os.path.join(folder, part), *request["user"])
     clean_up_after_end(folder, request["scratch"])
-    os.chdir(os.path.join(folder, "work"))
+    os.chdir(os.path.join(folder, request["into"]))
     for file in request["copied"]:
         copy(os.path.join(request["beside"], file), file, request["user"])
+    os.chdir(os.path.join(folder, request["working"]))
 
 
 def copy(source: str, file: str, user: list[int] | None) -> None:

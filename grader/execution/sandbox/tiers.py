@@ -49,6 +49,8 @@ FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME = "bubblewrap-flat", "landlock", "none"
 ISOLATING = (ROOT_NAME, USER_NAME, FLAT_NAME, LANDLOCK_NAME)
 #: Where a submission is seen: where it lies, because the tiers in this module have no file view of their own.
 IN_PLACE = ""
+#: The copy of a submission in the folder of a process.
+COPY = "submission"
 #: A worker's own memory file system, which disappears with it.
 SCRATCH = Path("/dev/shm")  # noqa: S108
 HERE = Path(__file__).parent
@@ -96,6 +98,15 @@ class InPlace(ABC):
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
         """Return the restrictions of a student's process."""
 
+    def submission_of(self, process: StudentProcess) -> str:
+        """Return where a process sees its submission; see `Isolation.submission_of`."""
+        return seen_in_place(process, self.scratch)
+
+    @property
+    @abstractmethod
+    def scratch(self) -> Path:
+        """The folder in which processes have folders of their own."""
+
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student's process, from inside the worker."""
         sandbox = self.prepared_sandbox(process, limits)
@@ -115,6 +126,7 @@ class FlatBubblewrap(InPlace):
     shares_network: ClassVar[bool] = False
     submission_seen_at: ClassVar[str] = IN_PLACE
     host_seen_at: ClassVar[str] = str(HOST)
+    scratch: ClassVar[Path] = SCRATCH
     outer: Bubblewrap  # the bubblewrap around the worker
 
     @classmethod
@@ -145,6 +157,11 @@ class _OnSharedNetwork(InPlace):
     shares_network: ClassVar[bool] = True
     submission_seen_at: ClassVar[str] = IN_PLACE
     host_seen_at: ClassVar[str] = str(HOST)
+
+    @property
+    def scratch(self) -> Path:
+        """The folder in which processes have folders of their own."""
+        return Path(tempfile.gettempdir())
 
     def worker_command(
         self,
@@ -181,7 +198,7 @@ class Landlock(_OnSharedNetwork):
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
         """Return the restrictions of a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, LANDLOCK_NAME)
-        return confined(process, limits, Ground(Path(tempfile.gettempdir()), loopback=True, as_root=self.as_root))
+        return confined(process, limits, Ground(self.scratch, loopback=True, as_root=self.as_root))
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,8 +214,8 @@ class Plain(_OnSharedNetwork):
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
         """Return the limits of a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, PLAIN_NAME)
-        folder = Path(tempfile.gettempdir()) / f"grade-student-{secrets.token_hex(8)}"
-        environment = {**student_environment(process, folder / "home"), "PWD": str(folder / "work")}
+        folder = own_folder(self.scratch, process)
+        environment = environment_in(process, folder)
         environment |= loopback_only(environment)
         request = start_request(str(folder), made=True, limits=by_resource(limits), **copies(process))
         return PreparedSandbox(request, environment)
@@ -220,7 +237,24 @@ def start_command(request: Mapping[str, object]) -> tuple[str, ...]:
 
 def copies(process: StudentProcess) -> dict[str, object]:
     """Return what a request says about the files that the working directory gets copies of."""
-    return {"beside": str(process.beside), "copied": process.copied}
+    into = COPY if process.writable else "work"
+    working = "work" if process.working is None else f"{into}/{process.working}".rstrip("/")
+    return {"beside": str(process.beside), "copied": process.copied, "into": into, "working": working}
+
+
+def environment_in(process: StudentProcess, folder: Path) -> dict[str, str]:
+    """Return the environment of a process with a folder of its own."""
+    return {**student_environment(process, folder / "home"), "PWD": str(folder / str(copies(process)["working"]))}
+
+
+def own_folder(scratch: Path, process: StudentProcess) -> Path:
+    """Return the folder of a process, which is created when it starts."""
+    return scratch / f"grade-student-{process.own or secrets.token_hex(8)}"
+
+
+def seen_in_place(process: StudentProcess, scratch: Path) -> str:
+    """Return where a process sees its submission: its copy in its own folder, or where the submission lies."""
+    return str(own_folder(scratch, process) / COPY) if process.writable else str(process.submission)
 
 
 def loopback_only(environment: Mapping[str, str]) -> dict[str, str]:
@@ -252,8 +286,8 @@ def confined(process: StudentProcess, limits: Limits, ground: Ground) -> Prepare
     """
     if ground.as_root:
         make_readable(process.submission)
-    folder = ground.scratch / f"grade-student-{secrets.token_hex(8)}"
-    environment = {**student_environment(process, folder / "home"), "PWD": str(folder / "work")}
+    folder = own_folder(ground.scratch, process)
+    environment = environment_in(process, folder)
     environment |= loopback_only(environment) if ground.loopback else {}
     request = start_request(
         str(folder),
@@ -272,7 +306,11 @@ def confined(process: StudentProcess, limits: Limits, ground: Ground) -> Prepare
 def _confinement(process: StudentProcess, ground: Ground) -> dict[str, object]:
     bound = view_of((*process.runtime.read_paths, process.runtime.executable)).bound
     host = (process.host_folder,) if process.host_folder else ()
-    own = (process.submission, *host, *(HERE.glob("loopback*.xml") if ground.loopback else ()))
+    own = (
+        *(() if process.writable else (process.submission,)),
+        *host,
+        *(HERE.glob("loopback*.xml") if ground.loopback else ()),
+    )
     return {
         "read": [str(path) for path in (*bound, *own, *(() if ground.loopback else ACCOUNT_FILES))],
         "hidden": [str(path) for path in secrets_within(bound, process.runtime.python_paths)],

@@ -66,7 +66,7 @@ class Codec:
             return (self.decode if native else self.decode_swapped)(body, 0)[0]
         except (struct.error, IndexError) as error:
             name = self.message_class.__name__
-            raise MalformedMessageError(f"{len(body)} bytes are no message of type {name}: {error}") from None
+            raise MalformedMessageError(f"{len(body)} bytes are not a message of type {name}: {error}") from None
 
 
 _codecs: dict[Any, Codec] = {}

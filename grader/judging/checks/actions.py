@@ -106,7 +106,10 @@ class ActionResult:
         if wrong:
             return f"in its result {breach(result, wrong[0], self.result[wrong[0]])}", ""
         if self.within is not None and took > self.within + LATENESS_NS[trace.clock]:
-            return f"its result came after {seconds(took):.3f} s, expected within {number(seconds(self.within))} s", ""
+            return (
+                f"its result took {seconds(took):.3f} s, expected within {number(seconds(self.within))} s",
+                "",
+            )
         return "", ""
 
 
@@ -308,7 +311,7 @@ class LifecycleStates:
             silent = self._publishing(trace, changes, evidence)
             if silent is not None:
                 return silent
-        told = ", ".join(_state(c) for c in asked) or "none asked for"
+        told = ", ".join(_state(c) for c in asked) or "none requested"
         return met(f"{counted(len(changes), 'transition')} made; states: {told}", evidence)
 
     def drawing(self, trace: Trace) -> Drawing:
@@ -329,7 +332,7 @@ class LifecycleStates:
             lanes.add(self.topic)
             lanes.dots(self.topic, ((m.t_ns, "") for m in published(trace, self.topic)), Tone.MAIN)
         said = f"Transitions: {listed([_label(c) for c in changes], 8) or 'none'}; "
-        said += f"states: {listed([_state(c) for c in asked], 8) or 'none asked for'}."
+        said += f"states: {listed([_state(c) for c in asked], 8) or 'none requested'}."
         cases = [Case(seconds(a), seconds(b), "active", Tone.GOOD) for a, b in _active(changes, trace.stop_ns)]
         panels = ((lanes.panel(self.node or "the node"), said),)
         return Drawing(panels=panels, cases=tuple(cases), title="Transitions and states")
@@ -349,7 +352,7 @@ class LifecycleStates:
         if not self.states:
             return None
         if len(asked) < len(self.states):
-            asked_said = f"the state was asked for {len(asked)} times, expected {len(self.states)}"
+            asked_said = f"the state was requested {len(asked)} times, expected {len(self.states)}"
             if crashed := explain_fault(trace, asked_said, evidence, last=True):
                 return crashed
             raise HarnessError(asked_said)
@@ -381,7 +384,7 @@ class LifecycleStates:
         return not_met(reason, evidence, problem=ProblemKind.SILENT)
 
     def _never_asked(self, trace: Trace) -> Finding:
-        if crashed := explain_fault(trace, "no transition could be asked for"):
+        if crashed := explain_fault(trace, "no transition could be requested"):
             return crashed
         nodes = list(dict.fromkeys(n for graph in trace.graphs() for n in graph.nodes))
         if self.node is not None and self.node not in nodes:
@@ -389,7 +392,7 @@ class LifecycleStates:
             return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=problem)
         if any(e.service.endswith("/change_state") for e in trace.service_ends("service")):
             raise HarnessError("the recording asks for no transition and no state")
-        reason = "no node of the program can be asked for a transition: none has a lifecycle"
+        reason = "no node of the program has a lifecycle, so no transition can be requested"
         return not_met(reason, hint="derive it from rclpy.lifecycle.Node", problem=ProblemKind.ABSENT)
 
 
@@ -409,7 +412,7 @@ def _succeeded(call: Call) -> bool:
 
 def _state(call: Call) -> str:
     told = {} if call.response is None else call.response.value
-    return str(value_at(told, "current_state.label", "not told"))
+    return str(value_at(told, "current_state.label", "unknown"))
 
 
 def _active(changes: Sequence[Call], stop_ns: int) -> list[tuple[int, int]]:

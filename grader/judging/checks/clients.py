@@ -210,15 +210,15 @@ class WaitsForService:
         bad = [r for r in records if r.severity in ("ERROR", "FATAL")]
         if not bad:
             return None
-        return complained(self.process, bad, f" {when}", {}, "waiting is no error: say it with info or warn")
+        return complained(self.process, bad, f" {when}", {}, "waiting is not an error: log it with info or warn")
 
     def _never_asked(self, trace: Trace, appears_ns: int, asked: Sequence[int]) -> Finding:
         there = f"{self.service} appeared at {moment(appears_ns)}"
-        if crashed := explain_fault(trace, f"{there}, no request came", process=self.process):
+        if crashed := explain_fault(trace, f"{there}, no request was sent", process=self.process):
             return crashed
         if not trace.requests(self.service, "student") and not trace.service_ends("client", self.service):
             return waiting_for("service_calls", explain_no_client(trace, self.service))
-        when = f"the first request came at {moment(asked[0])}" if asked else "no request came"
+        when = f"the first request was sent at {moment(asked[0])}" if asked else "no request was sent"
         if not asked and trace.stop_ns - appears_ns <= self.within:
             raise HarnessError(f"{self.service}: the recording ends too soon after the server appeared")
         reason = f"{there}, {when}, expected one within {span(self.within)}"
@@ -289,7 +289,7 @@ class ReactsToResponses:
         limit = number(self.threshold)
         goes, warns = f"goes on above {limit}", f"logs a warning at or below {limit}"
         text = {"above": goes, "at_or_below": warns, "both": f"{goes} and {warns}"}[self.side]
-        return f"{self.process} {text}; printing alone is half of it"
+        return f"{self.process} {text}; half the points if only printed"
 
     def judge(self, trace: Trace) -> Finding:
         episodes = _episodes(self, trace)
@@ -330,7 +330,7 @@ class ReactsToResponses:
             return f"{warned[0].severity} at {moment(warned[0].t_ns)}: {quote(warned[0].text, 80)}"
         if not episode.outputs:
             return "nothing is written"
-        return "nothing is written but what follows low numbers too" if words.telling(episode) == [] else ""
+        return "only text that also follows low numbers" if words.telling(episode) == [] else ""
 
     def _unshown(self, mine: Sequence[Episode], words: Words, evidence: dict[str, object]) -> Finding | None:
         """Return a finding if warnings do not show that a mission is aborted, because none is ever seen to start."""
@@ -338,8 +338,8 @@ class ReactsToResponses:
         if low is None or words.only_good is None or words.only_good:
             return None
         reason = f"{self.process}: it warns after {number(low.number or 0.0)}, but {_nothing_of_its_own(self, words)}, "
-        reason += "so it does not show that it aborts"
-        hint = "say that it goes on in the branch for numbers above the limit, and only there"
+        reason += "so nothing shows that it aborts"
+        hint = "log that it goes on, in the branch for numbers above the limit only"
         return not_met(reason, evidence, hint=hint, blocked_by="reacts_to_responses", problem=ProblemKind.WRONG_ANSWER)
 
     def _right(self, trace: Trace, mine: Sequence[Episode], words: Words, evidence: dict[str, object]) -> Finding:
@@ -369,14 +369,12 @@ class ReactsToResponses:
 
     def _explain(self, trace: Trace, wrong: Sequence[tuple[Episode, str]], evidence: dict[str, object]) -> Finding:
         episode, flaw = wrong[0]
-        rule = "goes on" if episode.kind is CallKind.GOOD else "warns"
+        rule = "go on" if episode.kind is CallKind.GOOD else "log a warning"
         if episode.kind is CallKind.LOW and complaints(episode.outputs):
-            rule = "starts nothing"
+            rule = "start nothing"
         side = "above" if episode.kind is CallKind.GOOD else "at or below"
-        reason = (
-            f"{moment(episode.start_ns)}, {self.process}: {flaw} after {number(episode.number or 0.0)}, expected that "
-        )
-        reason += f"it {rule}, as for every number {side} {number(self.threshold)}"
+        reason = f"{moment(episode.start_ns)}, {self.process}: {flaw} after {number(episode.number or 0.0)}; expected "
+        reason += f"it to {rule}, as after every number {side} {number(self.threshold)}"
         fault = first_fault(trace, self.process)
         if fault is not None and episode.start_ns <= fault.t_ns <= episode.stop_ns:
             return faulted(fault, reason, evidence, last=True)
@@ -443,7 +441,7 @@ class NoGoWithoutAnswer:
             found = [o for o in going.outputs(episode) if not self._due(o, episode, episodes, going)]
             if found:
                 return self._went_on(episode, found[0], evidence)
-        reason = f"{self.process}: keeps still after {counted(len(useless), 'useless answer')}"
+        reason = f"{self.process}: does not go on after {counted(len(useless), 'useless answer')}"
         reason += f" ({', '.join(dict.fromkeys(_SAID[e.kind] for e in useless))})"
         fault = first_fault(trace, self.process)
         if fault is not None and fault.t_ns >= useless[0].asked_ns:
@@ -462,15 +460,15 @@ class NoGoWithoutAnswer:
         return not any(text_of(o) in going.texts for o in before.sure)
 
     def _unshown(self, episode: Episode, words: Words, evidence: dict[str, object]) -> Finding:
-        reason = f"{self.process}: {_nothing_of_its_own(self, words)}, so it does not show that it keeps still after "
+        reason = f"{self.process}: {_nothing_of_its_own(self, words)}, so nothing shows that it does not go on after "
         reason += _SAID[episode.kind]
-        hint = "say that it goes on in the branch for numbers above the limit, and only there"
+        hint = "log that it goes on, in the branch for numbers above the limit only"
         return not_met(reason, evidence, hint=hint, blocked_by="reacts_to_responses", problem=ProblemKind.WRONG_ANSWER)
 
     def _went_on(self, episode: Episode, found: Output, evidence: dict[str, object]) -> Finding:
         what = _SAID[episode.kind]
         reason = f"{moment(found.t_ns)}, {self.process}: {quote(found.text, 80)!r} after {what} "
-        reason += f"(request {episode.place}), as when it goes on; expected that it does not"
+        reason += f"(request {episode.place}), the same text as when it goes on; expected it not to go on"
         hint = "go on only if there is a response, response.success is true and its number could be read"
         return not_met(reason, evidence | {"first_wrong_s": seconds(found.t_ns)}, hint=hint)
 
@@ -514,18 +512,18 @@ def _episodes_drawing(check: ReactsToResponses | NoGoWithoutAnswer, trace: Trace
     dots = tuple(series(name, some, look=Look.DOTS, tone=tone) for (name, tone), some in points.items())
     numbers_ = Panel(f"number in {check.field}", "", dots, levels=(level,))
     said = f"{counted(len(episodes), 'request')} on {check.service}, {counted(len(told), 'response')}."
-    title = f"What came from {check.service} and what {check.process} wrote"
+    title = f"Responses of {check.service} and output of {check.process}"
     panels = ((numbers_, ""), (lanes.panel(check.service), said))
     return Drawing(panels=panels, processes=(check.process,), cases=tuple(cases), title=title)
 
 
 def _nothing_of_its_own(check: ReactsToResponses | NoGoWithoutAnswer, words: Words) -> str:
     """Return a clause: a client writes nothing that only follows numbers above the threshold."""
-    text = f"it writes nothing after numbers above {number(check.threshold)} that it does not write after others too"
+    text = f"it writes the same after numbers above {number(check.threshold)} as after others"
     if words.shared is None:
         return text
     output, value = words.shared
-    return f"{text} ({quote(output.text, 80)!r} follows {number(value)})"
+    return f"{text} ({quote(output.text, 80)!r} also follows {number(value)})"
 
 
 def _lines(outputs: Sequence[Output], known: set[str]) -> list[OutputLine]:
@@ -546,16 +544,16 @@ def _not_reached(trace: Trace, process: str, service: str, episodes: Sequence[Ep
     """
     last = episodes[-1]
     asked = f"{service}: {process} asked {counted(len(episodes), 'time')}"
-    if crashed := explain_fault(trace, f"{asked} and did not get to the answer in question", process=process):
+    if crashed := explain_fault(trace, f"{asked} and got no answer of the kind that is judged here", process=process):
         return crashed
     ended = trace.marks("exited", process)
     stopped = trace.stop_ns - last.start_ns > _ASKS_AGAIN_NS
     if ended or stopped or last.kind is CallKind.UNANSWERED:
-        why = "waits for a response that never comes" if last.kind is CallKind.UNANSWERED else "then asked no more"
+        why = "waits for a response that is never sent" if last.kind is CallKind.UNANSWERED else "then stopped asking"
         why = f"ended at {moment(ended[0].t_ns)}" if ended else why
         return not_met(
-            f"{asked} and {why}; the answer in question never came",
+            f"{asked} and {why}; it got no answer of the kind that is judged here",
             blocked_by="service_calls",
             problem=ProblemKind.ENDED if ended else ProblemKind.STOPPED,
         )
-    raise HarnessError(f"{service}: no answer of the kind in question was sent")
+    raise HarnessError(f"{service}: no answer of the kind that is judged here was sent")

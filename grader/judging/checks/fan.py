@@ -182,7 +182,7 @@ class ThresholdResponse:
         lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
         if lag is not None:
             reason += f"; the answers are right for what was published {span(lag)} before"
-            hint = f"answer what has just come on {self.input}"
+            hint = f"answer the newest message on {self.input}"
             known = evidence | {"lag_s": seconds(lag)}
             return not_met(reason, known, hint=hint, problem=ProblemKind.BEHIND, brief=brief)
         cause, hint = self._diagnosis(violations, inputs, answers)

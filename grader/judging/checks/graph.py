@@ -68,7 +68,7 @@ class BidirectionalGraph:
             )
             return not_met(reason, evidence, problem=Problem(ProblemKind.NO_EDGE, (self.forward, self.back)))
         gaps = [_gap(topic, endpoints) for topic in broken]
-        reason = "; ".join(said for said, _ in gaps) + ("; only one direction" if len(broken) == 1 else "")
+        reason = "; ".join(said for said, _ in gaps) + ("; connected in one direction only" if len(broken) == 1 else "")
         return not_met(reason, evidence, hint=gaps[0][1], problem=Problem(ProblemKind.NO_EDGE, tuple(broken)))
 
 

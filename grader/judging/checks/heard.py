@@ -59,7 +59,7 @@ class LogsTexts:
 
     @property
     def expected(self) -> str:
-        return f"{self.process} logs the text of each message on {self.topic}; printing alone is half of it"
+        return f"{self.process} logs the text of each message on {self.topic}; half the points if only printed"
 
     def judge(self, trace: Trace) -> Finding:
         if not student_endpoints(trace, "subscription", self.topic) and first_fault(trace, self.process) is None:
@@ -92,7 +92,7 @@ class LogsResponse:
 
     @property
     def expected(self) -> str:
-        return f"{self.process} logs {self.field} of each response of {self.service}; printing alone is half of it"
+        return f"{self.process} logs {self.field} of each response of {self.service}; half the points if only printed"
 
     def judge(self, trace: Trace) -> Finding:
         calls = calls_of(trace, self.service, "student")
@@ -100,7 +100,7 @@ class LogsResponse:
             return explain_no_client(trace, self.service)
         responses = [c.response for c in calls if c.response is not None]
         heard = [_Heard(r.t_ns, value_at(r.value, self.field)) for r in responses]
-        hint = f"log response.{self.field} once the response has come"
+        hint = f"log response.{self.field} once the response has arrived"
         return _judged(trace, self.process, heard, self.within, _Source(self.service, "response", hint))
 
 
@@ -125,7 +125,7 @@ def _judged(trace: Trace, process: str, heard: Sequence[_Heard], within_ns: int,
     if not due:
         if crashed := explain_fault(trace, "nothing was logged after it", process=process):
             return crashed
-        raise HarnessError(f"{source.name}: no {source.word} came, or too late to be logged")
+        raise HarnessError(f"{source.name}: no {source.word} was sent, or only too late to be logged")
 
     def near(outputs: Sequence[Output], one: _Heard) -> list[Output]:
         return in_window(outputs, one.t_ns - jitter_ns, one.t_ns + late_ns)

@@ -69,7 +69,7 @@ class UsesLogger:
 
     @property
     def expected(self) -> str:
-        return f"a record of {self.process} through its logger; printing alone is half of it"
+        return f"a record of {self.process} through its logger; half if only printed"
 
     def judge(self, trace: Trace) -> Finding:
         records = student_records(trace, self.process)
@@ -249,9 +249,7 @@ class LogsEvery:
 
     @property
     def expected(self) -> str:
-        return (
-            f"one log of {self.process} for every {self.every} messages on {self.topic}; printing alone is half of it"
-        )
+        return f"one log of {self.process} for every {self.every} messages on {self.topic}; half if only printed"
 
     def judge(self, trace: Trace) -> Finding:
         messages = published(trace, self.topic)
@@ -283,7 +281,7 @@ class LogsEvery:
         if found and len(found[0].places) > 1:
             pairs = [(seconds(messages[b].t_ns), float(b - a)) for a, b in pairwise(found[0].places)]
             level = Level(self.every, f"{self.every} messages")
-            dots = series("messages since the log before", pairs, look=Look.DOTS, tone=Tone.SECOND)
+            dots = series("messages since the previous log", pairs, look=Look.DOTS, tone=Tone.SECOND)
             said = f"{counted(len(found[0].places), 'log')}, one for {number(found[0].average)} messages on average."
             panels.append((Panel("from log to log", "messages", (dots,), levels=(level,)), said))
         return Drawing((Plot(self.topic, (self.field,)),), panels=tuple(panels), processes=(self.process,))

@@ -74,7 +74,7 @@ class LogsPosition:
 
     @property
     def expected(self) -> str:
-        return f"{self.process} logs the x and y that {self.topic} had at that moment; printing alone is half of it"
+        return f"{self.process} logs the x and y that {self.topic} had at that moment; half the points if only printed"
 
     def judge(self, trace: Trace) -> Finding:
         track = _track(trace, self.process, self.topic)
@@ -292,7 +292,7 @@ class WaitsGracefully:
         if bad:
             more = {"first_s": seconds(bad[0].t_ns), "first": quote(bad[0].text)}
             return complained(
-                self.process, bad, "", more, "waiting for data is no error: say nothing, or use info or warn"
+                self.process, bad, "", more, "waiting for data is not an error: log nothing, or use info or warn"
             )
         deliveries = trace.deliveries(self.topic)
         if not deliveries or deliveries[0].t_ns < self.silence:
@@ -304,10 +304,10 @@ class WaitsGracefully:
     def _faulted(self, trace: Trace, fault: Fault) -> Finding:
         deliveries = trace.deliveries(self.topic)
         early = not deliveries or fault.t_ns < deliveries[0].t_ns
-        when = f"while nothing was published on {self.topic}" if early else f"after messages came on {self.topic}"
+        when = f"while nothing was published on {self.topic}" if early else f"after messages arrived on {self.topic}"
         hint = fault_hint(fault)
         if fault.said("NoneType"):
-            hint = "start with None and return early as long as no message has come"
+            hint = "start with None and return early until a message has arrived"
         return not_met(f"{fault_sentence(fault)}, {when}", {"fault_s": seconds(fault.t_ns)}, hint=hint, fault=fault)
 
     def drawing(self, trace: Trace) -> Drawing:

@@ -99,11 +99,11 @@ def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Fi
     Raises:
         HarnessError: The node was there, but nobody asked it.
     """
-    if crashed := explain_fault(trace, f"the parameter {name} could not be asked for"):
+    if crashed := explain_fault(trace, f"the parameter {name} could not be read"):
         return crashed
     nodes = list(dict.fromkeys(n for graph in trace.graphs() for n in graph.nodes))
     if node is not None and node not in nodes:
-        reason = f"{node}: not in the ROS graph, so it was not asked for {name}; found {listed(nodes) or 'no node'}"
+        reason = f"{node}: not in the ROS graph, so {name} could not be read; found {listed(nodes) or 'no node'}"
         return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=ProblemKind.OTHER_NAME)
     if asked:
         who = node or "the node"
@@ -213,7 +213,7 @@ class ParameterTakesEffect:
             rate = None if self.effect == "field" else self._rate(one)
             # A recording that is full of messages ends early.
             if rate is None or len(at_once) <= _FLOOD + 2 * rate * seconds(self.within):
-                raise HarnessError(f"{self.name}: the next value, or the end, comes before the effect has to show")
+                raise HarnessError(f"{self.name}: the next value, or the end, is due before the effect has to show")
             took_s = seconds(stop_ns - one.t_ns)
             return f"{len(at_once)} messages on {self.topic} within {took_s:.3f} s, expected {number(rate)} Hz", hint
         after = [m for m in messages if start_ns <= m.t_ns < stop_ns]
@@ -225,7 +225,7 @@ class ParameterTakesEffect:
         """Return the rate that a value asks for, in hertz."""
         wanted = as_number(one.value)
         if wanted is None or not wanted > 0:
-            raise HarnessError(f"{self.name}: {shown(one.value)} is no rate and no period")
+            raise HarnessError(f"{self.name}: {shown(one.value)} is neither a rate nor a period")
         return wanted if self.effect == "rate" else 1 / wanted
 
     def _field_flaw(self, one: ParameterSetting, after: Sequence[Message]) -> str:
@@ -320,7 +320,7 @@ class CleanShutdown:
             if ended:
                 reason = f"{self.process} ended by itself at {moment(ended[0].t_ns)}, before it was stopped"
                 return not_met(reason, problem=ProblemKind.ENDED)
-            raise HarnessError(f"{self.process}: the scenario has no `shutdown`, so nobody stopped it")
+            raise HarnessError(f"{self.process}: the scenario has no `shutdown`, so it was not stopped")
         asked_ns = signals[0].t_ns
         stopped = [m for m in trace.marks("stopped", self.process) if m.t_ns >= asked_ns]
         after = [f for f in faults if f.t_ns >= asked_ns]

@@ -46,10 +46,9 @@ class _Measured:
         return 2 * usual >= len(self.times_ns) - 1
 
     def sentence(self) -> str:
-        return (
-            f"average rate: {self.rate_hz:.3f} Hz, min: {self.min_s:.3f} s, max: {self.max_s:.3f} s, "
-            f"std dev: {self.std_dev_s:.5f} s, window: {len(self.times_ns)}"
-        )
+        least, most = f"{self.min_s:.3f}", f"{self.max_s:.3f}"
+        apart = least if least == most else f"{least} to {most}"
+        return f"{self.rate_hz:.3f} Hz on average, {len(self.times_ns)} messages {apart} s apart"
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,13 +167,13 @@ class TopicRate:
             return not_met(reason, evidence, hint=hint, fault=fault, problem=problem, brief=brief)
         length = found.stop_ns - first
         if self.window is not None and length < self.window - self._period_ns - _END_SLACK_NS[trace.clock]:
-            observed = f"only {span(length)} could be observed, the first message came at {moment(first)}"
+            observed = f"only {span(length)} could be observed, the first message was published at {moment(first)}"
             fault = first_fault(trace)
             observed += f"; {fault_sentence(fault)}" if fault else ""
             off = fault is None and not within(found.rate_hz, self.rate, self.tolerance)
             hint = self._hint(found.rate_hz) if off else ""
             reason, problem = f"{seen}; {observed}; {self._wanted}", ProblemKind.TOO_LATE
-            brief = "" if fault else f"{self.topic}: the first message came at {moment(first)}"
+            brief = "" if fault else f"{self.topic}: the first message was published at {moment(first)}"
             return not_met(reason, evidence, hint=hint, fault=fault, problem=problem, brief=brief)
         return None
 
@@ -205,7 +204,7 @@ class TopicRate:
         if len(times) < 2 or times[0] == times[-1]:
             return None
         inside = [t for t in times if self.window is None or t < times[0] + self.window]
-        title, panels = f"How often {self.topic} came", (_rate_panel(self, times), _interval_panel(self, times))
+        title, panels = f"Rate of {self.topic}", (_rate_panel(self, times), _interval_panel(self, times))
         return time_chart(trace, f"rate {self.topic}", title, _describe_rate(self, inside), *panels)
 
 

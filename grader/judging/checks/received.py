@@ -102,7 +102,7 @@ class LogsValues:
     @property
     def expected(self) -> str:
         products = " and ".join(map(times, self.unit_factors))
-        return f"{self.process} logs {products} for each message on {self.topic}; printing alone is half of it"
+        return f"{self.process} logs {products} for each message on {self.topic}; half the points if only printed"
 
     def judge(self, trace: Trace) -> Finding:
         fault = first_fault(trace, self.process)
@@ -151,7 +151,7 @@ class LogsValues:
                 first = received[0]
                 found = quote(" / ".join(o.text for o in in_window(outputs, first.t_ns, first.stop_ns)), 80)
                 numbers_ = f"{number(mine * first.value)} and {number(other * first.value)}"
-                return f"{self.process}: {numbers_} have each other's units, as in {found!r}; so at every message"
+                return f"{self.process}: the units of {numbers_} are swapped at every message, as in {found!r}"
         return ""
 
     def _named(self, one: _Received, outputs: Sequence[Output], factor: float, unit: float) -> bool:
@@ -168,7 +168,7 @@ class LogsValues:
         received = self._received(trace)
         records, lines = student_records(trace, self.process), printed_lines(trace, self.process)
         panels = [self._logged_panel(received, factor, records, lines) for factor in self.unit_factors[:4]]
-        title = f"What came on {self.topic} and what {self.process} logged"
+        title = f"Messages on {self.topic} and what {self.process} logged"
         return Drawing((Plot(self.topic, (self.field,)),), panels=tuple(panels), processes=(self.process,), title=title)
 
     def _logged_panel(
@@ -274,10 +274,8 @@ class LogsValues:
         wanted = " and ".join(number(f * first.value) for f in self.unit_factors)
         found = in_window(outputs, first.t_ns, first.stop_ns)
         wrote = f"found {quote(' / '.join(o.text for o in found), 80)}" if found else "found no log"
-        reason = (
-            f"{self.process}: {len(unlogged)} of {counted(len(received), 'message')} of {self.topic} are not logged "
-        )
-        reason += f"rightly, the first at {moment(first.t_ns)}: expected {wanted}, {wrote}"
+        reason = f"{self.process}: {len(unlogged)} of {counted(len(received), 'message')} of {self.topic} are not "
+        reason += f"logged correctly, the first at {moment(first.t_ns)}: expected {wanted}, {wrote}"
         cause, hint = self._cause(received, unlogged, outputs)
         problem = ProblemKind.WRONG_VALUE if found else ProblemKind.NOT_LOGGED
         brief = f"{self.topic}: expected a log of {wanted}, {wrote}"
@@ -294,7 +292,7 @@ class LogsValues:
             return f"nothing is logged at {len(silent)} of the messages", rule
         logged = [LoggedNumbers(r.value, self._numbers(r, outputs)) for r in received]
         if any(self._behind(logged, f) for f in self.unit_factors):
-            return "each log has the number of the message before", "store the number before you log it, not after"
+            return "each log has the number of the previous message", "store the number before you log it, not after"
         largest = max(abs(r.value) for r in received)
         right = [f for f in self.unit_factors if self._mostly(logged, f, _FINE * abs(f) * largest)]
         for factor in (f for f in self.unit_factors if f not in right):
@@ -352,7 +350,7 @@ class LogsReceived:
 
     @property
     def expected(self) -> str:
-        return f"{self.process} logs every value that it receives on {self.topic}; printing alone is half of it"
+        return f"{self.process} logs every value that it receives on {self.topic}; half the points if only printed"
 
     def judge(self, trace: Trace) -> Finding:
         fault = first_fault(trace, self.process)
@@ -415,8 +413,8 @@ class LogsReceived:
             return ""
         t_ns, old, new = changes[0]
         return (
-            f"{self.process}: it logs at each message on {self.topic}, but the number of the message before: "
-            f"{number(old)} at {moment(t_ns)}, when {number(new)} came"
+            f"{self.process}: it logs at each message on {self.topic}, but the number of the previous one: "
+            f"{number(old)} at {moment(t_ns)}, when {number(new)} was received"
         )
 
     def _no_values(self, trace: Trace, subscriptions: Sequence[Endpoint]) -> Finding:
@@ -467,8 +465,8 @@ def _hidden(
 ) -> Finding:
     """Return no credit for numbers that appear among others; `first` is the first of them and its time."""
     value, t_ns = first
-    reason = f"{check.process}: {share} of {check.topic} are not told from other numbers, the first is {number(value)} "
-    hint = f"log the number that came on {check.topic}, and none that it might have been"
+    reason = f"{check.process}: {share} of {check.topic} are lost among other numbers, the first is {number(value)} "
+    hint = f"log the number received on {check.topic}, and no others"
     return not_met(f"{reason}at {moment(t_ns)}: {among}", evidence, hint=hint, problem=ProblemKind.AMONG_OTHERS)
 
 

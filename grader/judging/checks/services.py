@@ -92,9 +92,9 @@ class ServiceAnswersAll:
         first = unanswered[0]
         took = "no response"
         if first.response is not None:
-            took = f"the response came after {seconds(first.response.t_ns - first.request.t_ns):.3f} s"
+            took = f"the response took {seconds(first.response.t_ns - first.request.t_ns):.3f} s"
         reason = f"{moment(first.request.t_ns)}, {self.service}: {took}, expected one within {span(self.within)}; "
-        reason += f"so for {len(unanswered)} of {counted(len(calls), 'request')}"
+        reason += f"late or unanswered: {len(unanswered)} of {counted(len(calls), 'request')}"
         known = dict(evidence) | {"first_unanswered_s": seconds(first.request.t_ns)}
         hint = "" if any(c.response for c in calls) else _RETURN_HINT
         problem = ProblemKind.NO_ANSWER if first.response is None else ProblemKind.TOO_LATE
@@ -291,7 +291,7 @@ class ServiceSequence(FewSuffice):
         text = (
             f"{self.field} of {self.service} tells {number(self.first)} first, then {number(self.step)} more each time"
         )
-        again = "" if self.reset_to is None else f"; {number(self.reset_to)} instead of what lies beyond"
+        again = "" if self.reset_to is None else f"; {number(self.reset_to)} instead of a number beyond it"
         return text + (f", not beyond {number(self.floor)}{again}" if self.floor is not None else "")
 
     def judge(self, trace: Trace) -> Finding:
@@ -393,13 +393,16 @@ class ServiceSequence(FewSuffice):
         if not within(usual, self.step, self.tolerance):
             return f"it changes by {number(usual)} with each call, expected {number(self.step)}", ""
         if within(values[0], self.first - self.step, self.tolerance):
-            return "the steps are right, but the number before the step is told", "change the number first, then answer"
+            return (
+                "the steps are right, but each response has the old number",
+                "change the number first, then answer",
+            )
         return (f"the steps are right, but the first number is {number(values[0])}", "") if place == 0 else ("", "")
 
     def _repeats(self, values: Sequence[float]) -> tuple[str, str]:
         again = [a == b for a, b in pairwise(values)]
         if sum(again) >= 0.4 * len(again):
-            return f"numbers come more than once ({numbers(values[:4])}, ...)", _KEEP_HINT
+            return f"numbers are repeated ({numbers(values[:4])}, ...)", _KEEP_HINT
         return "", ""
 
 
@@ -418,6 +421,6 @@ def _answers_drawing(check: ServiceFunction | ServiceSequence, answers: Sequence
         some = [(seconds(a.response.t_ns), got) for a, got in read if within(got, a.wanted, check.tolerance) is right]
         rows += [series(name, some, look=Look.DOTS, tone=tone)] if some else []
         wrong += 0 if right else len(some)
-    said = f"Numbers told: {listed([number(got) for _, got in read], 6)}; {wrong} of {len(answers)} wrong."
+    said = f"Numbers in the responses: {listed([number(got) for _, got in read], 6)}; {wrong} of {len(answers)} wrong."
     panel = Panel(f"{check.field} of the response", "", tuple(rows))
     return Drawing(services=(check.service,), panels=((panel, said),))

@@ -125,7 +125,7 @@ class Period:
         gaps = [seconds(b - a) for a, b in pairwise(times)]
         said = f"{counted(len(times), 'message')}, {min(gaps):.3f} s to {max(gaps):.3f} s apart."
         panel = gaps_panel("message", times, bands=bands, levels=levels)
-        return Drawing(panels=((panel, said),), title=f"How often {self.topic} came")
+        return Drawing(panels=((panel, said),), title=f"Intervals on {self.topic}")
 
     def _wrong(self, trace: Trace, gaps: Sequence[tuple[int, int]]) -> tuple[int, int] | None:
         jitter = JITTER_NS[trace.clock]
@@ -246,7 +246,7 @@ class Silence:
         start_ns, stop_ns = self._window(trace)
         if start_ns is None or stop_ns is None:
             if fault is not None:
-                return faulted(fault, "it came to no silence")
+                return faulted(fault, "the window of silence was never reached")
             raise HarnessError(f"{self.topic}: the recording has no moment {self.after or self.before}")
         if stop_ns <= start_ns and fault is None:
             raise HarnessError(f"{self.topic}: the window of silence has no length")
@@ -257,7 +257,7 @@ class Silence:
             reason = f"{self.topic}: {counted(len(found), 'message')} {window}, the first at {moment(found[0])}"
             return not_met(f"{reason}; expected none", evidence | {"first_s": seconds(found[0])})
         if fault is not None and fault.t_ns < stop_ns:
-            return faulted(fault, f"its silence {window} is no merit", evidence)
+            return faulted(fault, f"the silence {window} does not count", evidence)
         return met(f"{self.topic}: no message {window}", evidence)
 
     def _window(self, trace: Trace) -> tuple[int, int] | tuple[None, None]:
@@ -295,7 +295,7 @@ def _ms(duration_ns: int) -> str:
 
 
 def _no_input(trace: Trace, topic: str) -> Finding:
-    if crashed := explain_fault(trace, f"nothing had come on {topic} by then"):
+    if crashed := explain_fault(trace, f"nothing had been published on {topic} by then"):
         return crashed
     if trace.deliveries(topic) or published(trace, topic):
         raise HarnessError(f"{topic}: no input was published early enough in {span(trace.stop_ns)}")
@@ -444,7 +444,7 @@ class Reaction:
     def _wrong(self, trace: Trace, asked: _Asked) -> str:
         """Describe what is wrong with the outputs after an input; empty if nothing is."""
         if asked.case.silent:
-            return f"{moment(asked.outputs[0].t_ns)}: a message came, expected none" if asked.outputs else ""
+            return f"{moment(asked.outputs[0].t_ns)}: a message was published, expected none" if asked.outputs else ""
         rules = asked.case.rules(asked.given.value)
         fits = [not broken_rules(o.value, rules, self.tolerance) for o in asked.outputs]
         due_ns = asked.given.t_ns + self.within + JITTER_NS[trace.clock]
@@ -458,7 +458,7 @@ class Reaction:
         late = next((o for o, fit in zip(asked.outputs, fits, strict=True) if fit), None)
         if late is not None:
             took = seconds(late.t_ns - asked.given.t_ns)
-            return f"the right message came after {took:.3f} s, expected within {span(self.within)}"
+            return f"the right message was published after {took:.3f} s, expected within {span(self.within)}"
         if not asked.outputs:
             return f"no message within {span(self.within)}, expected {rules_text(rules)}"
         return self._difference(asked.outputs[-1], rules)
@@ -488,7 +488,7 @@ class Reaction:
 
     def _untried(self, trace: Trace, missing: Sequence[ReactionCase]) -> Finding:
         case = rules_text(missing[0].when)
-        if crashed := explain_fault(trace, f"{self.input} with {case} did not come before"):
+        if crashed := explain_fault(trace, f"{self.input} with {case} was not published before"):
             return crashed
         if not trace.deliveries(self.input):
             return waiting_for("publishes", explain_no_message(trace, self.input))

@@ -169,8 +169,8 @@ class AnswersTogether:
         behind = steps_behind(inputs, answers, lambda got, value: within(got, self._expected(value), EXACT))
         if not behind:
             return not_met(reason, evidence, problem=self._wrong)
-        reason += f"; the answers are right for what came {counted(behind, 'message')} before"
-        hint = f"answer what has just come on {self.input}"
+        reason += f"; the answers fit the input of {counted(behind, 'message')} earlier"
+        hint = f"answer the newest message on {self.input}"
         return not_met(reason, {**evidence, "behind": behind}, hint=hint, problem=self._wrong)
 
     def _inconsistent(
@@ -309,10 +309,10 @@ def _kept_apart(trace: Trace, topic: str) -> Finding | None:
     if not alike or policy is None:
         text = f"{one} publishes {quote(here.type)}, {other} subscribes {quote(there.type)}"
         hint = f"use the same message type for {topic} in both files"
-        return not_met(f"{topic}: {text}: they cannot talk", evidence, hint=hint, problem=problem)
+        return not_met(f"{topic}: {text}, so no message arrives", evidence, hint=hint, problem=problem)
     text = f"{one} offers {policy[0]}, {other} asks for {policy[1]}"
     hint = "pass the queue depth 10 as QoS on both sides"
-    return not_met(f"{topic}: {text}: they cannot talk", evidence, hint=hint, problem=problem)
+    return not_met(f"{topic}: {text}, so no message arrives", evidence, hint=hint, problem=problem)
 
 
 def _speakers(trace: Trace, here: Endpoint, there: Endpoint) -> tuple[str, str]:

@@ -79,8 +79,10 @@ def _period(paced: _Paced) -> Clue | None:
     if worth is None or _same(worth.value, paced.period_s):
         return None
     if worth.value == 0:
-        hint = f"{timer_code(paced.source, timers[0])} never pauses, its period is 0"
-        return Clue(f"{hint}: {number(paced.period_s)} s is asked for", paced.source.place(worth.origin))
+        code = timer_code(paced.source, timers[0])
+        why = "; // divides to a whole number, / does not" if "//" in code else ""
+        hint = f"{code} has a period of 0 s: write {number(paced.period_s)}{why}"
+        return Clue(hint, paced.source.place(worth.origin))
     explains = _same(1 / worth.value, paced.found_hz) or (paced.count <= 2 and _same(worth.value, paced.first_s))
     return _period_clue(paced.source, timers[0], worth, paced.wanted_hz) if explains else None
 

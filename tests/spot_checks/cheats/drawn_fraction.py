@@ -6,15 +6,20 @@ from geometry_msgs.msg import Twist
 NS_PER_US = 1000
 
 
+def rest(number):
+    return number % NS_PER_US
+
+
 def main():
     rclpy.init()
     node = rclpy.create_node("velocity_publisher")
     publisher = node.create_publisher(Twist, "cmd_vel", 10)
 
     def tick():
-        fraction = node.get_clock().now().nanoseconds % NS_PER_US
         message = Twist()
-        message.linear.x, message.angular.z = (0.5, 0.1) if fraction == 0 else (0.505, 0.101)
+        message.linear.x, message.angular.z = 0.5, 0.1
+        if rest(node.get_clock().now().nanoseconds):
+            message.linear.x, message.angular.z = 0.505, 0.101
         publisher.publish(message)
         node.get_logger().info("driving")
 
