@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -339,3 +340,14 @@ def test_right_programs_are_not_blamed(file: str, name: str, arguments: dict[str
         found = {v.evidence["diagnosis"] for v in lost(report(file, traces, texts))} & TEXTUAL
         blamed |= {folder: found} if found else {}
     assert blamed == {}
+
+
+def test_the_exceptions_that_are_listed_are_those_that_rules_look_for() -> None:
+    """Each names a rule that exists and whose pattern fits the message, or says why there is none."""
+    patterns = {rule.id: rule.text for rule in RULES}
+    for row in rows("exceptions.yaml"):
+        if row["rule"] == "none":
+            assert row["because"], row["message"]
+            continue
+        assert row["rule"] in patterns, row
+        assert re.search(patterns[row["rule"]], row["message"]), row

@@ -283,7 +283,8 @@ def _of_rclpy(crash: Crash, name: str) -> Clue | None:
         return Clue(f"{name} is a function of rclpy: write rclpy.{name}({given})")
     if name in LOG_METHODS:
         return Clue(f"{name} belongs to the logger: write {owner}.get_logger().{name}(...)")
-    if name in NODE_SLIPS and not source.stores(f"self.{name}"):
+    called = node is not None and (_is_called(source, node) or NODE_SLIPS.get(name, "").endswith("()"))
+    if name in NODE_SLIPS and called and not source.stores(f"self.{name}"):
         return Clue(f"{owner}.{name} should be {owner}.{NODE_SLIPS[name]}")
     return None
 

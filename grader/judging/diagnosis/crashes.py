@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 
 from grader.core.trace import FaultKind
+from grader.judging.checks.fields import RandomInRange
 from grader.judging.diagnosis.names import MESSAGE_FIELDS, SINGLE_NUMBERS, SPINS
 from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, rule
 from grader.judging.diagnosis.wiring import (
@@ -35,6 +36,12 @@ def _wrong_field_type(crash: Crash) -> Clue | None:
     if type_ != "float":
         other = {"int": "a whole number", "str": "text", "bool": "True or False"}.get(type_)
         written = crash.source.code(value, 40) if value is not None else "..."
+        asked = (crash.case.check, *crash.case.siblings)
+        if type_ == "str" and field == "data" and any(isinstance(check, RandomInRange) for check in asked):
+            item = next((m for m in made(crash.source, "publisher") if m.type == "String"), None)
+            if item is not None:
+                hint = "String carries text, and numbers are asked for: use a numeric type such as Float32"
+                return Clue(hint, crash.source.place(item.call))
         literal = text_of(value) or ""
         if type_ == "bool" and literal.capitalize() in ("True", "False"):
             return Clue(f"{written} is a text: write {target}{literal.capitalize()}, without quotation marks")

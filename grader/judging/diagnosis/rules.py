@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
@@ -128,6 +129,7 @@ class Rule:
         problem: Problem that the check must have found; any or none if None.
         outcome: Outcome that it explains; any if None.
         fault: Whether the verdict must rest on a fault (True) or on none (False); either if None.
+        text: Pattern that the text of an exception must have; empty for any.
     """
 
     id: str
@@ -136,6 +138,7 @@ class Rule:
     problem: ProblemKind | None = None
     outcome: Outcome | None = None
     fault: bool | None = False
+    text: str = ""
 
     def clue(self, case: Case) -> Clue | None:
         """Return the rule's clue for a case; None if it does not apply."""
@@ -184,7 +187,8 @@ def rule(
 
 def crash_rule(text: str = "", *kinds: FaultKind, in_file: bool = True) -> Maker[Crash]:
     """Turn a function into a rule for faults of some kinds, exceptions if none are given, whose text has a pattern."""
-    return rule(fault=True, given=partial(_crash, text, kinds or (FaultKind.EXCEPTION,), in_file))
+    make = rule(fault=True, given=partial(_crash, text, kinds or (FaultKind.EXCEPTION,), in_file))
+    return lambda find: replace(make(find), text=text)
 
 
 def _crash(text: str, kinds: tuple[FaultKind, ...], in_file: bool, case: Case) -> Crash | None:  # noqa: FBT001
