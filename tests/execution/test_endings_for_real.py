@@ -386,6 +386,19 @@ def test_a_spot_check_hears_what_a_short_lived_node_says(run: Callable[..., Trac
     assert [fault.text for fault in trace.faults()] == ["RuntimeError: over"]
 
 
+def test_a_bare_process_sees_the_same_machine_and_no_way_to_the_grader(run: Callable[..., Trace]) -> None:
+    """What replaces the answers about the machine leaves the same traces on both clocks."""
+    program = """
+        import sitecustomize
+        print(os.cpu_count(), sorted(vars(sitecustomize)), sys.path, os.environ.get('PYTHONPATH'))
+        rclpy.init()
+        node = Node('n')
+        """
+    virtual, bare = (run(program, **plan).lines()[0].text for plan in ({}, {"clock": "wall", "bare": True}))
+    assert virtual == bare
+    assert "grader_host" not in bare
+
+
 @pytest.mark.parametrize("options", ["", "signal_handler_options=rclpy.signals.SignalHandlerOptions.NO"])
 def test_what_is_published_at_ctrl_c_counts(run: Callable[..., Trace], options: str) -> None:
     """A stop in a `finally` is sent where the context is still there; rclpy's own handler has shut it down by then."""

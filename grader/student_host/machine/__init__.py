@@ -16,6 +16,7 @@ import signal
 import socket
 import sys
 from collections.abc import Callable, Iterator
+from types import ModuleType
 from typing import Any
 
 #: Processors of the machine that every program sees: as many as a small laptop has. rclpy's MultiThreadedExecutor
@@ -38,6 +39,8 @@ _IGNORED_BY_PYTHON = frozenset({signal.SIGPIPE, signal.SIGXFSZ})
 
 def install() -> None:
     """Replace the functions of the standard library through which a program asks about the machine."""
+    # A bare process has this module, by which Python has found this file; all others have one like it.
+    sys.modules["sitecustomize"] = ModuleType("sitecustomize")
     even_inherited()
     _install_processors()
     _install_user()
