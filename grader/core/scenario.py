@@ -321,8 +321,8 @@ class Scenario:
 
 
 def is_launch_file(name: str) -> bool:
-    """Return whether a file is a launch file, by its name: `robot.launch.py` or `robot_launch.py`."""
-    return name.endswith((".launch.py", "_launch.py"))
+    """Return whether a file is a launch file, by its name: `ros2 launch` takes all that end in `launch.py`."""
+    return name.endswith("launch.py")
 
 
 @dataclass(frozen=True, slots=True)

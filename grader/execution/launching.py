@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.core.dataclass import dataclass
+from grader.core.projects import Project
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Fault, FaultKind, LogRecord, Mark, Observation, Offer, OutputLine, Trace
 from grader.execution.ending import START_CPU_S, reported_fault
@@ -101,11 +102,15 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
     made = Launched()
     for node in _dicts(report.get("nodes"), NODES):
         package, wanted = _text(node.get("package")), _text(node.get("executable"))
-        found = find_executable(root, plan.projects, package, wanted)
+        near = _text(node.get("near")) if has_package(plan.projects, _text(node.get("near"))) else ""
+        found = None if near else find_executable(root, plan.projects, package, wanted)
         where = _place(name, node, places)
         if found is None or found.file is None:
-            if has_package(plan.projects, package):
-                text = _not_found(package, wanted, found, executables(root, plan.projects))
+            if _is_built_by_cmake(root, plan.projects, package) and found is None:
+                left_out.append(f"{where}: {_program(package, wanted)} was not started: {_BUILT_BY_CMAKE}")
+                continue
+            if has_package(plan.projects, package) or near:
+                text = _not_found(package, wanted, found, executables(root, plan.projects), near)
                 file, _, line = where.rpartition(":")
                 return Launched(
                     fault=Fault(0, name, FaultKind.EXCEPTION, text, file if line else "", int(line or 0)),
@@ -164,7 +169,17 @@ def _lacking(package: str) -> str:
     return f"the submission has no package {package if _NAME.fullmatch(package) else quoted(package)}"
 
 
-def _not_found(package: str, wanted: str, found: Executable | None, known: Sequence[Executable]) -> str:
+_BUILT_BY_CMAKE = "CMake builds the programs of its package"
+
+
+def _is_built_by_cmake(root: Path, projects: Sequence[Project], package: str) -> bool:
+    """Return whether a package may have programs in C++, which nothing here can build."""
+    return any(one.name == package and (root / one.folder / "CMakeLists.txt").is_file() for one in projects)
+
+
+def _not_found(package: str, wanted: str, found: Executable | None, known: Sequence[Executable], near: str) -> str:
+    if near:
+        return f"PackageNotFoundError: package {quoted(package)} not found; the submission has {near}"
     if found is not None:
         return f"SubstitutionFailure: the entry point {wanted} of {package} is {found.target}, which is not there"
     names = ", ".join(one.name for one in known if one.package == package)

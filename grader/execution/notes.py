@@ -67,6 +67,7 @@ _LEFT_OUT: Mapping[str, tuple[str, re.Pattern[str] | None]] = {
     "action": ("the action {name}", re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,59}")),
     "command": ("the command {text}", None),
     "launch_file": ("the launch file {name}, which is not in Python,", re.compile(r"[A-Za-z0-9_.-]{1,80}")),
+    "module": ("what needs the package {name}, which is not here,", re.compile(r"[a-z0-9_]{1,80}")),
     "node_argument": ("{name}= of a node", re.compile(r"[a-z_]{1,40}")),
     "nodes": ("a node beyond the first 16", None),
     "package": ("the package {name}, which is not in the submission,", re.compile(r"[A-Za-z0-9_-]{1,80}")),

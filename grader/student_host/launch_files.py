@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import difflib
 import json
+import logging
 import math
 import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from importlib.machinery import ModuleSpec
 from types import FrameType, ModuleType
 from typing import Any
 
@@ -77,9 +79,35 @@ class Context:
         """Return the folder of a package of the submission, which holds what its setup.py installs to share."""
         if package in self.packages:
             return self.packages[package]
-        if difflib.get_close_matches(package, self.packages, n=1, cutoff=SIMILARITY):
+        if meant_by(package, self.packages):
             raise PackageNotFoundError(f"package '{package}' not found, searching: {sorted(self.packages)}")
         raise LeftOutError("package", package)
+
+
+def meant_by(package: str, known: Iterable[str]) -> str:
+    """Return the package of which a name is a misspelling; empty if it may be the name of another one.
+
+    A name with a part more, or with another number, is often that of a released package: `turtlesim` and
+    `my_turtlesim`, `turtlebot3_gazebo` and `turtlebot4_gazebo`.
+    """
+    for near in difflib.get_close_matches(package, list(known), n=3, cutoff=SIMILARITY):
+        one, other = ({*re.sub(r"[0-9]", "", name).split("_")} for name in (package, near))
+        if not (one <= other or other <= one):
+            return near
+    return ""
+
+
+def installed(path: str, context: Context) -> str:
+    """Return where a file of a package's folder is once it is installed, if it is not there before."""
+    if os.path.exists(path):
+        return path
+    for name, folder in context.packages.items():
+        if path.startswith(os.path.join(folder, "")):
+            for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
+                there = os.path.join(prefix, "share", name, os.path.relpath(path, folder))
+                if prefix and os.path.exists(there):
+                    return there
+    return path
 
 
 class PackageNotFoundError(KeyError):
@@ -102,6 +130,10 @@ class Action:
 _folders: tuple[str, ...] = ()
 
 
+#: What is evaluated now.
+_evaluation: Any = None
+
+
 def _written_at() -> tuple[str, int]:
     frame: FrameType | None = sys._getframe(1)
     while frame is not None:
@@ -111,6 +143,10 @@ def _written_at() -> tuple[str, int]:
                 return os.path.relpath(name, folder), frame.f_lineno
         frame = frame.f_back
     return "", 0
+
+
+def _listed(parts: Any) -> list[Any]:
+    return list(parts) if isinstance(parts, (list, tuple)) else [parts]
 
 
 def text_of(value: Any, context: Context) -> str:
@@ -267,7 +303,24 @@ SUBSTITUTIONS: dict[str, Any] = {
     "Command": _made("Command", _impossible("Command")),
     "FindExecutable": _made("FindExecutable", _impossible("FindExecutable")),
 }
-FindPackageShare = _made("FindPackageShare", lambda context, name: context.share_of(text_of(name, context)))
+
+
+class FindPackageShare(Substitution):
+    """The folder of a package."""
+
+    def __init__(self, package: Any) -> None:
+        self.package = package
+
+    def perform(self, context: Context) -> str:
+        """Return the folder."""
+        return context.share_of(text_of(self.package, context))
+
+    def find(self, package: str) -> str:
+        """Return the folder of a package at once."""
+        folder: str = _evaluation.share_of(package)
+        return folder
+
+
 ROS_SUBSTITUTIONS: dict[str, Any] = {
     "FindPackageShare": FindPackageShare,
     "FindPackage": FindPackageShare,
@@ -441,7 +494,7 @@ class IncludeLaunchDescription(Action):
             context.launch_configurations[text_of(name, context)] = text_of(value, context)
         if isinstance(self.source, LaunchDescription):
             return self.source.entities
-        path = text_of(getattr(self.source, "path", self.source), context)
+        path = installed(text_of(getattr(self.source, "path", self.source), context), context)
         if not path.endswith(".py"):
             raise LeftOutError("launch_file", os.path.basename(path))
         if len(context.files) >= DEEPEST:
@@ -525,9 +578,11 @@ class Node(Action):
         for entry in self.parameters:
             texts += self._parameters(entry, target, context)
         ros = [part for rule in rules for part in ("-r", rule)] + [part for one in given for part in ("-p", one)]
+        package = text_of(self.package, context) if self.package is not None else ""
         context.nodes.append(
             {
-                "package": text_of(self.package, context) if self.package is not None else "",
+                "package": package,
+                "near": "" if package in context.packages else meant_by(package, context.packages),
                 "executable": text_of(self.executable, context),
                 "arguments": [text_of(one, context) for one in self.arguments],
                 "ros_arguments": [*ros, *(text_of(one, context) for one in self.ros_arguments)],
@@ -546,7 +601,7 @@ class Node(Action):
         elif isinstance(entry, Parameter):
             values = {text_of(entry.name, context): _evaluated(entry.value, context)}
         else:
-            path = text_of(entry.path if isinstance(entry, ParameterFile) else entry, context)
+            path = installed(text_of(entry.path if isinstance(entry, ParameterFile) else entry, context), context)
             if not os.path.isfile(path):  # as launch_ros does, with a warning
                 context.leave_out(self.file, self.line, LeftOutError("parameter_file", os.path.basename(path)))
                 return []
@@ -786,14 +841,25 @@ _SOURCES = {
 }
 #: The modules that a launch file imports, with what each of them has.
 MODULES: dict[str, dict[str, Any]] = {
-    "launch": {"LaunchDescription": LaunchDescription, "LaunchContext": Context, "Substitution": Substitution},
+    "launch": {
+        "LaunchDescription": LaunchDescription,
+        "LaunchContext": Context,
+        "LaunchDescriptionEntity": Action,
+        "Action": Action,
+        "Substitution": Substitution,
+    },
     "launch.actions": ACTIONS,
     "launch.conditions": _CONDITIONS,
     "launch.event_handlers": {},
     "launch.events": {},
     "launch.launch_description_sources": dict(_SOURCES),
     "launch.substitutions": SUBSTITUTIONS,
+    "launch.logging": {"get_logger": logging.getLogger},
     "launch.some_substitutions_type": {},
+    "launch.utilities": {
+        "perform_substitutions": lambda context, parts: text_of(parts, context),
+        "normalize_to_list_of_substitutions": _listed,
+    },
     "launch_ros": {},
     "launch_ros.actions": ROS_ACTIONS,
     "launch_ros.descriptions": _DESCRIPTIONS,
@@ -833,15 +899,96 @@ def install(context: Context) -> None:
         above, _, last = name.rpartition(".")
         if above:
             setattr(sys.modules[above], last, sys.modules[name])
+    sys.meta_path.append(_Unavailable())
     for name in ("ament_index_python", "ament_index_python.packages"):
         sys.modules[name].__dict__.update(index)
     sys.modules["launch"].__dict__["SomeSubstitutionsType"] = Any
 
 
+#: Packages that launch files import and that are not here: what they make is left out where it is used.
+_ABSENT = (
+    "launch_param_builder",
+    "launch_pal",
+    "launch_testing",
+    "launch_testing_ament_cmake",
+    "launch_testing_ros",
+    "moveit_configs_utils",
+    "nav2_common",
+    "ros_gz_sim",
+    "simple_launch",
+    "webots_ros2_driver",
+    "xacro",
+)
+
+
+class Absent(Action, Substitution):
+    """Something of a package that is not here, such as the text that `xacro` makes; its user is left out."""
+
+    def __init__(self, package: str) -> None:
+        super().__init__()
+        self.package = package
+
+    def visit(self, context: Context) -> Iterable[Any]:
+        """Leave it out."""
+        raise LeftOutError("module", self.package)
+
+    def perform(self, context: Context) -> str:
+        """Leave out what needs the text."""
+        raise LeftOutError("module", self.package)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return self
+
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        """Return the same: what a function makes of it is not here either."""
+        return self
+
+    def __str__(self) -> str:
+        raise LeftOutError("module", self.package)
+
+
+class _Unavailable:
+    """Finds the modules of launch that are not listed, and the packages that are not here.
+
+    A class of launch is found by its name, whichever module it is imported from.
+    """
+
+    def find_spec(self, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
+        """Return what loads a module; None for one of others."""
+        package = name.partition(".")[0]
+        own = package in _PACKAGES
+        return ModuleSpec(name, self, is_package=True) if own or package in _ABSENT else None  # type: ignore[arg-type]
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        """Return a module whose names are made when they are asked for."""
+        module, package = ModuleType(spec.name), spec.name.partition(".")[0]
+        find = _missing(spec.name) if package in _PACKAGES else _absent(package)
+        module.__dict__["__getattr__"] = find
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Do nothing: there is no code."""
+
+
+_PACKAGES = frozenset(name.partition(".")[0] for name in MODULES) - {"ament_index_python"}
+_CLASSES = {name: found for members in MODULES.values() for name, found in members.items() if _TYPE.fullmatch(name)}
+
+
+def _absent(package: str) -> Callable[[str], Any]:
+    def find(name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return Absent(package)
+
+    return find
+
+
 def _missing(module: str) -> Callable[[str], Any]:
     def find(name: str) -> Any:
         if _TYPE.fullmatch(name):
-            return unknown(name)
+            return _CLASSES.get(name) or unknown(name)
         raise AttributeError(f"module '{module}' has no attribute '{name}'")
 
     return find
@@ -863,8 +1010,11 @@ def describe(
     """
     global _folders  # noqa: PLW0603  every action needs them, also those that a launch file makes at import
     _folders = tuple(os.path.join(folder, "") for folder in folders)
-    context = Context(packages, arguments)
+    global _evaluation  # noqa: PLW0603  what a substitution finds without being performed
+    context = _evaluation = Context(packages, arguments)
     install(context)
+    # Once a package is built, a launch file imports the modules of its package.
+    sys.path += [folder for folder in packages.values() if folder not in sys.path]
     context.files.append(path)
     try:
         walk(described_by(path).entities, context)

@@ -108,6 +108,43 @@ def test_what_is_left_out_costs_no_points(graded: Callable[..., ExerciseReport])
     assert "turtle_sim/node was not started" in verdict.reason
 
 
+def test_a_misspelt_package_is_a_fault(graded: Callable[..., ExerciseReport]) -> None:
+    """`ros2 launch` refuses it, although a program of that name is there."""
+    report = graded((LAUNCH, 'package="robot"', 'package="robto"'))
+    assert set(outcomes(report).values()) <= {"not_met", "blocked"}
+    (fault,) = report.faults
+    assert (fault.file, fault.line) == (LAUNCH, line_of(LAUNCH, "        Node("))
+    assert fault.text == 'PackageNotFoundError: package "robto" not found; the submission has robot'
+
+
+def test_a_program_that_cmake_builds_costs_no_points(graded: Callable[..., ExerciseReport], tmp_path: Path) -> None:
+    """The Python nodes beside it start."""
+    drive = tmp_path / "ws" / "src" / "drive_cpp"
+    drive.mkdir(parents=True)
+    (drive / "package.xml").write_text("<package><name>drive_cpp</name></package>")
+    (drive / "CMakeLists.txt").write_text("add_executable(listener src/listener.cpp)\n")
+    node = 'Node(package="drive_cpp", executable="listener"),'
+    report = graded((LAUNCH, "        Node(\n", f"        {node}\n        Node(\n"))
+    assert set(outcomes(report).values()) == {"met"}
+    line = line_of(LAUNCH, "        Node(")
+    said = f"{LAUNCH}:{line}: drive_cpp/listener was not started: CMake builds the programs of its package"
+    assert said in report.notes
+
+
+def test_any_name_that_ends_in_launch_py_is_a_launch_file(
+    graded: Callable[..., ExerciseReport], tmp_path: Path
+) -> None:
+    """As for `ros2 launch`, also where it has the name of the package that it imports."""
+    rubric = (HERE / "rubrics" / "launched.yaml").read_text().replace("robot.launch.py", "launch.py")
+    (tmp_path / "own.yaml").write_text(rubric)
+    shutil.copytree(WORKSPACE, tmp_path / "ws", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "ws" / LAUNCH).rename((tmp_path / "ws" / LAUNCH).with_name("launch.py"))
+    for name, text in {name: (tmp_path / "ws" / name).read_text() for name in ("src/robot/setup.py",)}.items():
+        (tmp_path / "ws" / name).write_text(text.replace("robot.launch.py", "launch.py"))
+    request = GradeRequest(str(tmp_path / "ws"), rubrics=(tmp_path / "own.yaml",), clock="virtual")
+    assert set(outcomes(grade_until_decided(request).exercises[0]).values()) == {"met"}
+
+
 HOSTILE = {
     "exits": ("import sys; sys.exit(0)", "SystemExit"),
     "exits_hard": ("import os; os._exit(0)", "ended while it was evaluated"),

@@ -37,11 +37,11 @@ Described = tuple[list[dict[str, Any]], list[dict[str, Any]]]
 def described(tmp_path: Path) -> Callable[..., Described]:
     """Evaluate a launch file with these actions."""
 
-    def evaluate(actions: str, arguments: dict[str, str] | None = None, **others: str) -> Described:
+    def evaluate(actions: str, arguments: dict[str, str] | None = None, before: str = "", **others: str) -> Described:
         robot = tmp_path / "robot"
         (robot / "launch").mkdir(parents=True, exist_ok=True)
         (robot / "own.yaml").write_text("/**: {ros__parameters: {rate: 2.0}}\n")
-        body = textwrap.indent(f"return LaunchDescription([{actions}])", "    ")
+        body = textwrap.indent(f"{before}return LaunchDescription([{actions}])", "    ")
         file = robot / "launch" / "a.launch.py"
         file.write_text(f"{IMPORTS}\ndef generate_launch_description():\n{body}\n")
         for name, text in others.items():
@@ -190,3 +190,57 @@ def test_a_mistake_raises_what_ros_raises(described: Callable[..., Described], a
     with pytest.raises(Exception, match=r"\S") as raised:
         described(action)
     assert type(raised.value).__name__ == error
+
+
+@pytest.mark.parametrize(
+    ("imported", "actions"),
+    [
+        ("", "LogInfo(msg=FindPackageShare(package='robot').find('robot')), Node(**TALKER)"),
+        ("", "LogInfo(msg=FindPackageShare('x').find('robot')), Node(**TALKER)"),
+        ("from launch import logging", "LogInfo(msg=str(logging.get_logger('x').name)), Node(**TALKER)"),
+        ("import launch.logging", "Node(**TALKER)"),
+        (
+            "from launch.substitutions.path_join_substitution import PathJoinSubstitution",
+            "LogInfo(msg=PathJoinSubstitution(['a', 'b'])), Node(**TALKER)",
+        ),
+        ("from launch_ros.actions.node import Node", "Node(**TALKER)"),
+        ("from launch.launch_description import LaunchDescription", "Node(**TALKER)"),
+        ("from launch.utilities import perform_substitutions", "Node(**TALKER)"),
+        ("from robot.words import NAME", "Node(**TALKER, name=NAME)"),
+    ],
+)
+def test_what_launch_files_import_is_there(
+    described: Callable[..., Described], tmp_path: Path, imported: str, actions: str
+) -> None:
+    """Classes of launch from whichever module, its logger, and modules of the packages."""
+    (tmp_path / "robot" / "robot").mkdir(parents=True)
+    (tmp_path / "robot" / "robot" / "words.py").write_text("NAME = 'own'\n")
+    with patch.object(sys, "path", [*sys.path]):
+        nodes, left_out = described(actions, before=f"{imported or 'pass'}\n")
+    assert ([node["executable"] for node in nodes], left_out) == (["talker"], [])
+
+
+@pytest.mark.parametrize("package", ["xacro", "nav2_common.launch", "moveit_configs_utils"])
+def test_what_a_package_that_is_not_here_makes_is_left_out_where_it_is_used(
+    described: Callable[..., Described], package: str
+) -> None:
+    """The other nodes start."""
+    nodes, left_out = described(
+        "Node(package='robot', executable='publisher', parameters=[{'robot_description': made.toxml()}]), "
+        "Node(**TALKER, parameters=[{'a': 1}]), absent.Thing(a=1)",
+        before=f"import {package} as absent\nmade = absent.process_file('a.xacro', mappings={{'a': 'b'}})\n",
+    )
+    assert [node["executable"] for node in nodes] == ["talker"]
+    assert [left_out_words(one) for one in left_out] == [
+        f"what needs the package {package.split('.', maxsplit=1)[0]}, which is not here,"
+    ] * 2
+
+
+@pytest.mark.parametrize(
+    ("package", "near"),
+    [("robto", "robot"), ("robots", "robot"), ("robot", ""), ("my_robot", ""), ("robot2", ""), ("turtlesim", "")],
+)
+def test_a_misspelt_package_is_told(described: Callable[..., Described], package: str, near: str) -> None:
+    """A name with a part or a number more may be that of another package."""
+    nodes, _ = described(f"Node(package='{package}', executable='talker')")
+    assert [node["near"] for node in nodes] == [near]
