@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -184,24 +184,23 @@ def endless(tmp_path: Path) -> Path:
 def test_an_interrupt_in_the_middle_leaves_nothing(scratch: Path, tmp_path: Path) -> None:
     """Ctrl-C: 130, one line, and no process, folder or shared memory; also when it is pressed twice."""
     before = shared_memory()
-    process = start(scratch, endless(tmp_path), "--exercise", "velocity_publisher")
-    wait_for(lambda: students_of(scratch))
+    process, students = started(scratch, endless(tmp_path))
     process.send_signal(signal.SIGINT)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=120)
     assert (process.returncode, out) == (130, "")
     assert err == "interrupted: no report was made\n"
+    wait_for(lambda: not students & running())
     assert_nothing_left(scratch, before)
 
 
 def test_a_kill_in_the_middle_ends_everything(scratch: Path, tmp_path: Path) -> None:
     """SIGKILL gives no time to tidy up: folders stay, but no process and no shared memory."""
     before = shared_memory()
-    process = start(scratch, endless(tmp_path), "--exercise", "velocity_publisher")
-    wait_for(lambda: students_of(scratch))
+    process, students = started(scratch, endless(tmp_path))
     process.kill()
     process.communicate(timeout=120)
-    wait_for(lambda: not processes_of(scratch))
+    wait_for(lambda: not (processes_of(scratch) or students & running()))
     assert shared_memory() <= before
     assert all(re.match("grade-", path.name) for path in scratch.iterdir())
 
@@ -209,17 +208,53 @@ def test_a_kill_in_the_middle_ends_everything(scratch: Path, tmp_path: Path) -> 
 def test_a_termination_in_the_middle_ends_everything(scratch: Path, tmp_path: Path) -> None:
     """As a build server does it that has waited long enough."""
     before = shared_memory()
-    process = start(scratch, endless(tmp_path), "--exercise", "velocity_publisher")
-    wait_for(lambda: students_of(scratch))
+    process, students = started(scratch, endless(tmp_path))
     process.terminate()
     process.communicate(timeout=120)
-    wait_for(lambda: not processes_of(scratch))
+    wait_for(lambda: not (processes_of(scratch) or students & running()))
     assert shared_memory() <= before
 
 
-def students_of(scratch: Path) -> list[int]:
-    """Return the students' processes among those of a scratch folder."""
-    return [pid for pid in processes_of(scratch) if is_students(Path(f"/proc/{pid}"))]
+Running = tuple[int, str]  # a process id, and when the kernel started it
+
+
+def started(scratch: Path, submission: Path) -> tuple[subprocess.Popen[str], set[Running]]:
+    """Start the command, and return it with its students' processes once there are any."""
+    process = start(scratch, submission, "--exercise", "velocity_publisher")
+    students: set[Running] = set()
+
+    def found() -> set[Running]:
+        students.update(one for one in below(process.pid) if is_students(Path(f"/proc/{one[0]}")))
+        return students
+
+    wait_for(found)
+    return process, students
+
+
+def below(pid: int) -> set[Running]:
+    """Return the descendants of a process."""
+    parents = {one: int(status[1]) for one, status in stats().items()}
+    return {one for one in parents if pid in set(ancestors(one[0], {child: up for (child, _), up in parents.items()}))}
+
+
+def ancestors(pid: int, parents: Mapping[int, int]) -> Iterator[int]:
+    while pid := parents.get(pid, 0):
+        yield pid
+
+
+def running() -> set[Running]:
+    """Return all processes that have not ended."""
+    return {one for one, status in stats().items() if status[0] != b"Z"}
+
+
+def stats() -> dict[Running, list[bytes]]:
+    """Return the fields of proc_pid_stat(5) from the state on, of each process."""
+    found: dict[Running, list[bytes]] = {}
+    for entry in Path("/proc").iterdir():
+        fields = read(entry / "stat").rpartition(b") ")[2].split() if entry.name.isdigit() else []
+        if fields:
+            found[int(entry.name), fields[19].decode()] = fields
+    return found
 
 
 def is_students(process: Path) -> bool:
