@@ -9,10 +9,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
+from process_table import Running, read, running, students_of
 
 SUBMISSIONS = Path(__file__).resolve().parent / "submissions"
 GRADE = str(Path(sys.executable).with_name("grade"))
@@ -65,14 +66,6 @@ def processes_of(scratch: Path) -> list[int]:
         if str(scratch).encode() in told:
             found.append(int(entry.name))
     return found
-
-
-def read(path: Path) -> bytes:
-    """Return a file of /proc; nothing if its process has gone."""
-    try:
-        return path.read_bytes()
-    except OSError:
-        return b""
 
 
 def wait_for(condition: Callable[[], object], seconds: float = 60) -> None:
@@ -215,50 +208,14 @@ def test_a_termination_in_the_middle_ends_everything(scratch: Path, tmp_path: Pa
     assert shared_memory() <= before
 
 
-Running = tuple[int, str]  # a process id, and when the kernel started it
-
-
 def started(scratch: Path, submission: Path) -> tuple[subprocess.Popen[str], set[Running]]:
     """Start the command, and return it with its students' processes once there are any."""
     process = start(scratch, submission, "--exercise", "velocity_publisher")
     students: set[Running] = set()
 
     def found() -> set[Running]:
-        students.update(one for one in below(process.pid) if is_students(Path(f"/proc/{one[0]}")))
+        students.update(students_of(process))
         return students
 
     wait_for(found)
     return process, students
-
-
-def below(pid: int) -> set[Running]:
-    """Return the descendants of a process."""
-    parents = {one: int(status[1]) for one, status in stats().items()}
-    return {one for one in parents if pid in set(ancestors(one[0], {child: up for (child, _), up in parents.items()}))}
-
-
-def ancestors(pid: int, parents: Mapping[int, int]) -> Iterator[int]:
-    while pid := parents.get(pid, 0):
-        yield pid
-
-
-def running() -> set[Running]:
-    """Return all processes that have not ended."""
-    return {one for one, status in stats().items() if status[0] != b"Z"}
-
-
-def stats() -> dict[Running, list[bytes]]:
-    """Return the fields of proc_pid_stat(5) from the state on, of each process."""
-    found: dict[Running, list[bytes]] = {}
-    for entry in Path("/proc").iterdir():
-        fields = read(entry / "stat").rpartition(b") ")[2].split() if entry.name.isdigit() else []
-        if fields:
-            found[int(entry.name), fields[19].decode()] = fields
-    return found
-
-
-def is_students(process: Path) -> bool:
-    """Return whether a process was executed for a student's file, or forked for one, which has its own mounts."""
-    command = read(process / "cmdline")
-    forked = b"/host/starter.py" in command and b" /submission " in read(process / "mountinfo")
-    return forked or b"launcher.py" in command

@@ -166,7 +166,7 @@ def test_a_dash_prints_that_format_instead(run_session: Session, tmp_path: Path)
         (("ada", "--min-score", "101"), "expected 0 to 100, found 101", "grade --help"),
         (("ada", "--min-score", "nan"), "expected 0 to 100, found nan", "grade --help"),
         (("ada", "-o", "json"), "expected FORMAT=PATH, found 'json'", "grade --help"),
-        (("ada", "-o", "jsn=x"), "'jsn' is no format; did you mean json?", "grade --help"),
+        (("ada", "-o", "jsn=x"), "'jsn' is not a format; did you mean json?", "grade --help"),
         (("ada", "-o", "docx=x"), "there are json, text", "grade --help"),
         (("ada", "--json", "-o", "text=-"), "standard output: expected one report, found more", "to files"),
         (("ada", "-o", "json=x", "-o", "text=./x"), "x: expected one report, found more", "its own file"),

@@ -15,6 +15,7 @@ import pytest
 from _pytest.mark import ParameterSet
 from archive import SEED, SUBMISSIONS, expected, golden, outcomes, told
 from grading import grade_until_decided, say_nothing
+from process_table import running, students_of
 
 from grader.app.request import GradeRequest
 from grader.app.start import grade
@@ -126,11 +127,12 @@ def test_interrupting_the_grader_leaves_nothing_behind(tmp_path: Path) -> None:
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
     command = [GRADE, str(submission), "--exercise", "velocity_publisher"]
     process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    wait_for(lambda: processes_in(tmp_path))
+    wait_for(lambda: students_of(process))
+    started = students_of(process)
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=60)
     assert (process.returncode, told) == (130, "interrupted: no report was made\n")
-    wait_for(lambda: not processes_in(tmp_path))
+    wait_for(lambda: not started & running())
     assert [path.name for path in tmp_path.iterdir()] == ["endless"]
 
 
@@ -142,10 +144,11 @@ def test_killing_the_grader_ends_what_it_started(tmp_path: Path) -> None:
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
     command = [GRADE, str(submission), "--exercise", "velocity_publisher"]
     process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    wait_for(lambda: processes_in(tmp_path))
+    wait_for(lambda: students_of(process))
+    started = students_of(process)
     process.kill()
     process.wait()
-    wait_for(lambda: not processes_in(tmp_path))
+    wait_for(lambda: not started & running())
 
 
 def wait_for(condition: Callable[[], object], seconds: float = 60) -> None:
@@ -154,22 +157,6 @@ def wait_for(condition: Callable[[], object], seconds: float = 60) -> None:
     while not condition():
         assert time.monotonic() < deadline, "it never came to that"
         time.sleep(0.05)
-
-
-def processes_in(folder: Path) -> list[str]:
-    """Return the sandboxed processes whose submission was staged below a folder, as the mount tables say."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit() and entry.name != str(os.getpid()):
-            try:
-                command = (entry / "cmdline").read_bytes().decode(errors="replace")
-                mounts = (entry / "mountinfo").read_text(errors="replace")
-            except OSError:
-                continue
-            forked = "/host/starter.py" in command and " /submission " in mounts
-            if (forked or "launcher.py" in command) and f"{folder}/" in mounts + command:
-                found.append(entry.name)
-    return found
 
 
 def test_a_submission_is_never_written_to(tmp_path: Path) -> None:

@@ -106,7 +106,6 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
         root.chmod(0o755)  # as the folder of the session
         if names_a_program(request):
             exercises, submission = _of_one_file(request, exercises, root)
-            request = replace(request, exercises=tuple(exercise.id for exercise in exercises))
         else:
             submission = _staged(request, exercises, root)
         if request.every:
@@ -302,7 +301,11 @@ def begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[E
 def names_a_program(request: GradeRequest) -> bool:
     """Return whether a request names one .py file and no exercises: then those are graded that the file belongs to."""
     chosen = bool(request.exercises) or request.every or request.collected is not None
-    return not chosen and request.submission.casefold().endswith(".py") and Path(request.submission).is_file()
+    named = not chosen and request.submission.casefold().endswith(".py")
+    try:
+        return named and Path(request.submission).is_file()
+    except OSError:  # no file can have this name, which staging says
+        return False
 
 
 def _of_one_file(request: GradeRequest, usual: Sequence[Exercise], root: Path) -> tuple[list[Exercise], Submission]:

@@ -195,7 +195,7 @@ def test_a_pipe_in_the_place_of_a_file_is_refused(tmp_path: Path) -> None:
     kept_run(tmp_path, velocity_run(velocity_trace()))
     (tmp_path / RECORDING).unlink()
     os.mkfifo(tmp_path / RECORDING)
-    assert "no plain one" in refused(tmp_path)
+    assert "expected a regular file, found something else" in refused(tmp_path)
 
 
 def test_a_recording_answers_only_what_was_asked(tmp_path: Path) -> None:

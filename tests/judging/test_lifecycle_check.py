@@ -82,11 +82,14 @@ def test_a_node_that_is_mute_when_active_is_named() -> None:
 
 def test_a_node_without_a_lifecycle_and_a_crash_are_explained() -> None:
     """A recording that asks too little is ours."""
-    assert "none has a lifecycle" in CHECK.judge(Recording().endpoint("publisher", "/chatter").trace()).reason
+    assert (
+        "no node of the program has a lifecycle"
+        in CHECK.judge(Recording().endpoint("publisher", "/chatter").trace()).reason
+    )
     assert FAULT_KEY in CHECK.judge(Recording().crashed(0.0).trace()).evidence
     gone = CHECK.judge(living(STATES[:2]).crashed(4.2).trace())  # what is gone cannot be asked
     assert FAULT_KEY in gone.evidence
-    with pytest.raises(HarnessError, match="asked for 2 times, expected 5"):
+    with pytest.raises(HarnessError, match="requested 2 times, expected 5"):
         CHECK.judge(living(STATES[:2]).trace())
     assert FAULT_KEY in CHECK.judge(living(silent="activate").crashed(4.0).trace()).evidence
     assert LifecycleStates(node="/other").judge(living().trace()).blocked_by == "node_name"

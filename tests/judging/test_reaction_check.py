@@ -100,7 +100,7 @@ def test_the_old_goal_may_go_on_until_the_next_period() -> None:
             "frame_id is 'odom', expected",
         ),
         (lambda w: [(0.0, goal(2.0, 1.5))] if right(w) else [], "after data = go to the office on /voice_command"),
-        (lambda w: [(1.2, v) for _, v in at_once(w)], "came after 1.200 s, expected within 1.0 s"),
+        (lambda w: [(1.2, v) for _, v in at_once(w)], "was published after 1.200 s, expected within 1.0 s"),
         (lambda w: at_once(w) or [(0.0, goal(0, 0))], "a message was published, expected none"),
         (lambda w: [*at_once(w), (0.5, goal(9, 9))] if right(w) else [], "right at first, then t = 1.500 s"),
         (lambda w: at_once(w) if "office" in w else [], "no message within 1.0 s, expected header.frame_id 'map'"),

@@ -39,7 +39,7 @@ def test_temperature_messages_count_like_data() -> None:
     [
         (31.4, "above 30 °C at t = 3.200 s (31.4 °C)"),
         (19.9, "below 20 °C at t = 3.200 s (19.9 °C)"),
-        (math.nan, "no number"),
+        (math.nan, "not a number"),
         (math.inf, "above 30"),
         (-math.inf, "below 20"),
     ],
@@ -138,7 +138,7 @@ def test_one_message_behind_is_no_log_of_what_came() -> None:
         rec.log(t, f"fan {held_at(t - 0.2, SPEEDS) or 0.0}")
     finding = LOGS.judge(rec.trace())
     assert finding.credit == 0
-    assert "the number of the message before: 100 at t = 2.500 s, when 0 came" in finding.reason
+    assert "the number of the previous one: 100 at t = 2.500 s, when 0 was received" in finding.reason
     assert finding.problem == Problem(ProblemKind.BEHIND)
     for t in times:
         rec.number(t, "/temperature", 24.0)

@@ -1,0 +1,55 @@
+"""Finds the processes of a command in /proc: its descendants, and which of them run a student's file."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+Running = tuple[int, str]  # a process id, and when the kernel started it
+
+
+def read(path: Path) -> bytes:
+    """Return a file of /proc; nothing if its process has gone."""
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
+
+
+def students_of(command: subprocess.Popen[str] | subprocess.Popen[bytes]) -> set[Running]:
+    """Return the descendants of a command that run a student's file."""
+    return {one for one in below(command.pid) if is_students(Path(f"/proc/{one[0]}"))}
+
+
+def below(pid: int) -> set[Running]:
+    """Return the descendants of a process."""
+    parents = {one: int(status[1]) for one, status in stats().items()}
+    return {one for one in parents if pid in set(ancestors(one[0], {child: up for (child, _), up in parents.items()}))}
+
+
+def ancestors(pid: int, parents: Mapping[int, int]) -> Iterator[int]:
+    while pid := parents.get(pid, 0):
+        yield pid
+
+
+def running() -> set[Running]:
+    """Return all processes that have not ended."""
+    return {one for one, status in stats().items() if status[0] != b"Z"}
+
+
+def stats() -> dict[Running, list[bytes]]:
+    """Return the fields of proc_pid_stat(5) from the state on, of each process."""
+    found: dict[Running, list[bytes]] = {}
+    for entry in Path("/proc").iterdir():
+        fields = read(entry / "stat").rpartition(b") ")[2].split() if entry.name.isdigit() else []
+        if fields:
+            found[int(entry.name), fields[19].decode()] = fields
+    return found
+
+
+def is_students(process: Path) -> bool:
+    """Return whether a process was executed for a student's file, or forked for one, which has its own mounts."""
+    command = read(process / "cmdline")
+    forked = b"/host/starter.py" in command and b" /submission " in read(process / "mountinfo")
+    return forked or b"launcher.py" in command
