@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -103,9 +104,13 @@ def with_threads() -> list[str]:
     return found
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("executor", EXECUTORS)
-@pytest.mark.parametrize("body", BODIES)
+def sampled(cases: Iterable[tuple[str, ...]]) -> list[Any]:
+    """Return parameters of a test: one in five runs with `--long`, the others with `--everything`."""
+    marks = [pytest.mark.long, *[pytest.mark.nightly] * 4]
+    return [pytest.param(*case, marks=marks[n % 5], id="-".join(case)) for n, case in enumerate(cases)]
+
+
+@pytest.mark.parametrize(("body", "executor"), sampled(itertools.product(BODIES, EXECUTORS)))
 def test_what_a_program_does(folder: Path, body: str, executor: str) -> None:
     """Each message and each log record at the same time."""
     program = folder / "threads.py"
@@ -116,8 +121,7 @@ def test_what_a_program_does(folder: Path, body: str, executor: str) -> None:
     assert one["clock"] == "virtual"
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("name", with_threads())
+@pytest.mark.parametrize("name", sampled((name,) for name in with_threads()))
 def test_what_a_submission_gets(folder: Path, name: str) -> None:
     """Outcomes, reasons, hints and charts."""
     expected = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))

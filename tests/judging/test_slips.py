@@ -107,7 +107,7 @@ def test_a_hint_that_is_obeyed_gets_further(session: RecordingSession, tmp_path:
     check_obeyed(session, tmp_path, row)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_every_slip_gets_its_hint(session: RecordingSession, tmp_path: Path) -> None:
     """All of them; what differs is listed."""
@@ -122,7 +122,7 @@ def test_every_slip_gets_its_hint(session: RecordingSession, tmp_path: Path) -> 
     assert wrong == {}
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_every_hint_that_is_obeyed_gets_further(session: RecordingSession, tmp_path: Path) -> None:
     """All that do not lead back to the right program at once."""
