@@ -21,7 +21,7 @@ from grader.core.chart import (
     Tone,
 )
 from grader.core.exercise import Check, Criterion, Exercise, Location, reads_sources
-from grader.core.quantities import seconds
+from grader.core.quantities import counted, seconds
 from grader.core.report import ExerciseReport
 from grader.core.scenario import Scenario
 from grader.core.submission import Submission
@@ -33,7 +33,7 @@ from grader.judging.output import printed_lines
 from grader.judging.plots import chart_of
 from grader.judging.recorded_values import recorded_values
 from grader.judging.values import on_student_topic
-from grader.judging.wording import counted, quote
+from grader.judging.wording import quote
 
 
 def illustrated(

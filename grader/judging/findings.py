@@ -8,10 +8,10 @@ from fractions import Fraction
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Location, Problem, ProblemKind, exact_share
-from grader.core.quantities import NS_PER_S, seconds
+from grader.core.quantities import NS_PER_S, counted, seconds
 from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace
 from grader.judging.values import HIDDEN_TOPICS, student_endpoints
-from grader.judging.wording import counted, listed, nearest, quote, span
+from grader.judging.wording import listed, nearest, quote, span
 
 #: Evidence key for the fault that a finding rests on; judging an exercise counts each fault once.
 FAULT_KEY = "fault"

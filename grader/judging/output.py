@@ -10,11 +10,12 @@ from dataclasses import field
 from functools import lru_cache
 
 from grader.core.dataclass import dataclass
+from grader.core.quantities import counted
 from grader.core.trace import LogRecord, OutputLine, Trace
 from grader.judging.findings import AT_ONCE_NS, first_fault
 from grader.judging.texts import Printed, clean, printed_numbers, template_of, with_decimal_points
 from grader.judging.values import per_trace
-from grader.judging.wording import counted, number, quote
+from grader.judging.wording import number, quote
 
 #: Warnings that rclpy writes through the node's own logger when QoS policies are incompatible.
 _RCLPY_TEXT = re.compile(r"New (publisher|subscription) discovered on (topic|service) .*incompatible QoS", re.DOTALL)

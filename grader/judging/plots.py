@@ -11,7 +11,7 @@ from itertools import islice
 from grader.core.chart import Band, Case, Chart, Level, Look, Panel, Series, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
+from grader.core.quantities import NS_PER_MS, NS_PER_S, counted, seconds
 from grader.core.trace import Delivery, Message, Request, Response, Trace
 from grader.judging.charts import (
     MOST_CASES,
@@ -36,7 +36,7 @@ from grader.judging.values import (
     shown,
     value_at,
 )
-from grader.judging.wording import counted, listed, number, quote, unit_of
+from grader.judging.wording import listed, number, quote, unit_of
 
 #: Maximum number of panels of a chart, of panels for one topic, of lines in a panel, and of rows for texts.
 _MOST_PANELS, _MOST_GROUPS, _MOST_LINES, _MOST_WORDS = 6, 3, 6, 5

@@ -6,9 +6,10 @@ import statistics
 from collections.abc import Sequence
 
 from grader.core.dataclass import dataclass
+from grader.core.quantities import counted
 from grader.judging.position_logs import STALE_NS, Analysis, Entry, Group, Pose, Track, Wanted, X, Y, matched
 from grader.judging.texts import Pair, Printed
-from grader.judging.wording import counted, moment, number, quote, span
+from grader.judging.wording import moment, number, quote, span
 
 #: Minimum share of a template's texts that must show the same mistake for it to be reported.
 _SURE = 0.8

@@ -15,9 +15,9 @@ from itertools import pairwise
 from types import MappingProxyType
 
 from grader.core.dataclass import dataclass
-from grader.core.quantities import NS_PER_MS, NS_PER_S, within
+from grader.core.quantities import NS_PER_MS, NS_PER_S, counted, within
 from grader.judging.values import Reading
-from grader.judging.wording import counted, number
+from grader.judging.wording import number
 
 #: Variables of a formula: the number of a message from 0, and its time in seconds.
 VARIABLES = ("n", "t")

@@ -7,7 +7,6 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
-from grader.core.quantities import counted as counted  # noqa: PLC0414 - one of the words of all that judges
 from grader.core.quantities import seconds
 
 #: Longest quotation of a student's text inside a sentence, in characters.

@@ -12,7 +12,7 @@ from grader.core.chart import Case, Look, Panel, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import DurationNs, FieldOf, seconds
+from grader.core.quantities import DurationNs, FieldOf, counted, seconds
 from grader.core.trace import Message, Trace
 from grader.judging.charts import Lanes, series
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
@@ -31,7 +31,7 @@ from grader.judging.values import (
     shown,
     value_at,
 )
-from grader.judging.wording import counted, listed, moment, nearest, number, quote, span
+from grader.judging.wording import listed, moment, nearest, number, quote, span
 
 _FINISH_HINTS = {
     "succeeded": "call goal_handle.succeed() before the result is returned",

@@ -11,7 +11,7 @@ from grader.core.chart import Band, Case, Level, Look, Panel, Point, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, Pattern, seconds
+from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, Pattern, counted, seconds
 from grader.core.trace import OutputLine, Trace
 from grader.judging.charts import Lanes, gaps_panel, series
 from grader.judging.checks.logs import LOGGER_HINT, complained
@@ -43,7 +43,7 @@ from grader.judging.service_calls import (
     text_of,
 )
 from grader.judging.values import RuleOrValue, breach, broken_rules, rules_text
-from grader.judging.wording import counted, moment, number, quote, span
+from grader.judging.wording import moment, number, quote, span
 
 _WAIT_HINT = "wait in a loop: while not client.wait_for_service(timeout_sec=1.0): log that it is still waited for"
 

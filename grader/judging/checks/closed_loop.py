@@ -9,12 +9,12 @@ from typing import Annotated
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import DurationNs, FieldNumber, FieldOf, Topic, seconds
+from grader.core.quantities import DurationNs, FieldNumber, FieldOf, Topic, counted, seconds
 from grader.core.trace import Delivery, Trace
 from grader.judging.findings import explain_fault, faulted, first_fault, met, not_met
 from grader.judging.plots import Drawing, Plot, value_panels
 from grader.judging.values import JITTER_NS, FieldRule, as_number, delivered, number_at, value_at
-from grader.judging.wording import counted, moment, number, span
+from grader.judging.wording import moment, number, span
 
 #: Rounding to single precision must not push a value out of its range.
 _EDGE = 1e-6

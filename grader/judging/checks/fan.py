@@ -11,7 +11,7 @@ from typing import Literal
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_MS, seconds, within
+from grader.core.quantities import NS_PER_MS, counted, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Trace
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
 from grader.judging.plots import Drawing, threshold_drawing
@@ -28,7 +28,7 @@ from grader.judging.values import (
     published_numbers,
     student_endpoints,
 )
-from grader.judging.wording import counted, moment, number, numbers, quote, span, unit_of
+from grader.judging.wording import moment, number, numbers, quote, span, unit_of
 
 #: How long after a new input the answer to the previous one is still accepted.
 _GRACE_NS = 300 * NS_PER_MS

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from grader.core.chart import Band
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Problem, ProblemKind
-from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern, seconds, within
+from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern, counted, seconds, within
 from grader.core.trace import Message, Trace
 from grader.judging.findings import explain_fault, explain_no_message, met, not_met
 from grader.judging.output import number_in
@@ -33,7 +33,7 @@ from grader.judging.values import (
     rules_text,
     text_at,
 )
-from grader.judging.wording import counted, moment, number, numbers, quote, unit_of
+from grader.judging.wording import moment, number, numbers, quote, unit_of
 
 
 @dataclass(frozen=True, slots=True)

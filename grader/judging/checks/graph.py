@@ -8,11 +8,11 @@ from typing import ClassVar, Literal
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
-from grader.core.quantities import DurationNs, seconds
+from grader.core.quantities import DurationNs, counted, seconds
 from grader.core.trace import Endpoint, GraphSnapshot, Trace
 from grader.judging.findings import explain_fault, explain_no_subscription, faulted, first_fault, met, not_met
 from grader.judging.values import student_endpoints
-from grader.judging.wording import counted, listed, moment, nearest, number, quote
+from grader.judging.wording import listed, moment, nearest, number, quote
 
 Pair = tuple[Endpoint, Endpoint]
 

@@ -9,7 +9,7 @@ from typing import Annotated
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, seconds
+from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, counted, seconds
 from grader.core.trace import Trace
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.findings import (
@@ -25,7 +25,7 @@ from grader.judging.findings import (
 from grader.judging.output import Output, in_window, numbers_in, printed_lines, student_records
 from grader.judging.service_calls import calls_of
 from grader.judging.values import JITTER_NS, as_number, heard_from_ns, shown, student_endpoints, value_at
-from grader.judging.wording import counted, moment, quote, span
+from grader.judging.wording import moment, quote, span
 
 #: More numbers than this in one text, besides those expected, show nothing.
 _FEW = 6

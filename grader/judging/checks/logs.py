@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 from grader.core.chart import Band, Level, Look, Panel, Tone
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Location, ProblemKind
-from grader.core.quantities import DurationNs, FieldOf, Pattern, seconds, within
+from grader.core.quantities import DurationNs, FieldOf, Pattern, counted, seconds, within
 from grader.core.trace import LogRecord, Message, Trace
 from grader.judging.charts import Lanes, gaps_panel, series
 from grader.judging.findings import (
@@ -29,7 +29,7 @@ from grader.judging.findings import (
 from grader.judging.output import Output, is_no_node, numbers_in, printed_lines, shape_of, student_records
 from grader.judging.plots import Drawing, Plot
 from grader.judging.values import JITTER_NS, number_at, published
-from grader.judging.wording import counted, listed, moment, number, quote, span
+from grader.judging.wording import listed, moment, number, quote, span
 
 LOGGER_HINT = "write through the node's logger: self.get_logger().info(...)"
 

@@ -10,7 +10,7 @@ from grader.core.chart import Band, Case, Chart, Look, Panel, Point, Series, Ton
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
+from grader.core.quantities import NS_PER_S, DurationNs, counted, seconds, within
 from grader.core.trace import Fault, Trace
 from grader.judging.charts import gaps_panel, series, time_chart
 from grader.judging.checks.logs import complained
@@ -29,7 +29,7 @@ from grader.judging.position_logs import (
     printed_positions,
     track_of,
 )
-from grader.judging.wording import counted, moment, number, quote, span
+from grader.judging.wording import moment, number, quote, span
 
 _LOGGER_HINT = "write the position through the node's logger: self.get_logger().info(...)"
 _TIMER_HINT = "log from a timer of that period, or give the logger throttle_duration_sec"

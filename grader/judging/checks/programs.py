@@ -12,7 +12,7 @@ from grader.core.chart import Case, Look, Panel
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Location, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, seconds, within
+from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, counted, seconds, within
 from grader.core.trace import FaultKind, Message, Trace
 from grader.judging.charts import expected_series, series
 from grader.judging.findings import (
@@ -37,7 +37,7 @@ from grader.judging.service_calls import (
 )
 from grader.judging.source import Source, read, subtree
 from grader.judging.values import FieldRule, Reading, as_number, published, shown, value_at
-from grader.judging.wording import counted, listed, moment, number, quote, span
+from grader.judging.wording import listed, moment, number, quote, span
 
 _DECLARE_HINT = "declare it where the node is created: self.declare_parameter('{name}', ...)"
 _READ_HINT = "read the parameter each time it is used, self.get_parameter('{name}').value, or react to its change"

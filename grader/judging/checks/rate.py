@@ -10,12 +10,12 @@ from itertools import pairwise
 from grader.core.chart import Band, Chart, Level, Panel, Point, Tone
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
+from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, counted, seconds, within
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
 from grader.judging.charts import gaps_panel, series, time_chart
 from grader.judging.findings import explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met, partly
 from grader.judging.values import published
-from grader.judging.wording import counted, moment, number, quote, span
+from grader.judging.wording import moment, number, quote, span
 
 #: How much later than two periods before the end the last message may be missing: rounding, or a busy machine.
 _END_SLACK_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}

@@ -13,7 +13,7 @@ from grader.core.chart import Look, Panel, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_MS, NS_PER_S, FieldOf, seconds
+from grader.core.quantities import NS_PER_MS, NS_PER_S, FieldOf, counted, seconds
 from grader.core.trace import ClockKind, Endpoint, LogRecord, Message, Trace
 from grader.judging.charts import expected_series, series
 from grader.judging.checks.logs import LOGGER_HINT
@@ -55,7 +55,7 @@ from grader.judging.values import (
     number_at,
     student_endpoints,
 )
-from grader.judging.wording import counted, moment, number, numbers, quote
+from grader.judging.wording import moment, number, numbers, quote
 
 #: How long after a message its log may come, if there are enough numbers in total.
 _LATE_NS = NS_PER_S

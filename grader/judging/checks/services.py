@@ -11,7 +11,17 @@ from grader.core.chart import Look, Panel, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, Pattern, ServiceType, seconds, within
+from grader.core.quantities import (
+    NS_PER_S,
+    DurationNs,
+    FieldFormula,
+    FieldOf,
+    Pattern,
+    ServiceType,
+    counted,
+    seconds,
+    within,
+)
 from grader.core.trace import Response, Trace
 from grader.judging.charts import expected_series, series
 from grader.judging.findings import explain_fault, explain_no_server, first_fault, met, not_met, waiting_for
@@ -20,7 +30,7 @@ from grader.judging.plots import Drawing
 from grader.judging.series import curve
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of
 from grader.judging.values import FewSuffice, Reading, RuleOrValue, breach, broken_rules, number_at, rules_text, text_at
-from grader.judging.wording import counted, listed, moment, number, numbers, quote, span
+from grader.judging.wording import listed, moment, number, numbers, quote, span
 
 _RETURN_HINT = "a service callback takes (self, request, response) and ends with return response"
 

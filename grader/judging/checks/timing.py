@@ -14,7 +14,7 @@ from grader.core.chart import Band, Case, Level, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, seconds, within
+from grader.core.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, counted, seconds, within
 from grader.core.trace import Delivery, Message, Trace
 from grader.judging.charts import Lanes, gaps_panel
 from grader.judging.checks.fields import too_few_messages
@@ -48,7 +48,7 @@ from grader.judging.values import (
     student_endpoints,
     value_at,
 )
-from grader.judging.wording import counted, listed, moment, number, quote, span
+from grader.judging.wording import listed, moment, number, quote, span
 
 MarkName = Literal[
     "stream_starts", "stream_stops", "server_starts", "server_stops", "process_starts", "exited", "stop_signal"

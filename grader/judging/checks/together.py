@@ -11,7 +11,7 @@ from itertools import pairwise
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Problem, ProblemKind
-from grader.core.quantities import NS_PER_MS, seconds, within
+from grader.core.quantities import NS_PER_MS, counted, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace, unmet_policy
 from grader.judging.findings import FAULT_KEY, explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met
 from grader.judging.plots import Drawing, threshold_drawing
@@ -25,7 +25,7 @@ from grader.judging.values import (
     published_numbers,
     student_endpoints,
 )
-from grader.judging.wording import counted, moment, number, quote, span, unit_of
+from grader.judging.wording import moment, number, quote, span, unit_of
 
 #: An answer may belong to any input that was current within this time before it.
 _CURRENT_NS = 250 * NS_PER_MS

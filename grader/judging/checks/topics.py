@@ -9,13 +9,13 @@ from typing import Annotated, ClassVar
 from grader.core.chart import Level
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import SLACK, FieldNumber, FieldOf, Hertz, seconds, within
+from grader.core.quantities import SLACK, FieldNumber, FieldOf, Hertz, counted, seconds, within
 from grader.core.trace import Endpoint, Message, Trace
 from grader.judging.charts import gaps_panel
 from grader.judging.findings import explain_fault, explain_no_message, explain_no_subscription, met, not_met
 from grader.judging.plots import Drawing, Plot, value_panels
 from grader.judging.values import FieldRule, equals, leaves, number_at, published, student_endpoints, text_at
-from grader.judging.wording import counted, listed, moment, number, numbers, quote
+from grader.judging.wording import listed, moment, number, numbers, quote
 
 
 @dataclass(frozen=True, slots=True)
