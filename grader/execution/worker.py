@@ -60,6 +60,8 @@ ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 5
 WORN_BYTES = 128 * MIB
 #: What a bare process sees of the grader: the module that makes the machine look the same.
 MACHINE = Path(machine.__file__).resolve().parent
+#: Where it sees that module, which says nothing of the grader.
+MACHINE_SEEN_AT = Path("/opt/student/lib")
 #: In sockstat: the TCP sockets in use, and those that only wait for their port to be free again (`tw`).
 _CONNECTIONS = re.compile(r"\bTCP6?: inuse (\d+)|\btw (\d+)")
 
@@ -267,12 +269,13 @@ class Worker:
     def _start_bare(self, plan: Plan, name: str, file: str, domain: int) -> NodeProcess:
         """Start a file without the grader's code in its process."""
         runtime = _with_packages(self._runtime, plan)
-        own = MACHINE if self._isolation.submission_seen_at == IN_PLACE else Path(self._isolation.host_seen_at)
+        own = MACHINE if self._isolation.submission_seen_at == IN_PLACE else MACHINE_SEEN_AT
         # nothing in its process could add to sys.path, so these folders come before the installed packages
         searched = (*runtime.python_paths, *plan.interfaces, own)
         process = StudentProcess(
             runtime=runtime,
             host_folder=MACHINE,  # nothing else of the grader
+            host_at=MACHINE_SEEN_AT,
             submission=Path(plan.root),
             arguments=(),
             environment={"ROS_DOMAIN_ID": str(domain), "PYTHONPATH": os.pathsep.join(map(str, searched))},

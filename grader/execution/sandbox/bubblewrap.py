@@ -253,7 +253,9 @@ class Bubblewrap:
             options += ["--perms", "1777", "--size", size, "--tmpfs", scratch]
         for folder in (HOME, HOME / "log", WORK):
             options += ["--perms", "0777", "--dir", str(folder)]
-        for folder in (*view.parents(), *parents_of((HOST, PLACEHOLDER) if process.host_folder else ())):
+        host_at = process.host_at or HOST
+        needed = (host_at, *(() if process.host_at else (PLACEHOLDER,))) if process.host_folder else ()
+        for folder in (*view.parents(), *parents_of(needed)):
             # If Python is installed below /tmp, these are in the scratch folder and belong to the student's user.
             options += ["--perms", "0555", "--dir", str(folder)]
         for path in view.bound:
@@ -266,7 +268,7 @@ class Bubblewrap:
             options += ["--perms", "0777", "--size", size, "--tmpfs", str(SUBMISSION)]
         else:
             options += ["--ro-bind", str(process.submission), str(SUBMISSION)]
-        options += ["--ro-bind", str(process.host_folder), str(HOST)] if process.host_folder else []
+        options += ["--ro-bind", str(process.host_folder), str(host_at)] if process.host_folder else []
         options += more
         # bubblewrap's /dev is a tmpfs without a size limit, which its owner could fill.
         return [*options, "--remount-ro", "/dev", "--remount-ro", "/"]

@@ -32,6 +32,8 @@ class StudentProcess:
     writable: bool = False
     # The working directory, relative to a submission that may be written to; None for an empty folder of its own
     working: str | None = None
+    # Where the process sees `host_folder` in tiers with a view of files for each; None for the usual place
+    host_at: Path | None = None
     own: str = ""  # part of the name of its own folder, in tiers without a view of files for each process
 
 

@@ -18,7 +18,8 @@ def token_by_its_name(node):
 
 @attempt
 def name_of_the_user(node):
-    return [name for name in ("USER", "LOGNAME", "HOSTNAME", "OLDPWD", "XDG_RUNTIME_DIR", "DISPLAY") if name in os.environ]
+    own = [name for name in ("USER", "LOGNAME") if os.environ.get(name) != "student"]  # the user of every sandbox
+    return own + [name for name in ("HOSTNAME", "OLDPWD", "XDG_RUNTIME_DIR", "DISPLAY") if name in os.environ]
 
 
 run()

@@ -29,8 +29,15 @@ def changes_root(node):
 
 @attempt
 def writes(node):
-    with open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "written"), "w"):
-        return True
+    return any([is_written(place) for place in ("/", "/usr/lib", "/grader_host/host", os.path.dirname(os.__file__))])
+
+
+def is_written(place):
+    try:
+        with open(os.path.join(place, "written"), "w"):
+            return True
+    except OSError:
+        return False
 
 
 def mounts(source, target, flags):

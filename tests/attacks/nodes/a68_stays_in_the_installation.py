@@ -9,8 +9,9 @@ import rclpy
 from attempts import attempt, run
 
 FOLDERS = {sys.prefix, sys.base_prefix, sysconfig.get_path("purelib"), sysconfig.get_path("stdlib"),
-           os.path.dirname(rclpy.__file__), os.path.dirname(os.__file__), "/grader_host/host", "/submission", "/usr/lib",
+           os.path.dirname(rclpy.__file__), os.path.dirname(os.__file__), "/grader_host/host", "/usr/lib",
            *(path for path in sys.path if os.path.isdir(path))}
+FOLDERS -= {os.path.dirname(os.path.abspath(__file__))}  # its own copy of the submission, which no other node has
 
 
 @attempt
