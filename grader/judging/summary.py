@@ -11,7 +11,7 @@ from typing import TypeVar
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.report import Pace, Summary, TopicSummary
 from grader.core.trace import Message, Offer, Trace
-from grader.judging.judge_run import started
+from grader.judging.judge_run import started, unheard
 from grader.judging.values import as_number
 
 #: The different values of a text field that a summary names, and the elements of an array that it looks at: enough for
@@ -34,7 +34,7 @@ def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary
         records=trace.records(),
         lines=trace.lines(),
         faults=trace.faults(),
-        notes=(*started(trace), *trace.notes),
+        notes=(*started(trace), *unheard(trace), *trace.notes),
         starts=trace.starts,
         # of those of equal size the last, whose parts have all been matched
         graph=max(reversed(graphs), key=lambda g: len(g.endpoints) + len(g.services) + len(g.nodes), default=None),

@@ -425,12 +425,13 @@ def replace_log(wrap: Callable[[Callable[..., Any]], Callable[..., Any]]) -> Non
     _rclpy.rclpy_logging_rcutils_log = wrap(_rclpy.rclpy_logging_rcutils_log)
 
 
-def install_traffic(
+def install_traffic(  # noqa: PLR0913 - all that the traffic depends on
     ledger: Ledger,
     clock: VirtualClock,
     settle: Callable[[], None],
     leave: Callable[[], None],
     give_up: Callable[[], None],
+    work_ns: Callable[[], int],
 ) -> None:
     """Count what is published and taken, and let the grader match every endpoint before it is used.
 
@@ -440,6 +441,7 @@ def install_traffic(
         settle: Yields to the grader at the same instant.
         leave: The same, but returns only after all sent messages have arrived; called before a sender is destroyed.
         give_up: Called for an endpoint whose events the middleware times on the real clock.
+        work_ns: Returns how much processor time the program has used.
     """
     ledger.events.install(BACKGROUND)
     _install_endpoints(ledger, settle, leave, give_up)
@@ -456,11 +458,13 @@ def install_traffic(
         if ledger.is_elsewhere(handle):
             return send()
         clock.busy_sending()
-        ledger.note_sent(name, handle)
+        early = ledger.early[name]
+        ledger.note_sent(name, handle, work_ns())
         try:
             return send()
         except BaseException:
             ledger.sent[name] -= 1  # nothing was sent, e.g. because the context was shut down
+            ledger.early[name] = early
             raise
 
     publish = rclpy.publisher.Publisher.publish
@@ -482,6 +486,14 @@ def install_traffic(
     def counted_respond(self: Any, response: Any, header: Any) -> Any:
         return counted(f"response {service_name(self)}", self.handle, lambda: respond(self, response, header))
 
+    make = rclpy.publisher.Publisher.__init__
+
+    @functools.wraps(make)
+    def made(self: Any, *args: Any, **kwargs: Any) -> None:
+        make(self, *args, **kwargs)
+        ledger.note_created(self, work_ns())
+
+    rclpy.publisher.Publisher.__init__ = made
     rclpy.publisher.Publisher.publish = counted_publish
     rclpy.client.Client.call_async = counted_call
     rclpy.service.Service.send_response = counted_respond
@@ -635,6 +647,21 @@ def see_whole_graph(ledger: Ledger, settle: Callable[[], None]) -> None:
         ledger.sees_graph = ledger.changed = True
     if ledger.changed:
         settle()
+    ledger.note_waited()
+
+
+def _note_found(ledger: Ledger, cls: Any, name: str) -> None:
+    """Note that a program has found a server: on a real clock, this takes the time in which it is discovered itself."""
+    look = getattr(cls, name)
+
+    @functools.wraps(look)
+    def looked(self: Any, *args: Any, **kwargs: Any) -> Any:
+        found = look(self, *args, **kwargs)
+        if found:
+            ledger.note_waited()
+        return found
+
+    setattr(cls, name, looked)
 
 
 def install_departures(leave: Callable[[], None], remove: Callable[[], None] = lambda: None) -> None:
@@ -749,8 +776,10 @@ def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None
     looking(rclpy.context.Context, "ok", lambda: None)
     looking(rclpy.task.Future, "done", lambda: None)
     looking(rclpy.client.Client, "service_is_ready", at_the_graph)
+    _note_found(ledger, rclpy.client.Client, "service_is_ready")
     _install_counts(clock, at_the_graph)
     looking(_rclpy.ActionClient, "is_action_server_available", at_the_graph)
+    _note_found(ledger, _rclpy.ActionClient, "is_action_server_available")
     for name in GRAPH_LOOKS:
         looking(rclpy.node.Node, name, lambda: at_the_graph(whole=True))
 

@@ -13,12 +13,30 @@ from typing import Any
 from . import originals
 from .link import Link
 
-#: How long, in real time, a new publisher waits for its first subscription before its first message.
-MATCH_S = 2.0
+#: How long, in real time, a new publisher waits for the grader's subscription before its first message, and how the
+#: name of the grader's node begins.
+MATCH_S, OBSERVER = 2.0, "_ros2cli_daemon_"
 #: How long, in real time, to wait until what was sent has arrived before its sender is destroyed.
 ACKNOWLEDGED_S = 0.5
+#: A first message that is sent sooner after its publisher was created, without the time in which its thread waited for
+#: a processor, is one that nobody would have heard: discovery takes some milliseconds. The most that are reported.
+EARLY_S, MOST_EARLY = 0.01, 500
 #: How long the other side may take to pass on a request or a response that it has read: nothing tells when it has.
 TAKEN_S = 0.03
+
+
+class _Existed:
+    """Measures how long something has existed, without the time in which its thread waited for a processor."""
+
+    def __init__(self) -> None:
+        self._thread = originals.get_native_id()
+        self._began_s, self._starved_ns = originals.perf_counter(), originals.starved_ns(self._thread)
+
+    def seconds(self) -> float:
+        """Return the time; of what another thread does, the whole of it."""
+        starved_ns = originals.starved_ns(self._thread) - self._starved_ns
+        mine = self._thread == originals.get_native_id()
+        return originals.perf_counter() - self._began_s - (starved_ns / 1e9 if mine else 0.0)
 
 
 class WallTime:
@@ -33,30 +51,44 @@ class WallTime:
         self._publishing: weakref.WeakSet[Any] = weakref.WeakSet()
         self._patience: Any = None
         self._exchanged = False
+        self._early_reports = 0
         self.domain = 0
 
     def install_ros(self) -> None:
-        """Make every publisher wait for a subscription before its first message, as if it joined a running system."""
+        """Make every publisher wait for the grader's subscription before its first message, so that it is recorded."""
         import rclpy.client
         import rclpy.publisher
         import rclpy.service
         from rclpy.duration import Duration
 
         from . import ros
-        from .ledger import BACKGROUND, is_in
+        from .ledger import BACKGROUND, is_in, is_latched
 
-        publish = rclpy.publisher.Publisher.publish
+        publish, make = rclpy.publisher.Publisher.publish, rclpy.publisher.Publisher.__init__
         matched, time = self._publishing, self
+        existed_s: weakref.WeakKeyDictionary[Any, _Existed] = weakref.WeakKeyDictionary()
         self._patience = Duration(seconds=ACKNOWLEDGED_S)
+
+        @functools.wraps(make)
+        def made(self: Any, *args: Any, **kwargs: Any) -> None:
+            make(self, *args, **kwargs)
+            if not is_latched(self):
+                existed_s[self] = _Existed()
 
         @functools.wraps(publish)
         def publish_when_matched(self: Any, msg: Any) -> Any:
             if self not in matched and self.topic_name not in BACKGROUND:
+                existed = existed_s.pop(self, None)
+                early = existed is not None and existed.seconds() < EARLY_S
                 # In another domain there are no subscriptions: waiting would only delay the program.
                 owner = _owner_of(self, ros.MADE_NODES)
-                if owner is None or is_in(time.domain, owner):
+                if owner is None:
                     originals.wait_until(self.get_subscription_count, MATCH_S, pause_s=0.001)
+                elif is_in(time.domain, owner):
+                    originals.wait_until(functools.partial(_is_watched, owner, self), MATCH_S, pause_s=0.002)
                 matched.add(self)
+                if early:
+                    time.report_early(self.topic_name)
             return publish(self, msg)
 
         def when_heard(destroy: Callable[..., None]) -> Callable[..., None]:
@@ -75,6 +107,7 @@ class WallTime:
 
             return noted
 
+        rclpy.publisher.Publisher.__init__ = made
         rclpy.publisher.Publisher.publish = publish_when_matched
         for sender in (rclpy.publisher.Publisher, rclpy.client.Client, rclpy.service.Service):
             sender.destroy = when_heard(sender.destroy)
@@ -82,6 +115,12 @@ class WallTime:
         rclpy.service.Service.send_response = noting(rclpy.service.Service.send_response)
         ros.note_nodes()
         ros.install_departures(self._leave)
+
+    def report_early(self, topic: str) -> None:
+        """Report that what is sent on a topic now is sent before anybody could have discovered its publisher."""
+        if self._early_reports < MOST_EARLY:
+            self._early_reports += 1
+            self._link.send({"kind": "early", "topic": topic, "system_ns": originals.time_ns()})
 
     def _leave(self) -> None:
         """Wait until published messages have arrived, since they are lost when their publisher is destroyed."""
@@ -115,6 +154,16 @@ class WallTime:
     def summary(self) -> dict[str, Any]:
         """Return the additional fields of the last report: none."""
         return {}
+
+
+def _is_watched(node: Any, publisher: Any) -> bool:
+    """Return whether a publisher of a node is matched, and the grader's subscription is in the graph."""
+    from rclpy.node import Node
+
+    if not publisher.get_subscription_count():
+        return False
+    known = Node.get_subscriptions_info_by_topic(node, publisher.topic_name)
+    return any(one.node_name.startswith(OBSERVER) for one in known)
 
 
 def _owner_of(publisher: Any, made: list[weakref.ref[Any]]) -> Any:
