@@ -1,4 +1,4 @@
-"""Tells a ROS package that this installation lacks from a module that a submission should bring."""
+"""Tells what this installation lacks, a ROS package or a newer Python, from what a submission should bring."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import ast
 from collections.abc import Mapping, Sequence
 
 from grader.core.dataclass import dataclass
-from grader.core.trace import Fault, FaultKind, Trace
+from grader.core.exercise import Location
+from grader.core.scenario import is_launch_file
+from grader.core.trace import Fault, FaultKind, NewerPython, Trace
 from grader.judging.findings import faults_before_stop
 from grader.judging.source import read, words
 
@@ -56,6 +58,22 @@ def lacking_package(trace: Trace, processes: Sequence[str], sources: Mapping[str
         if fault.file.rpartition("/")[2] != fault.process or _imports(sources.get(fault.process, ""), found[1]):
             return LackingPackage(found[1], fault)
     return None
+
+
+def lacking_python(trace: Trace, processes: Sequence[str], place: Location | None) -> NewerPython | None:
+    """Return what programs of a scenario use of the Python of the ROS release, which is newer than the one here.
+
+    Args:
+        trace: The recording.
+        processes: The programs.
+        place: Where points are lost. A file that no Python can read is the student's to correct.
+    """
+    known = {(one.process, one.file) for one in trace.newer}
+    wrong = {f.file for f in trace.faults() if f.kind is FaultKind.SYNTAX_ERROR and (f.process, f.file) not in known}
+    if place is not None and place.file in wrong:
+        return None
+    launched = any(map(is_launch_file, processes))  # a launch file's nodes have names of their own
+    return next((one for one in trace.newer if launched or one.process in processes), None)
 
 
 def _imports(text: str, package: str) -> bool:
