@@ -15,9 +15,9 @@ from grader.judging.source import read, words
 #: Python packages that come with a desktop installation of ROS 2 and not with the wheels of rclpy.
 ROS_PACKAGES = frozenset(
     words(
-        "action_tutorials_interfaces angles catkin_pkg composition_interfaces cv_bridge domain_coordinator "
+        "action_tutorials_interfaces angles catkin_pkg composition_interfaces cv2 cv_bridge domain_coordinator "
         "image_geometry interactive_markers joint_state_publisher laser_geometry launch launch_ros "
-        "launch_testing launch_testing_ros launch_xml launch_yaml logging_demo map_msgs message_filters "
+        "launch_testing launch_testing_ros launch_xml launch_yaml logging_demo map_msgs matplotlib message_filters "
         "osrf_pycommon pcl_msgs pendulum_msgs PyKDL python_qt_binding qt_gui resource_retriever robot_state_publisher "
         "ros2action ros2bag ros2cli ros2component ros2doctor ros2interface ros2launch ros2lifecycle ros2node ros2param "
         "ros2pkg ros2run ros2service ros2topic rosbag2_interfaces rosbag2_py rosidl_runtime_py rqt_gui rqt_gui_py "
@@ -36,6 +36,8 @@ ROS_PACKAGES = frozenset(
 )
 
 
+#: Those that no ROS package holds, but that such an installation needs, with the extra of the grader that brings them.
+EXTRAS = {"cv2": "opencv", "matplotlib": "plots"}
 #: Endings of the names of packages that hold nothing but interfaces.
 INTERFACES = ("_msgs", "_interfaces")
 

@@ -15,7 +15,7 @@ from grader.core.trace import Fault, FaultKind, Request, Response, Trace
 from grader.judging.authored import breach, is_authored, mistake_in, mistake_of
 from grader.judging.checks import CHECKS
 from grader.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
-from grader.judging.installation import INTERFACES, lacking_package, lacking_python
+from grader.judging.installation import EXTRAS, INTERFACES, lacking_package, lacking_python
 from grader.judging.values import student_endpoints
 from grader.judging.wording import quote, span
 
@@ -136,6 +136,9 @@ def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sourc
         return answer
     text = f"{fault_place(lack.fault)}: {lack.name} is a package of ROS 2 that is not installed where this was graded"
     hint = f"grade again where {lack.name} is installed, or leave the import out if the program does not need it"
+    if lack.name in EXTRAS:
+        text = f"{fault_place(lack.fault)}: {lack.name} comes with ROS 2 and is not installed where this was graded"
+        hint = f"grade again after pip install 'rclpy-grader[{EXTRAS[lack.name]}]', which brings {lack.name}"
     if lack.name.endswith(INTERFACES):
         hint = f"grade again with --interfaces and the folder of {lack.name}, which has its definitions"
     return Answer(problem=f"{text}, which is not the program's fault", hint=hint, fault=lack.fault)
