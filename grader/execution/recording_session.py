@@ -94,6 +94,7 @@ class RecordingSession:
             budget: Real time that all jobs may take together; None for any.
             under_way: Called once while jobs are being recorded, for work that need not wait for them.
         """
+        from grader.execution.newer_python import with_newer  # noqa: PLC0415 - as the next one
         from grader.execution.unrunnable import trace_without_run  # noqa: PLC0415 - after a worker has been started
 
         budget = budget or RealTimeBudget()
@@ -105,9 +106,9 @@ class RecordingSession:
         under_way()
 
         def tell(key: Key, trace: Trace) -> None:
-            traces[key] = trace
+            traces[key] = with_newer(trace, jobs[key].plan.root, self.ros.distro)
             if finished is not None:
-                finished(key, trace)
+                finished(key, traces[key])
 
         for key, trace in chain(known.items(), recorded):
             traces[key] = trace

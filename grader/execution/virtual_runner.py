@@ -373,11 +373,20 @@ def unfit(students: Sequence[NodeProcess], seen: Sequence[Observation], *, full:
         seen: The observations.
         full: Whether a limit has ended the recording.
     """
-    if any(isinstance(o, Fault) and o.kind is FaultKind.HUNG for o in seen):
-        return next((UNSETTLED[s.unsettled] for s in students if s.unsettled in UNSETTLED), "")
+    hung = [one for one in seen if isinstance(one, Fault) and one.kind is FaultKind.HUNG]
+    if hung:
+        return next((_why_unsettled(s, hung) for s in students if s.unsettled in UNSETTLED), "")
     if full:
         return ""
     hiding = [s.workload for s in students if s.workload is not None and s.workload.delay.hides]
     if not hiding:
         return ""
     return OUTSIDE if any(workload.waited_ns > workload.used_ns for workload in hiding) else BUSY
+
+
+def _why_unsettled(student: NodeProcess, hung: Sequence[Fault]) -> str:
+    """Return why a program does not settle, with the line that it is at if it waits for something outside."""
+    fault = next((fault for fault in hung if fault.process == student.name and fault.file), None)
+    if student.unsettled != "outside" or fault is None:
+        return UNSETTLED[student.unsettled]
+    return f"{fault.file}:{fault.line} {fault.text}" if fault.line else f"{fault.file} {fault.text}"

@@ -34,7 +34,7 @@ def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary
         records=trace.records(),
         lines=trace.lines(),
         faults=trace.faults(),
-        notes=(*started(trace), *trace.notes),
+        notes=(*started(trace), *trace.notes, *(one.sentence for one in trace.newer)),
         starts=trace.starts,
         # of those of equal size the last, whose parts have all been matched
         graph=max(reversed(graphs), key=lambda g: len(g.endpoints) + len(g.services) + len(g.nodes), default=None),

@@ -110,7 +110,8 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
         time.give_up_outside = watchdog.give_up_outside
         Watch(link, request["root"]).install()
     home = os.environ.get("HOME", "")
-    written = Written((request["root"], os.getcwd(), home), os.path.join(home, "log"))
+    kept = tuple(os.path.join(home, name) for name in ("log", ".cache", ".config"))
+    written = Written((request["root"], os.getcwd(), home), kept)
     ending = play(request, describer, link, install_ros)
     try:
         ending |= clean_up(request["root"], time, watchdog)

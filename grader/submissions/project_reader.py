@@ -24,7 +24,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from grader.submissions.confinement import confine
+from grader.execution.confinement import confine
 from grader.submissions.setup_files import LimitError, given_to_setup
 
 #: Why a file was not read: it is no valid text of its format, or reading it would take too much.
