@@ -281,7 +281,7 @@ def test_packages_are_observed(path: Path, processes: tuple[str, ...], nodes: tu
     ("path", "said"),
     [
         (ROBOT / "talkr", "expected an executable (robot/talker or robot/listener), found none"),
-        (ROBOT / "launch", "expected a package or workspace with entry points, found none"),
+        (ROBOT / "launch", "expected a package or workspace with executables, found none"),
         (ROBOT / "config" / "talker.yaml", "expected a .py file, found none"),
     ],
 )

@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from grader.core.dataclass import dataclass
-from grader.core.projects import Project
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Fault, FaultKind, LogRecord, Mark, Observation, Offer, OutputLine, Trace
 from grader.execution.ending import START_CPU_S, reported_fault
-from grader.execution.executables import Executable, executables, find_executable, has_package
+from grader.execution.executables import Executable, executables, find_executable, find_loose, has_package, why_unknown
 from grader.execution.notes import Places, left_out_words, quoted
 from grader.execution.plan import Plan, PlannedStart
 from grader.execution.student_process import NodeProcess
@@ -103,13 +102,15 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
     for node in _dicts(report.get("nodes"), NODES):
         package, wanted = _text(node.get("package")), _text(node.get("executable"))
         near = _text(node.get("near")) if has_package(plan.projects, _text(node.get("near"))) else ""
-        found = None if near else find_executable(root, plan.projects, package, wanted)
+        known_package = has_package(plan.projects, package)
+        look = find_executable(root, plan.projects, package, wanted) if known_package else find_loose(root, wanted)
+        found = None if near else look
         where = _place(name, node, places)
         if found is None or found.file is None:
-            if _is_built_by_cmake(root, plan.projects, package) and found is None:
-                left_out.append(f"{where}: {_program(package, wanted)} was not started: {_BUILT_BY_CMAKE}")
+            if found is None and (why := why_unknown(root, plan.projects, package, wanted)):
+                left_out.append(f"{where}: {_program(package, wanted)} was not started: {why}")
                 continue
-            if has_package(plan.projects, package) or near:
+            if known_package or near:
                 text = _not_found(package, wanted, found, executables(root, plan.projects), near)
                 file, _, line = where.rpartition(":")
                 return Launched(
@@ -119,7 +120,7 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
             sentence = f"{where}: {_program(package, wanted)} was not started: {_lacking(package)}"
             (notes if package in ONLY_LOOKING else left_out).append(sentence)
             continue
-        if not found.target and not has_package(plan.projects, package):
+        if not known_package:
             notes.append(f"{where}: {_lacking(package)}; {found.file} was started")
         made = _added(made, name, node, found, where, known)
         if problem := made.starts[-1].problem:
@@ -169,23 +170,15 @@ def _lacking(package: str) -> str:
     return f"the submission has no package {package if _NAME.fullmatch(package) else quoted(package)}"
 
 
-_BUILT_BY_CMAKE = "CMake builds the programs of its package"
-
-
-def _is_built_by_cmake(root: Path, projects: Sequence[Project], package: str) -> bool:
-    """Return whether a package may have programs in C++, which nothing here can build."""
-    return any(one.name == package and (root / one.folder / "CMakeLists.txt").is_file() for one in projects)
-
-
 def _not_found(package: str, wanted: str, found: Executable | None, known: Sequence[Executable], near: str) -> str:
     if near:
         return f"PackageNotFoundError: package {quoted(package)} not found; the submission has {near}"
     if found is not None:
-        return f"SubstitutionFailure: the entry point {wanted} of {package} is {found.target}, which is not there"
+        return f"SubstitutionFailure: {found.problem}"
     names = ", ".join(one.name for one in known if one.package == package)
     name = f"'{wanted}'" if _NAME.fullmatch(wanted) else quoted(wanted)
     text = f"SubstitutionFailure: package '{package}' found, but executable {name} not found"
-    return f"{text}; its entry points are {names}" if names else f"{text}; it has no entry points"
+    return f"{text}; its executables are {names}" if names else f"{text}; it has no executables"
 
 
 def _left_out(name: str, one: Mapping[str, Any], places: Places) -> str:

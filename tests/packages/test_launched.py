@@ -87,7 +87,7 @@ def test_an_executable_that_is_not_there_is_a_fault(graded: Callable[..., Exerci
     assert set(outcomes(report).values()) <= {"not_met", "blocked"}
     (fault,) = report.faults
     assert (fault.file, fault.line) == (LAUNCH, line_of(LAUNCH, "        Node("))
-    assert "executable 'talk' not found; its entry points are talker, listener" in fault.text
+    assert "executable 'talk' not found; its executables are talker, listener" in fault.text
 
 
 def test_what_is_left_out_costs_no_points(graded: Callable[..., ExerciseReport]) -> None:
@@ -127,7 +127,7 @@ def test_a_program_that_cmake_builds_costs_no_points(graded: Callable[..., Exerc
     report = graded((LAUNCH, "        Node(\n", f"        {node}\n        Node(\n"))
     assert set(outcomes(report).values()) == {"met"}
     line = line_of(LAUNCH, "        Node(")
-    said = f"{LAUNCH}:{line}: drive_cpp/listener was not started: CMake builds the programs of its package"
+    said = f"{LAUNCH}:{line}: drive_cpp/listener was not started: it is not a Python program"
     assert said in report.notes
 
 
@@ -201,7 +201,7 @@ def test_a_launch_file_starts_nothing_outside_of_the_submission(
     assert not any("antigravity" in start.file or "this.py" in start.file for start in report.starts)
     if package == "robot":
         assert set(outcomes(report).values()) <= {"not_met", "blocked"}
-        assert "not found; its entry points are talker, listener" in report.faults[0].text
+        assert "not found; its executables are talker, listener" in report.faults[0].text
     else:
         assert set(outcomes(report).values()) == {"met"}
         assert any("was not started: the submission has no package elsewhere" in note for note in report.notes)
