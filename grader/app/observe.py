@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S
 from grader.core.report import Summary
 from grader.core.scenario import OdometryStream, Scenario, Span, is_launch_file
+from grader.core.submission import Submission
 from grader.core.trace import Trace
 from grader.execution.bag import read_odometry
 from grader.execution.launching import NODES
@@ -26,6 +27,7 @@ from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
 from grader.judging.summary import summarise
 from grader.judging.values import student_endpoints
+from grader.submissions.sources import source_text
 
 #: When a given recording starts playing; before that the nodes receive no odometry.
 ODOMETRY_AFTER_NS = NS_PER_S
@@ -53,6 +55,7 @@ class Watched:
     trace: Trace
     processes: tuple[str, ...]  # file names of the processes
     isolation: str
+    sources: Mapping[str, str] = field(default_factory=dict)  # the text of their files, and of those that faults name
 
 
 def observe(request: ObserveRequest, progress: Progress) -> Summary:
@@ -67,7 +70,7 @@ def observe(request: ObserveRequest, progress: Progress) -> Summary:
         sent = messages(request.sent, types, request.duration_ns / NS_PER_S, request.interfaces)
         scenario = undisturbed(request, watched.processes)
         watched = watch(request, progress, replace(scenario, stimuli=(*scenario.stimuli, *sent)))
-    return summarise(watched.trace, watched.processes, watched.isolation)
+    return summarise(watched.trace, watched.processes, watched.isolation, watched.sources)
 
 
 def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None = None) -> Watched:
@@ -93,10 +96,20 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         prefixes, _ = install_shares(submission.root, submission.projects, installed, session.ros)
         plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)
         trace = session.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
+        sources = _sources(trace, submission)
     if trace.harness_problem:
         raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")
     trace = replace(trace, notes=(*known.notes, *trace.notes))
-    return Watched(trace, tuple(names), session.isolation.name)
+    return Watched(trace, tuple(names), session.isolation.name, sources)
+
+
+def _sources(trace: Trace, submission: Submission) -> dict[str, str]:
+    """Return the text of the programs and of the files that faults name, by path; none for one that is no text."""
+    named = {fault.file for fault in trace.faults()} | {start.file for start in trace.starts}
+    named |= {file.found for file in submission.files.values() if file.found}
+    # the paths are those of staged files: a process can name no other
+    texts = {name: source_text(submission.root / name) for name in sorted(named) if name}
+    return {name: text for name, text in texts.items() if text is not None}
 
 
 def undisturbed(request: ObserveRequest, names: Sequence[str]) -> Scenario:
