@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import posixpath
 import random
 from collections.abc import Iterable, Iterator, Mapping
 from shlex import quote
@@ -206,6 +207,21 @@ class Plan:
         """Return the console scripts of the package that a file is in; none if it is in none."""
         package = layout_of(self.root, file).package
         return next((project.scripts for project in self.projects if project.folder == package), ())
+
+    def is_installed(self, file: str, executable: str) -> bool:
+        """Return whether a file is started as its package installs it, as a script, and not by an entry point."""
+        package = layout_of(self.root, file).package
+        return any(
+            executable not in {script for script, _, _ in project.scripts}
+            and any(posixpath.join(project.folder, source) == file for _, source in project.programs)
+            for project in self.projects
+            if project.folder == package
+        )
+
+    @property
+    def imported(self) -> tuple[str, ...]:
+        """The folders of Python packages that CMake installs, relative to the submission."""
+        return tuple(posixpath.join(project.folder, path) for project in self.projects for path in project.imported)
 
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage

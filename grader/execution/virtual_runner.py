@@ -373,9 +373,10 @@ def unfit(students: Sequence[NodeProcess], seen: Sequence[Observation], *, full:
         seen: The observations.
         full: Whether a limit has ended the recording.
     """
-    hung = [one for one in seen if isinstance(one, Fault) and one.kind is FaultKind.HUNG]
+    hung = {o.process: o for o in seen if isinstance(o, Fault) and o.kind is FaultKind.HUNG}
     if hung:
-        return next((_why_unsettled(s, hung) for s in students if s.unsettled in UNSETTLED), "")
+        unsettled = [s for s in students if s.unsettled in UNSETTLED]
+        return next((_with_place(UNSETTLED[s.unsettled], hung.get(s.name)) for s in unsettled), "")
     if full:
         return ""
     hiding = [s.workload for s in students if s.workload is not None and s.workload.delay.hides]
@@ -384,9 +385,9 @@ def unfit(students: Sequence[NodeProcess], seen: Sequence[Observation], *, full:
     return OUTSIDE if any(workload.waited_ns > workload.used_ns for workload in hiding) else BUSY
 
 
-def _why_unsettled(student: NodeProcess, hung: Sequence[Fault]) -> str:
-    """Return why a program does not settle, with the line that it is at if it waits for something outside."""
-    fault = next((fault for fault in hung if fault.process == student.name and fault.file), None)
-    if student.unsettled != "outside" or fault is None:
-        return UNSETTLED[student.unsettled]
-    return f"{fault.file}:{fault.line} {fault.text}" if fault.line else f"{fault.file} {fault.text}"
+def _with_place(reason: str, fault: Fault | None) -> str:
+    """Return a reason with what a process did, and the line at which it did it."""
+    if fault is None:
+        return reason
+    place = f"{fault.file}:{fault.line}" if fault.file and fault.line else fault.process
+    return f"{reason}: {place} {fault.text}"

@@ -168,6 +168,7 @@ def evaluate(request: dict[str, Any]) -> None:
         path = os.path.join(here, request["file"])
         sys.argv = [path]
         packages = {name: os.path.join(root, folder).rstrip("/") for name, folder in reversed(told["packages"])}
+        sys.path += [os.path.join(root, folder) for folder in request["imported"]]
         nodes, left_out = launch_files.describe((root, own), path, packages, dict(told["arguments"]))
         found = {"nodes": nodes, "left_out": left_out}
     except BaseException as error:  # whatever the launch file raises becomes a fault
@@ -349,7 +350,7 @@ def keep_interfaces(request: dict[str, Any]) -> None:
 
 def hides_modules(request: dict[str, Any]) -> bool:
     """Return whether a module of the submission hides one that this process has imported already."""
-    return bool(entry.shadows_of(request["root"], request["file"]).files)
+    return bool(entry.shadows_of(request).files)
 
 
 def flush() -> None:

@@ -110,6 +110,8 @@ class VirtualTime:
         ros.install_traffic(
             self._ledger, self.clock, self._settle, self.leave, lambda: self.give_up_outside("timed_event")
         )
+        ros.install_events_executor(lambda: self.give_up_outside("events_executor"))
+        ros.note_other_domains(lambda: self._domain, lambda note: self._link.send({"kind": "note", **note}))
         ros.install_looks(self.clock, self._ledger, self._settle)
         ros.install_own_signals(self._await_shutdown)
         ros.install_callers()

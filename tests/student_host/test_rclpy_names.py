@@ -60,7 +60,8 @@ ASSIGNED = {
 #: Class written in C++ -> its methods and attributes; the empty name stands for functions and bare classes.
 CPP = {
     "": (
-        *("ActionClient", "ActionServer", "Clock", "ClockType", "InvalidHandle", "LifecycleStateMachine", "RCLError"),
+        *("ActionClient", "ActionServer", "Clock", "ClockType", "EventsExecutor", "InvalidHandle"),
+        *("LifecycleStateMachine", "RCLError"),
         *(
             "SignalHandlerOptions",
             "WaitSet",
