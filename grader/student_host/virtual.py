@@ -119,18 +119,24 @@ class VirtualTime:
         self._notice_output(ros)
 
     def _notice_output(self, ros: Any) -> None:
-        """Make the program report before time advances whenever it has written output, so that its time is exact."""
+        """Make the program report before time advances whenever it has written output, so that its time is exact.
 
-        def noticing(write: Callable[..., Any]) -> Callable[..., Any]:
+        Threads may take turns after a line or a log record: `print` writes the end of a line after the line.
+        """
+
+        def noticing(write: Callable[..., Any], ends: Callable[..., bool]) -> Callable[..., Any]:
             def write_and_note(*args: Any) -> Any:
                 self.unreported = True
-                return write(*args)
+                written = write(*args)
+                if ends(*args):
+                    self.scheduler.wrote()
+                return written
 
             return write_and_note
 
         for stream in (sys.stdout, sys.stderr):
-            stream.write = noticing(stream.write)  # type: ignore[method-assign]
-        ros.replace_log(noticing)
+            stream.write = noticing(stream.write, lambda text: text.endswith("\n"))  # type: ignore[method-assign]
+        ros.replace_log(lambda log: noticing(log, lambda *_: True))
 
     def start(self, now_ns: int, steady_ns: int, *, charged: float = 0.0) -> None:
         """Start virtual time in this thread, which may be of a fork of the process that made this object.
