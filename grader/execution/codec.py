@@ -70,6 +70,11 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
     }
 
 
+def beside_trace(trace: Trace) -> dict[str, Any]:
+    """Convert what the format of evidence does not include, and a supervisor has to know."""
+    return {"reached": list(trace.reached), "incomplete": trace.incomplete, "may_drift": trace.may_drift}
+
+
 def _start_to_json(start: Start) -> list[Any]:
     """Convert how a process was started; what it was given on the command line follows in a list, if there is any."""
     *row, arguments, launched_by = plain(start)

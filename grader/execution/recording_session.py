@@ -78,6 +78,7 @@ class RecordingSession:
         *,
         budget: RealTimeBudget | None = None,
         under_way: Callable[[], None] = lambda: None,
+        on_wall: bool = True,
     ) -> dict[Key, Trace]:
         """Record jobs and return their traces, in the same order.
 
@@ -93,6 +94,8 @@ class RecordingSession:
             finished: Called with each trace once it is final, while others are still being recorded.
             budget: Real time that all jobs may take together; None for any.
             under_way: Called once while jobs are being recorded, for work that need not wait for them.
+            on_wall: Whether to record on the wall clock at all. If not, what `auto` would record there is the beginning
+                in virtual time, with the reason.
         """
         from grader.execution.newer_python import with_newer  # noqa: PLC0415 - as the next one
         from grader.execution.unrunnable import trace_without_run  # noqa: PLC0415 - after a worker has been started
@@ -122,6 +125,9 @@ class RecordingSession:
             else:
                 traces[key] = replace(traces[key], clock_reason=DRIFTS)
         for key in [key for key, trace in traces.items() if _unfit(trace, clock)]:
+            if not on_wall:
+                tell(key, traces[key])
+                continue
             again = Job(f"{jobs[key].title}, on the wall clock", replace(jobs[key].plan, clock=WALL), budget)
             repeated = replace(self.recorder.record([again], progress)[0], clock_reason=traces[key].clock_reason)
             if traces[key].may_drift and _was_held_up(repeated):
@@ -196,13 +202,14 @@ def _was_held_up(trace: Trace) -> bool:
 
 
 @contextmanager
-def open_session(
+def open_session(  # noqa: PLR0913  what to open, and who is told
     isolation: str,
     workers: int | None = None,
     progress: Callable[[str], None] = lambda _: None,
     *,
     warm: bool = True,
     on_wall_clock: Callable[[], None] = lambda: None,
+    executes: bool = False,
 ) -> Iterator[RecordingSession]:
     """Open a recording session, and close it at the end of the block.
 
@@ -212,6 +219,7 @@ def open_session(
         progress: Called with a message when a sandbox has to be tested.
         warm: Whether to start a worker at once, not when something is recorded.
         on_wall_clock: See `Recorder`.
+        executes: See `Recorder`.
 
     Raises:
         EnvironmentFault: This machine lacks ROS or the requested tier.
@@ -225,7 +233,15 @@ def open_session(
     compile_own()
     with scratch_folder() as folder:
         folder.chmod(0o755)  # students' processes may run as another user and have to read the staged copy
-        kept = Recorder(tier, ros.runtime, domains, scratch=folder, workers=workers, on_wall_clock=on_wall_clock)
+        kept = Recorder(
+            tier,
+            ros.runtime,
+            domains,
+            scratch=folder,
+            workers=workers,
+            on_wall_clock=on_wall_clock,
+            executes=executes,
+        )
         with kept as recorder:
             if warm:
                 recorder.warm_up(workers)
