@@ -171,6 +171,7 @@ class Endpoint:
     depth: int = 0  # history depth, 0 if unknown
     deadline_ns: int = 0  # offered or requested deadline, 0 for none
     liveliness: str = "automatic"  # `automatic` or `manual_by_topic`
+    lease_ns: int = 0  # offered or requested lease of the liveliness, 0 for none
 
 
 def unmet_policy(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:
@@ -182,12 +183,22 @@ def unmet_policy(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str]
         return "best_effort reliability", "reliable"
     if (publisher.durability, subscription.durability) == ("volatile", "transient_local"):
         return "volatile durability", "transient_local"
-    if subscription.deadline_ns and not 0 < publisher.deadline_ns <= subscription.deadline_ns:
-        offered = f"a deadline of {seconds(publisher.deadline_ns):g} s" if publisher.deadline_ns else "no deadline"
-        return offered, f"{seconds(subscription.deadline_ns):g} s"
+    if not keeps_within(publisher.deadline_ns, subscription.deadline_ns):
+        return _time_of("deadline", publisher.deadline_ns), f"{seconds(subscription.deadline_ns):g} s"
     if (publisher.liveliness, subscription.liveliness) == ("automatic", "manual_by_topic"):
         return "automatic liveliness", "manual_by_topic"
+    if not keeps_within(publisher.lease_ns, subscription.lease_ns):
+        return _time_of("liveliness lease", publisher.lease_ns), f"{seconds(subscription.lease_ns):g} s"
     return None
+
+
+def keeps_within(offered_ns: int, requested_ns: int) -> bool:
+    """Return whether a publisher's deadline or lease is as short as a subscription requests; 0 stands for none."""
+    return requested_ns == 0 or 0 < offered_ns <= requested_ns
+
+
+def _time_of(name: str, offered_ns: int) -> str:
+    return f"a {name} of {seconds(offered_ns):g} s" if offered_ns else f"no {name}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -284,7 +284,8 @@ class VirtualTime:
             if "match" in answer:
                 missing = self._ledger.await_matches(answer["match"], answer["wait_s"])
                 self._ledger.await_absence(answer.get("gone", []), answer["wait_s"])
-                answer = self._link.ask({"kind": "matched", "missing": missing})
+                untold = self._ledger.await_events(answer["match"].get("refused", {}), answer["wait_s"])
+                answer = self._link.ask({"kind": "matched", "missing": missing, "untold": untold})
             elif "expect" in answer:
                 self._ledger.expect(answer["expect"])
                 answer = self._link.ask({"kind": "arrived"})

@@ -232,7 +232,7 @@ _EXACT_ROWS: Mapping[type, Any] = {
     GraphSnapshot: _row_of(
         GraphSnapshot,
         "services",
-        endpoints=tuple[_row_of(Endpoint), ...],  # type: ignore[misc]
+        endpoints=tuple[_row_of(Endpoint, "lease_ns", last=("lease_ns", int, 0)), ...],  # type: ignore[misc]
         last=("services", tuple[_row_of(ServiceEnd), ...], ()),  # type: ignore[misc]
     ),
     Fault: _row_of(Fault, "exit_code", "signal", "python", last=("details", _FaultDetails, _NO_DETAILS)),
