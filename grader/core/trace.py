@@ -287,6 +287,29 @@ Observation = Message | Delivery | Request | Response | LogRecord | OutputLine |
 
 
 @dataclass(frozen=True, slots=True)
+class NewerPython:
+    """What ended a program is right in the Python of the ROS release, and unknown to the older one that runs here."""
+
+    process: str  # file name of the student process
+    file: str  # the file that needs it, relative to the submission
+    line: int  # where it was found, from 1; 0 if unknown
+    needs: tuple[int, int]  # the oldest version of Python that has it
+    here: tuple[int, int]  # the version that the program ran on
+    release: str  # the ROS release, e.g. `jazzy`
+    python: tuple[int, int]  # the version that the release runs on
+    name: str = ""  # what the standard library has since then, e.g. `itertools.batched`; empty for syntax
+
+    @property
+    def sentence(self) -> str:
+        """What is lacking, and whose fault it is not."""
+        place = f"{self.file}:{self.line}" if self.line else self.file or self.process
+        needs, here, python = (".".join(map(str, version)) for version in (self.needs, self.here, self.python))
+        what = f"{self.name} came with" if self.name else "this is valid since"
+        runs = f"ROS 2 {self.release} runs on Python {python}, the grader here on Python {here}"
+        return f"{place}: {what} Python {needs}; {runs}, which is not the program's fault"
+
+
+@dataclass(frozen=True, slots=True)
 class WrittenFile:
     """A small file that a program wrote beside itself, as its process reports it; no check reads it."""
 
@@ -317,6 +340,7 @@ class Trace:
     # What a launch file asks for and the grader cannot do, as sentences: what is not met may be due to it
     left_out: tuple[str, ...] = ()
     written: tuple[WrittenFile, ...] = ()  # of programs that ended in time
+    newer: tuple[NewerPython, ...] = ()  # what programs ended of, and would not where the release's own Python runs
     # Whether a wait for the middleware timed out, so that something may be missing: a reason to record again
     incomplete: bool = False
     # The mistake in a simulation of the rubric's author that prevents judging, as `harness_problem` does; None without

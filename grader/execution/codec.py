@@ -66,9 +66,15 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
         **({"most_starved_ns": trace.most_starved_ns} if trace.most_starved_ns else {}),
         **({"left_out": list(trace.left_out)} if trace.left_out else {}),
         **({"written": [plain(file) for file in trace.written]} if trace.written else {}),
+        **({"newer": [plain(one) for one in trace.newer]} if trace.newer else {}),
         **({"author_mistake": asdict(trace.author_mistake)} if trace.author_mistake is not None else {}),
         "observations": [observation_to_json(o) for o in trace.observations],
     }
+
+
+def beside_trace(trace: Trace) -> dict[str, Any]:
+    """Convert what the format of evidence does not include, and a supervisor has to know."""
+    return {"reached": list(trace.reached), "incomplete": trace.incomplete, "may_drift": trace.may_drift}
 
 
 def _start_to_json(start: Start) -> list[Any]:

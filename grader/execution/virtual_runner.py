@@ -410,11 +410,21 @@ def unfit(students: Sequence[NodeProcess], seen: Sequence[Observation], *, full:
         seen: The observations.
         full: Whether a limit has ended the recording.
     """
-    if any(isinstance(o, Fault) and o.kind is FaultKind.HUNG for o in seen):
-        return next((UNSETTLED[s.unsettled] for s in students if s.unsettled in UNSETTLED), "")
+    hung = {o.process: o for o in seen if isinstance(o, Fault) and o.kind is FaultKind.HUNG}
+    if hung:
+        unsettled = [s for s in students if s.unsettled in UNSETTLED]
+        return next((_with_place(UNSETTLED[s.unsettled], hung.get(s.name)) for s in unsettled), "")
     if full:
         return ""
     hiding = [s.workload for s in students if s.workload is not None and s.workload.delay.hides]
     if not hiding:
         return ""
     return OUTSIDE if any(workload.waited_ns > workload.used_ns for workload in hiding) else BUSY
+
+
+def _with_place(reason: str, fault: Fault | None) -> str:
+    """Return a reason with what a process did, and the line at which it did it."""
+    if fault is None:
+        return reason
+    place = f"{fault.file}:{fault.line}" if fault.file and fault.line else fault.process
+    return f"{reason}: {place} {fault.text}"

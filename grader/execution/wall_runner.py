@@ -30,8 +30,6 @@ MESSAGES_A_LOOK, READS_A_LOOK = 100, 2
 PAUSE_S = 0.0002
 LONGEST_PAUSE_NS = 10 * NS_PER_MS
 HELD_UP_NS = 150 * NS_PER_MS
-#: What is sent so soon after the report of an early message is early as well; a timer of 100 Hz is not as fast.
-EARLY_NS = 8 * NS_PER_MS
 #: The most early messages that are told apart.
 MOST_EARLY = 10_000
 #: How long before its first message a publisher is created, so that subscriptions can discover it.
@@ -58,9 +56,9 @@ class WallRunner(Runner):
         self._next_graph_ns = 0
         self._graph_every_ns = GRAPH_EVERY_NS
         self._started = 0
-        #: When messages were sent before anybody could have discovered their publisher: topic -> times of the system
-        #: clock, as the processes report them.
-        self._early: dict[str, list[int]] = {}
+        #: When messages were sent before anybody could have discovered their publisher: topic -> beginnings and ends,
+        #: by the system clock, as the processes report them.
+        self._early: dict[str, list[tuple[int, int]]] = {}
         self._early_told = 0
         #: When messages were sent, by the system clock, by their index in the recording.
         self._sent_ns: dict[int, int] = {}
@@ -145,7 +143,7 @@ class WallRunner(Runner):
     def _marked(self, one: Observation, sent_ns: int) -> Observation:
         """Mark a message as sent before discovery if that was reported; the report may arrive after the message."""
         told = self._early.get(one.topic, ()) if isinstance(one, Message) else ()
-        if isinstance(one, Message) and any(0 <= sent_ns - system_ns <= EARLY_NS for system_ns in told):
+        if isinstance(one, Message) and any(began_ns <= sent_ns <= ended_ns for began_ns, ended_ns in told):
             return replace(one, before_discovery=True)
         return one
 
@@ -170,10 +168,10 @@ class WallRunner(Runner):
         self._recorder.add(*student.output(now_ns))
 
     def _note_early(self, report: Mapping[str, Any]) -> None:
-        topic, system_ns = report.get("topic"), report.get("system_ns")
-        if isinstance(topic, str) and isinstance(system_ns, int) and self._early_told < MOST_EARLY:
+        topic, began_ns, ended_ns = (report.get(name) for name in ("topic", "began_ns", "ended_ns"))
+        if self._early_told < MOST_EARLY and isinstance(began_ns, int) and isinstance(ended_ns, int):
             self._early_told += 1
-            self._early.setdefault(topic, []).append(system_ns)
+            self._early.setdefault(str(topic), []).append((began_ns, ended_ns))
 
     def _look_at_graph(self, now_ns: int) -> bool:
         """Record the graph, subscribe to what is new, and return whether it has changed."""

@@ -60,16 +60,8 @@ ASSIGNED = {
 #: Class written in C++ -> its methods and attributes; the empty name stands for functions and bare classes.
 CPP = {
     "": (
-        *(
-            "ActionClient",
-            "ActionServer",
-            "Clock",
-            "ClockType",
-            "EventHandle",
-            "InvalidHandle",
-            "LifecycleStateMachine",
-            "RCLError",
-        ),
+        *("ActionClient", "ActionServer", "Clock", "ClockType", "EventHandle", "EventsExecutor", "InvalidHandle"),
+        *("LifecycleStateMachine", "RCLError"),
         *(
             "SignalHandlerOptions",
             "WaitSet",

@@ -23,6 +23,7 @@ from grader.core.trace import (
     LogRecord,
     Mark,
     Message,
+    NewerPython,
     Observation,
     Offer,
     OutputLine,
@@ -125,7 +126,7 @@ def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: An
 _START = _row_of(Start, "arguments", "launched_by", last=("given", tuple[str, str], ("", "")))
 
 
-_WRITTEN = _row_of(WrittenFile)
+_WRITTEN, _NEWER = _row_of(WrittenFile), _row_of(NewerPython)
 
 
 def _start(row: Any) -> Start:
@@ -148,6 +149,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("most_starved_ns", int, 0),
         ("left_out", tuple[str, ...], ()),
         ("written", tuple[_WRITTEN, ...], ()),  # type: ignore[valid-type]
+        ("newer", tuple[_NEWER, ...], ()),  # type: ignore[valid-type]
         ("author_mistake", AuthorMistake | None, None),
     ]
     return msgspec.defstruct("Trace", written)
@@ -170,6 +172,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         most_starved_ns=row.most_starved_ns,
         left_out=row.left_out,
         written=tuple(_same(WrittenFile, file) for file in row.written),
+        newer=tuple(_same(NewerPython, one) for one in row.newer),
         author_mistake=row.author_mistake,
     )
 
