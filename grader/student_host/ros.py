@@ -13,7 +13,7 @@ import os
 import signal
 import sys
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import CodeType, SimpleNamespace
 from typing import Any
 
@@ -29,7 +29,8 @@ import rclpy.subscription
 import rclpy.task
 import rclpy.time_source
 import rclpy.utilities
-from rclpy.clock import Clock, ClockType, ROSClock
+from rclpy.clock import Clock, ClockChange, ClockType, JumpHandle, JumpThreshold, ROSClock, TimeJump
+from rclpy.duration import Duration
 from rclpy.event_handler import QoSPublisherEventType, QoSSubscriptionEventType
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -84,6 +85,9 @@ class RosClocks:
         self._made: weakref.WeakSet[Clock] = weakref.WeakSet()
         self._simulated: weakref.WeakSet[Clock] = weakref.WeakSet()
         self._told: weakref.WeakKeyDictionary[Clock, Time] = weakref.WeakKeyDictionary()
+        #: The clock that a message on /clock, or the program, sets right now: it may jump.
+        self._jumping: Clock | None = None
+        self._on_change: weakref.WeakKeyDictionary[Clock, weakref.WeakSet[JumpHandle]] = weakref.WeakKeyDictionary()
 
     def new(self, cls: type[Clock] = Clock, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> Clock:
         """Replace `Clock.__new__`."""
@@ -122,24 +126,61 @@ class RosClocks:
     def simulate(self, clock: ROSClock, active: bool) -> None:
         """Replace `ROSClock._set_ros_time_is_active`; a clock that no message has set yet is at 0."""
         if active and clock in self._made:
-            self._made.discard(clock)
-            self._simulated.add(clock)
-            _set(clock, self._told.get(clock) or Time(clock_type=ClockType.ROS_TIME))
+            with self._changing(clock, ClockChange.ROS_TIME_ACTIVATED):
+                self._made.discard(clock)
+                self._simulated.add(clock)
+                _set(clock, self._told.get(clock) or Time(clock_type=ClockType.ROS_TIME))
         elif not active and clock in self._simulated:
-            self._simulated.discard(clock)
-            self._made.add(clock)
-            _set(clock, self._time())
+            with self._changing(clock, ClockChange.ROS_TIME_DEACTIVATED):
+                self._simulated.discard(clock)
+                self._made.add(clock)
+                _set(clock, self._time())
 
     def tell(self, clock: ROSClock, time: Time) -> None:
         """Replace `ROSClock.set_ros_time_override`, which counts only while the clock is simulated."""
         self._told[clock] = time
         if clock in self._simulated:
-            _set(clock, time)
+            self._jumping = clock
+            try:
+                _set(clock, time)
+            finally:
+                self._jumping = None
+
+    def watch_jumps(
+        self, clock: Clock, threshold: JumpThreshold, *, pre_callback: Any = None, post_callback: Any = None
+    ) -> JumpHandle:
+        """Replace `Clock.create_jump_callback`: that virtual time goes on is no jump."""
+
+        def told(callback: Any) -> Any:
+            def call(*jump: Any) -> None:
+                if self._jumping is clock:
+                    callback(*jump)
+
+            return call if callable(callback) else callback
+
+        handle = _WATCH_JUMPS(clock, threshold, pre_callback=told(pre_callback), post_callback=told(post_callback))
+        if threshold.on_clock_change:
+            handle.grader_callbacks = (pre_callback, post_callback)
+            self._on_change.setdefault(clock, weakref.WeakSet()).add(handle)
+        return handle
+
+    @contextlib.contextmanager
+    def _changing(self, clock: Clock, change: ClockChange) -> Iterator[None]:
+        """Tell those who watch a clock that /clock begins or ends to set it."""
+        callbacks = [h.grader_callbacks for h in self._on_change.get(clock, ()) if h._clock is not None]
+        for before, _ in callbacks:
+            if before is not None:
+                before()
+        yield
+        for _, after in callbacks:
+            if after is not None:
+                after(TimeJump(change, Duration()))
 
     def _time(self) -> Time:
         return Time(nanoseconds=self._clock.now_ns, clock_type=ClockType.ROS_TIME)
 
 
+_WATCH_JUMPS = Clock.create_jump_callback
 #: Checks whether a task has ended, without counting as a look, which would let time pass.
 _DONE = rclpy.task.Future.done
 _RclTime = type(Time()._time_handle)
@@ -155,6 +196,10 @@ def _of_clock(clock: ROSClock, method: Callable[[ROSClock, Any], None], value: A
     method(clock, value)
 
 
+def _watch_jumps(clock: Clock, clocks: RosClocks, threshold: JumpThreshold, **callbacks: Any) -> JumpHandle:
+    return clocks.watch_jumps(clock, threshold, **callbacks)
+
+
 def _set(clock: Clock, time: Time) -> None:
     with contextlib.suppress(_rclpy.InvalidHandle), clock.handle:
         clock.handle.set_ros_time_override(time._time_handle)
@@ -166,6 +211,8 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
     ROSClock.__new__ = staticmethod(lambda cls: clocks.new(cls, clock_type=ClockType.ROS_TIME))
     ROSClock._set_ros_time_is_active = functools.partialmethod(_of_clock, clocks.simulate)
     ROSClock.set_ros_time_override = functools.partialmethod(_of_clock, clocks.tell)
+    ROSClock.ros_time_is_active = property(clocks.simulates)
+    Clock.create_jump_callback = functools.partialmethod(_watch_jumps, clocks)
     rclpy.impl.rcutils_logger.Throttle.params["throttle_time_source_type"] = Clock()
 
     timer = rclpy.executors.Timer
@@ -508,11 +555,12 @@ def _install_transitions(ledger: Ledger, counted: Counted) -> None:
     machines = _rclpy.LifecycleStateMachine
     make = machines.__init__
 
-    def made(self: Any, node: Any, telling: bool) -> None:
-        make(self, node, telling)
-        if telling:
-            ledger.transitions[self] = f"{self.service_change_state.name.rpartition('/')[0]}/transition_event"
-            ledger.changed = True
+    def made(self: Any, node: Any, *services: bool) -> None:
+        make(self, node, *services)
+        # also without services, transitions are published
+        topic = _rclpy.rclpy_resolve_name(node, "~/transition_event", False, False)  # noqa: FBT003 - C++
+        ledger.transitions[self] = topic
+        ledger.changed = True
 
     machines.__init__ = made
     for name in ("trigger_transition_by_id", "trigger_transition_by_label"):
