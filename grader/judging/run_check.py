@@ -16,6 +16,7 @@ from grader.judging.authored import breach, is_authored, mistake_in, mistake_of
 from grader.judging.checks import CHECKS
 from grader.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
 from grader.judging.installation import INTERFACES, lacking_package
+from grader.judging.launched import excuses
 from grader.judging.values import student_endpoints
 from grader.judging.wording import quote, span
 
@@ -87,7 +88,7 @@ def run_check(
                 problem=f"the machine was too busy: the nodes waited {waited} for a processor, which can be why"
             )
     if not reads_sources(criterion.check):
-        return _for_what_is_lacking(answer, scenario, trace, sources or {})
+        return _for_what_is_lacking(answer, criterion, scenario, trace, sources or {})
     return answer if answer.finding is None else replace(answer, finding=_placed(answer.finding, submission))
 
 
@@ -109,14 +110,17 @@ def for_beginning(criterion: Criterion) -> Criterion | None:
     return None if check is None else replace(criterion, check=check, check_name=check_name(criterion))
 
 
-def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
+def _for_what_is_lacking(
+    answer: Answer, criterion: Criterion, scenario: Scenario, trace: Trace, sources: Mapping[str, str]
+) -> Answer:
     """Return the answer; no answer if points are lost where this installation lacks a package of ROS.
 
     Nor is there one where a launch file asks for something that the grader cannot do.
     """
     lost = answer.finding is not None and answer.finding.credit < 1
-    if lost and trace.left_out:
-        problem = f"{trace.left_out[0]}, which can be why this is not met"
+    excuse = next(excuses(criterion.check, trace), "") if lost else ""
+    if excuse:
+        problem = f"{excuse}, which can be why this is not met"
         return Answer(problem=problem, hint=_LEFT_OUT_HINT, suspected=True)
     lack = lacking_package(trace, scenario.processes, sources) if lost else None
     if lack is None:
