@@ -154,7 +154,7 @@ LEFT_OUT = {
     "Node(**TALKER, parameters=[{'urdf': Command(['xacro ', 'a.urdf'])}])": 'the substitution Command("xacro a.urdf")',
     "SetEnvironmentVariable('PATH', '/x')": "the environment variable PATH",
     "Node(**TALKER, prefix='gdb')": "prefix= of a node",
-    "IncludeLaunchDescription('more.launch.xml')": "the launch file more.launch.xml, which is not in Python,",
+    "IncludeLaunchDescription('more.launch.xml')": "the launch file more.launch.xml",
     "LogInfo(msg=FindPackageShare('gazebo_ros'))": "what needs the package gazebo_ros",
 }
 
