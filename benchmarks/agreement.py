@@ -1,15 +1,14 @@
 """Judges the whole set of test submissions on each clock, with and without load, and prints where the outcomes differ.
 
 Usage: python benchmarks/agreement.py RESULTS [--jobs N] [--parts N] [--only TEXT] [--isolation TIER] MODE...
-       MODE is virtual, wall, auto, auto-load (two busy loops per core), auto-checked (every submission is spot-checked,
-       as a class is), or auto-executed (every student's process is executed, none is forked from a starter); RESULTS is
-       a JSON file that is added to, so that a run that was stopped goes on. Without a MODE only the table of what
-       RESULTS holds is printed. With --parts the submissions are shared out among so many processes, each with its own
-       jobs: auto-checked mostly waits, about 10 s for a submission, so six parts keep two processors busy.
+       MODE is virtual, wall, auto, auto-load (two busy loops per core), or auto-checked (every submission is
+       spot-checked, as a class is); RESULTS is a JSON file that is added to, so that a run that was stopped goes on.
+       Without a MODE only the table of what RESULTS holds is printed. With --parts the submissions are shared out among
+       so many processes, each with its own jobs: auto-checked mostly waits, about 10 s for a submission, so six parts
+       keep two processors busy.
 
-The reports, without their duration, are kept in the folder RESULTS.reports, by mode. If there are some of auto and of
-auto-executed, the table also says which differ; `diff -r` shows how. Those on the wall clock hold measured times and
-always do. The exit code is 1 if an outcome differs.
+The reports, without their duration, are kept in the folder RESULTS.reports, by mode. The exit code is 1 if an outcome
+of auto-checked differs. Whether recordings in virtual time are the same, event by event, `grade verify` tells.
 """
 
 from __future__ import annotations
@@ -18,35 +17,28 @@ import argparse
 import collections
 import json
 import multiprocessing
-import os
 import re
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tests" / "execution"))
-
-from executed import executing
-from killing import kind_of
 from ruamel.yaml import YAML
 
 from grader.app.grade import grade_in
 from grader.app.request import GradeRequest
 from grader.core.errors import GraderError
 from grader.execution.recording_session import RecordingSession, open_session
-from grader.execution.usage import families
 from grader.reporting.delivery import write_whole
 from grader.reporting.json_report import dumps
 
-SUBMISSIONS = ROOT / "tests" / "submissions"
-FORKED, EXECUTED, CHECKED = "auto", "auto-executed", "auto-checked"
-MODES = ("virtual", "wall", FORKED, "auto-load", CHECKED, EXECUTED)
+SUBMISSIONS = Path(__file__).resolve().parent.parent / "tests" / "submissions"
+CHECKED = "auto-checked"
+MODES = ("virtual", "wall", "auto", "auto-load", CHECKED)
 #: Numbers in reasons, which differ from run to run.
 NUMBERS = re.compile(r"\d+(\.\d+)?")
 Results = dict[str, dict[str, Any]]
@@ -109,30 +101,16 @@ def run(  # noqa: PLR0913  one parameter a choice
     loops = 2 * multiprocessing.cpu_count() if mode.endswith("-load") else 0
     with (
         busy(loops),
-        open_session(how.isolation, jobs, warm=mode != EXECUTED) as opened,
-        session_of(mode, opened, jobs) as session,
+        open_session(how.isolation, jobs) as session,
         ThreadPoolExecutor(jobs) as pool,
     ):
         futures = {
             pool.submit(judged, session, f, tuple(expected[f]["graded"]), how, reports_of(path, mode)): f for f in left
         }
-        forked = False
         for number, future in enumerate(as_completed(futures), 1):
             results[mode][futures[future]] = future.result()
             write_whole(path, json.dumps(results, indent=1).encode())  # a run that is killed here loses nothing
             print(f"{mode} {number}/{len(left)} {futures[future]}", flush=True)
-            forked = forked or bool(starters())
-        assert forked == session.isolation.can_fork or not left, "processes were started in the other way"
-
-
-def session_of(mode: str, opened: RecordingSession, jobs: int) -> AbstractContextManager[RecordingSession]:
-    """Return the session that a mode records in."""
-    return executing(opened, jobs) if mode == EXECUTED else nullcontext(opened)
-
-
-def starters() -> list[int]:
-    """Return the starters below this process."""
-    return [pid for pid in families([os.getpid()])[os.getpid()] if kind_of(pid, os.getpid()) == "starter"]
 
 
 def reports_of(path: Path, mode: str) -> Path:
@@ -165,24 +143,6 @@ def table(expected: Mapping[str, Any], results: Results) -> None:
                 print(f"\n{mode}: {folder}\n  expected {expected[folder]['expected']}\n  found    {result['outcomes']}")
                 for criterion, reason in result.get("reasons", {}).items():
                     print(f"    {criterion}: {reason}")
-
-
-def ways_of_starting(results: Results, path: Path) -> int:
-    """Print which folders were given something else after a fork than after an execution; return 1 for an outcome."""
-    forked, executed = results.get(FORKED, {}), results.get(EXECUTED, {})
-    both = sorted({*forked} & {*executed})
-    if not both:
-        return 0
-    kept = {folder: [reports_of(path, mode) / f"{folder}.json" for mode in (FORKED, EXECUTED)] for folder in both}
-    texts = {folder: [file.read_bytes() if file.exists() else b"" for file in files] for folder, files in kept.items()}
-    others = [folder for folder in both if forked[folder]["outcomes"] != executed[folder]["outcomes"]]
-    words = [folder for folder in both if texts[folder][0] != texts[folder][1]]
-    print(f"\n{FORKED} and {EXECUTED}: {len(both)} folders, {len(others)} with other outcomes", end="")
-    print(f", {len(words)} with another report")
-    for folder in words:
-        on_wall = any(mode[folder]["wall"] for mode in (forked, executed))
-        print(f"  {folder}" + ": another outcome" * (folder in others) + ", on the wall clock" * on_wall)
-    return 1 if others else 0
 
 
 def in_parts(arguments: argparse.Namespace, results: Results) -> None:
@@ -246,7 +206,7 @@ def main() -> int:
     if arguments.part == "0/1":
         table(expected, results)
     wrong = [f for f, r in results.get(CHECKED, {}).items() if r["outcomes"] != expected[f]["expected"]]
-    return max(int(bool(wrong)), ways_of_starting(results, arguments.results))
+    return int(bool(wrong))
 
 
 if __name__ == "__main__":

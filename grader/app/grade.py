@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -12,11 +13,12 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import grader
-from grader.app.interface_packages import definitions, known_interfaces, provide
+from grader.app.interface_packages import Provided, definitions, known_interfaces, provide
 from grader.app.request import GradeRequest, recording_digest, reproduction
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
 from grader.compiled import compiled, state_of
+from grader.core.dataclass import dataclass
 from grader.core.errors import EvidenceError, SubmissionError
 from grader.core.exercise import Exercise, exercise_name
 from grader.core.releases import TRIED
@@ -94,6 +96,48 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
     `time.perf_counter`; now if it is None. While nodes are recorded, `under_way` is called once.
     """
     started = time.perf_counter() if started is None else started
+    with prepared(session, request, progress, started) as ready:
+        exercises, submission, run = ready.exercises, ready.submission, ready.run
+        take = EarlyReports(exercises, ready.jobs, run, on_partial_report).take if on_partial_report else None
+        checks = SpotChecks(request.spot_checks, run.seed, submission.digest, ready.reaches)
+        later = request.clock == AUTO and checks.certain
+        first = None if later else take
+
+        def meanwhile() -> None:
+            _judge()
+            under_way()
+
+        budget = RealTimeBudget(request.time_budget_s, spent_s=ready.provided.spent_s)
+        traces = session.record(ready.jobs, request.clock, progress, first, budget=budget, under_way=meanwhile)
+        if request.clock == AUTO:
+            # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
+            record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
+            judge_of = partial(_judge_of, exercises, submission, run.sources)
+            traces = check(checks, ready.jobs, traces, record, take or (lambda *_: None), judge_of)
+        run = replace(run, traces={**run.traces, **traces}, duration_s=time.perf_counter() - started)
+        run = replace(run, definitions=definitions(run.traces.values(), ready.provided))
+        if on_recorded is not None:
+            on_recorded(run, exercises)
+        return _judge()(exercises, run, pictures=pictures)
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A submission that was read and staged, and the recordings to make of it."""
+
+    exercises: Sequence[Exercise]
+    submission: Submission
+    provided: Provided
+    reaches: tuple[str, ...]  # what its files use that reaches into their process
+    jobs: Mapping[Key, Job]  # by exercise and scenario
+    run: Run  # all but the recordings to make
+
+
+@contextmanager
+def prepared(
+    session: RecordingSession, request: GradeRequest, progress: Progress, started: float
+) -> Iterator[Prepared]:
+    """Read and stage a submission for the block, and plan its recordings; raises as `grade_in`."""
     # What cannot be removed now is removed with the folder of the session.
     with (
         TemporaryDirectory(prefix="submission-", dir=session.folder, ignore_cleanup_errors=True) as folder,
@@ -137,27 +181,7 @@ def grade_in(  # noqa: PLR0913  what to grade, and who is told
             interfaces=provided.packages,
             offered=provided.offered,
         )
-        take = EarlyReports(exercises, jobs, run, on_partial_report).take if on_partial_report is not None else None
-        checks = SpotChecks(request.spot_checks, seed, submission.digest, reaches)
-        later = request.clock == AUTO and checks.certain
-        first = None if later else take
-
-        def meanwhile() -> None:
-            _judge()
-            under_way()
-
-        budget = RealTimeBudget(request.time_budget_s, spent_s=provided.spent_s)
-        traces = session.record(jobs, request.clock, progress, first, budget=budget, under_way=meanwhile)
-        if request.clock == AUTO:
-            # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
-            record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
-            judge_of = partial(_judge_of, exercises, submission, run.sources)
-            traces = check(checks, jobs, traces, record, take or (lambda *_: None), judge_of)
-        run = replace(run, traces={**kept, **traces}, duration_s=time.perf_counter() - started)
-        run = replace(run, definitions=definitions(run.traces.values(), provided))
-        if on_recorded is not None:
-            on_recorded(run, exercises)
-        return _judge()(exercises, run, pictures=pictures)
+        yield Prepared(exercises, submission, provided, reaches, jobs, run)
 
 
 def _judge() -> Callable[..., Report]:

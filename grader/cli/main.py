@@ -17,17 +17,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import grader
-from grader.cli import batch, completion, export, interfaces, rejudge, rubric, upload
+from grader.cli import batch, completion, export, interfaces, rejudge, rubric, upload, verify
 from grader.cli.completion import complete_criterion, complete_exercise, complete_file, complete_output
 from grader.cli.options import (
     EVIDENCE,
+    ISOLATION,
     PATH,
+    SANDBOXES,
     audience_options,
     complain,
     drawn_by,
     drawn_with,
     inputs_options,
     interfaces_option,
+    isolation_option,
     parse_outputs,
     parse_percent,
     parse_share,
@@ -36,7 +39,6 @@ from grader.cli.options import (
     shown_progress,
     time_budget_option,
 )
-from grader.core.checkup import TIERS
 from grader.core.dataclass import dataclass
 from grader.core.errors import (
     ALL_MET,
@@ -66,9 +68,6 @@ _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
     "given cannot be used, or a rubric has a mistake, 3 undecided through no fault of the student, 130 interrupted."
 )
-_TIERS = ("auto", *TIERS)
-# Environment variable that chooses the sandbox of a machine, such as a container that can have one only.
-_ISOLATION = "GRADER_ISOLATION"
 #: Garbage is collected after so many new objects: imports make many and no garbage.
 COLLECT_AFTER = 200_000
 # Internal name of the default command; it cannot clash, because a process argument cannot contain a NUL.
@@ -153,14 +152,7 @@ class _Default(click.Command):
     default="auto",
     help="The clock of the student's nodes; auto: virtual, and wall where that cannot hold.",
 )
-@click.option(
-    "--isolation",
-    type=click.Choice(_TIERS),
-    default="auto",
-    envvar=_ISOLATION,
-    show_envvar=True,
-    help="auto: the strongest sandbox that holds here; none: run the student's code without one.",
-)
+@isolation_option
 @time_budget_option
 @click.option(
     "--spot-checks",
@@ -362,7 +354,7 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
 @click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
 @click.option("--odom-bag", type=PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
-@click.option("--isolation", type=click.Choice(_TIERS), default="auto", envvar=_ISOLATION, help="As for grading.")
+@click.option("--isolation", type=click.Choice(SANDBOXES), default="auto", envvar=ISOLATION, help="As for grading.")
 @inputs_options
 @interfaces_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
@@ -447,6 +439,7 @@ app = CommandLine(_grade, name="grade", context_settings={"help_option_names": [
 _grade.context_settings = {**app.context_settings, "allow_extra_args": True}
 app.add_command(_observe)
 app.add_command(rejudge.command)
+app.add_command(verify.command)
 app.add_command(batch.command)
 app.add_command(upload.command)
 app.add_command(_explain)

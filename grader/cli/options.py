@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
+from grader.core.checkup import TIERS
 from grader.core.errors import EnvironmentFault, GraderError
 from grader.core.limits import TIME_BUDGET_S
 from grader.reporting.formats import FORMATS
@@ -40,6 +41,20 @@ time_budget_option = click.option(
     show_default=True,
     metavar="SECONDS",
     help="Real time that the recordings of one submission may take together; what is left then is not met.",
+)
+
+
+#: Environment variable that chooses the sandbox of a machine, such as a container that can have one only.
+ISOLATION = "GRADER_ISOLATION"
+#: The values of `--isolation`.
+SANDBOXES = ("auto", *TIERS)
+isolation_option = click.option(
+    "--isolation",
+    type=click.Choice(SANDBOXES),
+    default="auto",
+    envvar=ISOLATION,
+    show_envvar=True,
+    help="auto: the strongest sandbox that holds here; none: run the student's code without one.",
 )
 
 

@@ -142,7 +142,7 @@ class Plan:
         recordings: Recordings to play.
         clock: `virtual` or `wall`.
         limits: How much the processes may use, and how much is recorded.
-        charged: Whether time passes on the virtual clock while a program works.
+        charged: The share of a program's work for which time passes on the virtual clock; otherwise it stands still.
         stop_when_unfit: Whether a run on the virtual clock may end as soon as virtual time is known to be unsuitable.
         messages: Message streams.
         servers: Service servers.
@@ -197,7 +197,7 @@ class Plan:
     hash_seed: int = 0
     starts: tuple[PlannedStart, ...] = ()
     projects: tuple[Project, ...] = ()
-    charged: bool = False
+    charged: float = 0.0
 
     def start_of(self, process: str) -> PlannedStart:
         """Return what a process is started with."""

@@ -261,10 +261,18 @@ class ExecutedWorker(Worker):
         domains: Yields ROS domains that no other program uses.
         scratch: A folder for files that ROS writes, such as logs.
         forks: How many forks it makes; each costs less than another start.
+        executes: Whether it executes each student's process, also in a tier in which they can be forked.
     """
 
-    def __init__(
-        self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], scratch: Path, *, forks: int
+    def __init__(  # noqa: PLR0913  what it records with
+        self,
+        isolation: Isolation,
+        runtime: PythonRuntime,
+        domains: Iterator[int],
+        scratch: Path,
+        *,
+        forks: int,
+        executes: bool = False,
     ) -> None:
         lines = [socket.socketpair() for _ in range(1 + forks)]
         super().__init__(lines[0][0], domains)
@@ -273,12 +281,14 @@ class ExecutedWorker(Worker):
         self._executable = os.fsencode(runtime.executable)
         numbers = tuple(theirs.fileno() for _, theirs in lines)
         clock, host = ClockKind.VIRTUAL.value, isolation.host_seen_at
+        can_fork = isolation.can_fork and not executes
         request = {
             "isolation": isolation.name,
             "line": numbers[0],
             "lines_of_forks": numbers[1:],
             "runtime": to_json(runtime),
-            "starter": starter_command(clock, runtime, host, users=len(lines)) if isolation.can_fork else None,
+            "can_fork": can_fork,
+            "starter": starter_command(clock, runtime, host, users=len(lines)) if can_fork else None,
         }
         argv = [str(runtime.executable), "-s", "-S", "-u", "-m", MODULE.decode(), json.dumps(request)]
         environment, view = _environment(runtime, scratch), worker_view(runtime, scratch)
@@ -398,6 +408,7 @@ class Recorder:
             folder. The caller removes it.
         workers: How many scenarios to record at the same time.
         on_wall_clock: Called before each recording on the wall clock, which takes much time and little of a processor.
+        executes: Whether each student's process is executed, also in a tier in which they can be forked.
 
     Attributes:
         ended_ns: Processor time of the workers that were replaced.
@@ -412,8 +423,10 @@ class Recorder:
         scratch: Path,
         workers: int,
         on_wall_clock: Callable[[], None] = lambda: None,
+        executes: bool = False,
     ) -> None:
         self._isolation = isolation
+        self._executes = executes
         self._runtime = runtime
         self._domains = _Shared(domains)
         self._idle: queue.LifoQueue[Worker | None] = queue.LifoQueue()  # a warm worker first
@@ -566,7 +579,8 @@ class Recorder:
         with self._lock:
             if self._closed:
                 raise HarnessError("worker: the recorder is closed")
-            worker = ExecutedWorker(self._isolation, self._runtime, self._domains, self._scratch, forks=forks)
+            given = (self._isolation, self._runtime, self._domains, self._scratch)
+            worker = ExecutedWorker(*given, forks=forks, executes=self._executes)
             self._alive += [worker, *worker.forked]
             return worker
 
@@ -612,6 +626,7 @@ class _Shared:
 
 
 def _environment(runtime: PythonRuntime, scratch: Path) -> Mapping[str, str]:
-    """Return the complete environment of a worker; only PATH and GRADER_DEBUG come from the caller's."""
-    from_caller = {name: os.environ[name] for name in ("PATH", "GRADER_DEBUG") if name in os.environ}
+    """Return the complete environment of a worker; nothing but these variables comes from the caller's."""
+    names = ("PATH", "GRADER_DEBUG", "PYTHONHASHSEED")
+    from_caller = {name: os.environ[name] for name in names if name in os.environ}
     return {**worker_environment(runtime, scratch), **from_caller}

@@ -13,7 +13,7 @@ from typing import Any
 
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Observation, Offer
-from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, readers_of
+from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, passes, readers_of
 from grader.execution.ending import ending
 from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer
@@ -39,6 +39,10 @@ OUTSIDE = "the node waits for something that is neither ROS nor time"
 BUSY = "the node needs so much processor time that virtual time would hide it"
 #: The host's codes for a program that does not settle, with their reasons.
 UNSETTLED = {"threads": THREADS, "outside": OUTSIDE}
+
+
+#: The end of a service of a process that says nothing about its QoS, and each of the grader's.
+ORDINARY_END: Mapping[str, Any] = {}
 
 
 class VirtualRunner(Runner):
@@ -230,7 +234,7 @@ class VirtualRunner(Runner):
             self._has_lost = True
         if sent := counts(report.get("sent")):
             self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
-            self._collect_exchanges(sent)
+            self._collect_exchanges(student, sent)
             self._forward(student, sent)
         endpoints = report.get("endpoints")
         if isinstance(endpoints, list) and report["kind"] == "idle":
@@ -268,9 +272,10 @@ class VirtualRunner(Runner):
             for topic in sorted(t for t, n in expected.items() if n > 0):
                 self._recorder.note(f"some messages on {topic[:NAME_CHARACTERS]} did not arrive")
 
-    def _collect_exchanges(self, sent: Mapping[str, int]) -> None:
+    def _collect_exchanges(self, sender: NodeProcess, sent: Mapping[str, int]) -> None:
         """Wait until all requests and responses for the grader have been taken, and record them."""
-        expected = self._services.expected(sent)
+        reaching = {c: n for c, n in sent.items() if any(passes(end, ORDINARY_END) for end in _senders(sender, c))}
+        expected = self._services.expected(reaching)
         if not expected:
             return
 
@@ -302,13 +307,15 @@ class VirtualRunner(Runner):
                     if any(compatible(w, r) for w in writers for r in readers_of(student, name)):
                         announce(student, channel, count)
             elif kind in ("request", "response"):
-                self._announce_exchange(kind, name, count)
+                self._announce_exchange(kind, name, count, _senders(sender, channel))
 
-    def _announce_exchange(self, kind: str, service: str, count: int) -> None:
+    def _announce_exchange(
+        self, kind: str, service: str, count: int, senders: Sequence[Mapping[str, Any]] = (ORDINARY_END,)
+    ) -> None:
         """Announce requests to servers, or responses to clients: every client of a service receives all responses."""
         for student in self._students:
             ends = student.claims_of("service" if kind == "request" else "client", service)
-            if not student.ended and ends:
+            if not student.ended and any(passes(sender, end) for sender in senders for end in ends):
                 announce(student, f"{kind} {service}", count)
 
     def _hand_over(self) -> None:
@@ -358,6 +365,12 @@ class VirtualRunner(Runner):
         for server in self._services.done():
             if not any(f"response {server.service}" in s.arrivals for s in self._students if not s.ended):
                 self._do(RemoveServer(self._now_ns, server), self._now_ns)
+
+
+def _senders(process: NodeProcess, channel: str) -> Sequence[Mapping[str, Any]]:
+    """Return the ends of a service with which a process sends on a channel."""
+    kind, _, service = channel.partition(" ")
+    return process.claims_of("client" if kind == "request" else "service", service) or (ORDINARY_END,)
 
 
 def hopeless(students: Sequence[NodeProcess]) -> bool:

@@ -28,7 +28,7 @@ from grader.core.trace import ClockKind, FaultKind, Mark, Trace
 from grader.execution import late_numpy
 from grader.execution.bare_start import BareProcess, bare_arguments
 from grader.execution.beside import files_beside, is_loose, whole_submission
-from grader.execution.codec import from_json, observation_to_json, trace_to_json
+from grader.execution.codec import beside_trace, from_json, observation_to_json, trace_to_json
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.execution.launching import Launched, evaluated, expanded, renamed, unstarted
 from grader.execution.notes import Places
@@ -72,15 +72,18 @@ class Worker:
     Args:
         isolation: The tier to start student processes in.
         runtime: Interpreter and ROS.
-        executed: The starter for virtual time, which imports rclpy while the first plan is made; None if the tier needs
-            none.
+        executed: The starter for virtual time, which imports rclpy while the first plan is made; None without one.
+        can_fork: Whether students' processes are forked; otherwise Python is executed for each.
 
     Attributes:
         has_started: Whether the submission's code has started since the last plan came.
     """
 
-    def __init__(self, isolation: Isolation, runtime: PythonRuntime, executed: StarterProcess | None) -> None:
+    def __init__(
+        self, isolation: Isolation, runtime: PythonRuntime, executed: StarterProcess | None, *, can_fork: bool
+    ) -> None:
         self._isolation = isolation
+        self._can_fork = can_fork
         self._runtime = runtime
         self._real_ns = self._starved_ns = 0
         self.has_started = False
@@ -243,7 +246,7 @@ class Worker:
         process = replace(process, arguments=arguments)
         try:
             # a fork of the starter has imported rclpy, which takes no part, and has the hashes of the starter
-            if told or not self._isolation.can_fork or str(plan.hash_seed) != HASH_SEED:
+            if told or not self._can_fork or str(plan.hash_seed) != HASH_SEED:
                 command = self._isolation.student_command(process, plan.limits)
                 environment = command.environment
                 student = NodeProcess.start(name, root, command, ours, plan.limits)
@@ -426,13 +429,13 @@ def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
     """Run plans until the supervisor closes the socket.
 
     Args:
-        request: `isolation`, `runtime` and `line`, the number of the socket; and `lines_of_forks`, those of forks that
-            serve too.
+        request: `isolation`, `runtime` and `can_fork`; `line`, the number of the socket; and `lines_of_forks`, those of
+            forks that serve too.
         executed: See `Worker`.
     """
     limit_memory()
     runtime = from_json(PythonRuntime, request["runtime"])
-    worker = Worker(isolation_from_name(request["isolation"]), runtime, executed)
+    worker = Worker(isolation_from_name(request["isolation"]), runtime, executed, can_fork=request["can_fork"])
     with suppress(Exception):  # the first plan raises it again, and answers with it
         # here, because the starter and the supervisor are still busy with imports as well, and forks share it
         _import_runners()
@@ -460,9 +463,7 @@ def written(answer: Mapping[str, Any]) -> Iterator[str]:
     if trace is None:
         yield json.dumps(answer) + "\n"
         return
-    # not in trace_to_json, because the format of evidence does not include it
-    beside = {"reached": list(trace.reached), "incomplete": trace.incomplete, "may_drift": trace.may_drift}
-    head = {**trace_to_json(replace(trace, observations=())), **beside}
+    head = {**trace_to_json(replace(trace, observations=())), **beside_trace(trace)}
     del head["observations"]
     yield json.dumps({name: value for name, value in answer.items() if name != "trace"})[:-1]
     yield f', "trace": {json.dumps(head)[:-1]}, "observations": ['

@@ -66,9 +66,9 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     """Run the file that a request names; never returns.
 
     Args:
-        request: `fd` of the socket, `root` and `file` of the submission, `clock` and whether work is `charged` to it,
-            `seed` (hex), `log_format`, `limits`, `steady_ns` of `VirtualTime.start`, and `interfaces`, the folders of
-            interface packages that are not installed.
+        request: `fd` of the socket, `root` and `file` of the submission, `clock` and the share of the work that is
+            `charged` to it, `seed` (hex), `log_format`, `limits`, `steady_ns` of `VirtualTime.start`, and `interfaces`,
+            the folders of interface packages that are not installed.
         host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
             hide one that it has imported.
     """
@@ -110,7 +110,8 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
         time.give_up_outside = watchdog.give_up_outside
         Watch(link, request["root"]).install()
     home = os.environ.get("HOME", "")
-    written = Written((request["root"], os.getcwd(), home), os.path.join(home, "log"))
+    kept = tuple(os.path.join(home, name) for name in ("log", ".cache", ".config"))
+    written = Written((request["root"], os.getcwd(), home), kept)
     ending = play(request, describer, link, install_ros)
     try:
         ending |= clean_up(request["root"], time, watchdog)

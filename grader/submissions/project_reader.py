@@ -27,8 +27,8 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
+from grader.execution.confinement import confine
 from grader.submissions.cmake_files import Contents, contents_of
-from grader.submissions.confinement import confine
 from grader.submissions.setup_files import LimitError, given_to_setup
 
 #: Why a file was not read: it is no valid text of its format, or reading it would take too much.

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from executed import executing
 from hostile import hostile, record, staging
 from sandboxes import DOMAIN, Sandbox, finish, said, sandbox_or_skip
 
@@ -187,7 +186,7 @@ def test_a_node_has_the_same_surroundings_in_both_ways(studio: RecordingSession,
     to; the session, which a forked process leads; and files and threads of LTTng, which the starter keeps to itself.
     """
     tmp_path.chmod(0o755)
-    with executing(studio, 1) as other:
+    with open_session(studio.isolation.name, 1, executes=True) as other:
         found, expected = (
             json.loads("".join(printed(record(session, tmp_path / way, INSPECT, duration_ns=S, clock=clock))))
             for way, session in (("forked", studio), ("executed", staging(other)))

@@ -529,9 +529,9 @@ def forks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     made: list[int] = []
 
     class Counted(module.ExecutedWorker):
-        def __init__(self, *of: Any, forks: int) -> None:
+        def __init__(self, *of: Any, forks: int, executes: bool) -> None:
             made.append(forks)
-            super().__init__(*of, forks=forks)
+            super().__init__(*of, forks=forks, executes=executes)
 
     monkeypatch.setattr(module, "ExecutedWorker", Counted)
     return made

@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 
 from grader.core.projects import Project
+from grader.execution import contained
 from grader.execution.executables import executables, find_executable
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.shares import install_shares
-from grader.submissions import contained, projects
+from grader.submissions import projects
 from grader.submissions.projects import read_projects
 
 COSTLY = "setup.py: not read, because that would take too much memory or time"

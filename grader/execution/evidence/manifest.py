@@ -28,9 +28,11 @@ from grader.core.submission import Definition, StudentFile
 MANIFEST = "evidence.json"
 #: The report that was made when the submission was graded.
 REPORT = "report.json"
+#: What recording the submission again has found; only where that was done.
+VERIFICATION = "verification.json"
 METADATA = "metadata.yaml"
 _ID = "[a-z][a-z0-9_]{0,99}"
-_OWN = re.compile(rf"{MANIFEST}|{REPORT}|({_ID})\.({_ID})/(?:\1\.\2_0\.mcap|{METADATA})")
+_OWN = re.compile(rf"{MANIFEST}|{REPORT}|{VERIFICATION}|({_ID})\.({_ID})/(?:\1\.\2_0\.mcap|{METADATA})")
 
 
 def recording_name(exercise: str, scenario: str) -> str:

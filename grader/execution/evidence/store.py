@@ -84,7 +84,8 @@ def carry_over(evidence: Evidence, into: Path, *, request: Mapping[str, Any], re
 
     Files are linked where the disk allows it. Raises EvidenceError if one cannot be written.
     """
-    names = [name for name in evidence.manifest.files if files.is_own(name) and "/" in name]
+    made_anew = (files.MANIFEST, files.REPORT)
+    names = [name for name in evidence.manifest.files if files.is_own(name) and name not in made_anew]
     try:
         for name in names:
             (into / name).parent.mkdir(parents=True, exist_ok=True)
@@ -94,6 +95,15 @@ def carry_over(evidence: Evidence, into: Path, *, request: Mapping[str, Any], re
     run = msgspec.structs.replace(evidence.manifest.run, request=dict(request))
     manifest = msgspec.structs.replace(evidence.manifest, run=run)
     files.write(into, {files.REPORT: report, files.MANIFEST: kept.dump(manifest)})
+
+
+def add_verification(folder: Path, result: bytes) -> None:
+    """Add the result of recording the submission again to evidence, instead of an earlier one; raises EvidenceError."""
+    manifest = open_evidence(folder).manifest
+    files.refuse_foreign(folder, (files.VERIFICATION,), _own(folder))
+    listed = msgspec.structs.replace(manifest, files=tuple(sorted({*manifest.files, files.VERIFICATION})))
+    files.write(folder, {files.MANIFEST: kept.dump(listed)})
+    files.write(folder, {files.VERIFICATION: result})
 
 
 def _link_or_copy(old: Path, new: Path) -> None:

@@ -1,0 +1,136 @@
+"""The command `grade verify`: records submissions several times, and tells whether the recordings are the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from grader.cli.completion import complete_exercise, complete_file
+from grader.cli.options import (
+    PATH,
+    complain,
+    drawn_by,
+    drawn_with,
+    interfaces_option,
+    isolation_option,
+    print_result,
+    shown_progress,
+)
+from grader.core.conditions import CONDITIONS, TOGETHER
+from grader.core.errors import ALL_MET, NOT_ALL_MET, UNDECIDED
+
+if TYPE_CHECKING:
+    from grader.core.verification import Verification
+
+_EPILOG = (
+    "Exit codes: 0 all recordings that can be compared are the same, 1 some differ, 2 the command or something it was "
+    "given cannot be used, 3 nothing could be compared, or the grader or the machine failed, 130 interrupted."
+)
+
+
+@click.command(name="verify", epilog=_EPILOG)
+@click.argument("submissions", metavar="SUBMISSION...", nargs=-1, required=True, shell_complete=complete_file)
+@click.option(
+    "--condition",
+    "conditions",
+    metavar="NAME",
+    type=click.Choice(CONDITIONS),
+    multiple=True,
+    help=f"Try only this condition ({', '.join(CONDITIONS)}); repeatable. By default all but {TOGETHER}.",
+)
+@click.option("--quick", is_flag=True, help="Try only together: order, processors, folder, zone, hashes and executed.")
+@click.option(
+    "--exercise",
+    "exercises",
+    metavar="ID",
+    multiple=True,
+    shell_complete=complete_exercise,
+    help="Record only this exercise; repeatable. By default each of which there is a file.",
+)
+@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option(
+    "--evidence", type=PATH, metavar="FOLDER", help="Compare with this evidence too, and keep the result in it."
+)
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, as a report names it.")
+@click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key and the files handed in.")
+@click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
+@interfaces_option
+@isolation_option
+@click.option("--student", metavar="ID", default="", help="Use the variant of this student; see --variant-key.")
+@click.option("--variant-key", type=PATH, metavar="FILE", help="The course key that rubrics draw variants from.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+@click.option("--no-progress", is_flag=True, help="Say nothing while recording.")
+def command(  # noqa: PLR0913  one parameter an option
+    *,
+    submissions: tuple[str, ...],
+    conditions: tuple[str, ...],
+    quick: bool,
+    exercises: tuple[str, ...],
+    rubrics: tuple[Path, ...],
+    evidence: Path | None,
+    seed: int | None,
+    seed_key: Path | None,
+    odom_bag: Path | None,
+    interfaces: tuple[Path, ...],
+    isolation: str,
+    student: str,
+    variant_key: Path | None,
+    as_json: bool,
+    no_progress: bool,
+) -> int:
+    """Record a SUBMISSION several times, and tell whether the same happens each time.
+
+    Each recording after the first is made under a condition that must not matter: another order of scenarios, one
+    processor, a busy machine, another way of starting programs, temporary folder, time zone, hash seed, user, sandbox.
+    They are compared event by event. The first difference is printed with its kind: time, order, content, clock, or
+    only what the grader saw. What this machine cannot do is named as not tried. Scenarios that the wall clock decides
+    are named too: they cannot be compared in this way. Nothing is judged.
+    """
+    if quick and conditions:
+        raise click.BadParameter("--quick and --condition exclude each other")
+    if evidence is not None and len(submissions) != 1:
+        raise click.BadParameter("--evidence is that of one submission: expected one SUBMISSION, found several")
+    if evidence is not None and (seed is not None or seed_key is not None or exercises or odom_bag or student):
+        raise click.BadParameter("--evidence says what was recorded, and with which seed: leave out the other options")
+    key = drawn_with(seed, seed_key)
+    draw = drawn_by(student, variant_key)
+    from grader.app.request import GradeRequest
+    from grader.app.seeds import PRACTICE
+    from grader.app.verify import VerifyRequest, verify
+    from grader.core.verification import State
+    from grader.reporting.verified import render_verification, verification_to_json
+
+    how = GradeRequest(
+        submission="",
+        exercises=tuple(dict.fromkeys(exercises)),
+        rubrics=rubrics,
+        seed=seed,
+        seed_key=key or PRACTICE,
+        odom_bag=odom_bag,
+        isolation=isolation,
+        student=student.strip(),
+        variant_key=variant_key,
+        interfaces=interfaces,
+        draw=draw,
+    )
+    wanted = (TOGETHER,) if quick else conditions
+    with shown_progress(wanted=not no_progress) as progress:
+        found = verify(VerifyRequest(submissions, how, wanted, evidence), progress)
+    if evidence is not None:
+        _keep(found, evidence, verification_to_json(found))
+    print_result(
+        lambda: verification_to_json(found),
+        lambda page: render_verification(found, width=page.width, colour=page.colour),
+        as_json=as_json,
+    )
+    return {State.SAME: ALL_MET, State.DIFFERENT: NOT_ALL_MET}.get(found.state, UNDECIDED)
+
+
+def _keep(found: Verification, evidence: Path, text: str) -> None:
+    """Add the result to the evidence."""
+    from grader.execution.evidence.store import add_verification
+
+    add_verification(evidence, text.encode())
+    complain(f"{evidence} says now that the recordings are {found.state.value}", kind="kept")
