@@ -65,6 +65,7 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
         **({"starts": [_start_to_json(start) for start in trace.starts]} if trace.starts else {}),
         **({"most_starved_ns": trace.most_starved_ns} if trace.most_starved_ns else {}),
         **({"left_out": list(trace.left_out)} if trace.left_out else {}),
+        **({"unstarted": [list(one) for one in trace.unstarted]} if trace.unstarted else {}),
         **({"written": [plain(file) for file in trace.written]} if trace.written else {}),
         **({"newer": [plain(one) for one in trace.newer]} if trace.newer else {}),
         **({"author_mistake": asdict(trace.author_mistake)} if trace.author_mistake is not None else {}),

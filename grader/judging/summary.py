@@ -14,7 +14,7 @@ from grader.core.quantities import NS_PER_S, seconds
 from grader.core.report import Pace, Summary, TopicSummary
 from grader.core.trace import Fault, Message, Offer, Trace
 from grader.judging.diagnosis import hint_for, placed_in
-from grader.judging.installation import INTERFACES, lacking_package
+from grader.judging.installation import EXTRAS, INTERFACES, lacking_package
 from grader.judging.judge_run import same_names, started, unheard
 from grader.judging.values import as_number
 
@@ -66,6 +66,8 @@ def _hint(fault: Fault, trace: Trace, sources: Mapping[str, str]) -> str:
     lack = lacking_package(replace(trace, observations=(fault,)), [fault.process], {fault.process: text})
     if lack is None:
         return hint_for(fault, trace, text)
+    if lack.name in EXTRAS:
+        return f"{lack.name} is not installed here: pip install 'rclpy-grader[{EXTRAS[lack.name]}]' brings it"
     if lack.name.endswith(INTERFACES):
         return f"{lack.name} is not installed here: give the folder with its definitions as --interfaces"
     return f"{lack.name} is a package of ROS 2 that is not installed here: the program may be right where it is"

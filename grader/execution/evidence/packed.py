@@ -148,6 +148,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("may_drift", bool, False),
         ("most_starved_ns", int, 0),
         ("left_out", tuple[str, ...], ()),
+        ("unstarted", tuple[tuple[str, str], ...], ()),
         ("written", tuple[_WRITTEN, ...], ()),  # type: ignore[valid-type]
         ("newer", tuple[_NEWER, ...], ()),  # type: ignore[valid-type]
         ("author_mistake", AuthorMistake | None, None),
@@ -171,6 +172,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         may_drift=row.may_drift,
         most_starved_ns=row.most_starved_ns,
         left_out=row.left_out,
+        unstarted=row.unstarted,
         written=tuple(_same(WrittenFile, file) for file in row.written),
         newer=tuple(_same(NewerPython, one) for one in row.newer),
         author_mistake=row.author_mistake,
