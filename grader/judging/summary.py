@@ -70,7 +70,8 @@ def _hint(fault: Fault, trace: Trace, sources: Mapping[str, str]) -> str:
         return f"{lack.name} is not installed here: pip install 'rclpy-grader[{EXTRAS[lack.name]}]' brings it"
     if lack.name.endswith(INTERFACES):
         return f"{lack.name} is not installed here: give the folder with its definitions as --interfaces"
-    return f"{lack.name} is a package of ROS 2 that is not installed here: the program may be right where it is"
+    kind = "part" if "." in lack.name else "package"
+    return f"{lack.name} is a {kind} of ROS 2 that is not installed here: the program may be right where it is"
 
 
 def _topic(trace: Trace, name: str) -> TopicSummary:
