@@ -212,6 +212,8 @@ class ServiceEnd:
     service: str  # absolute name
     type: str  # e.g. `std_srvs/srv/Trigger`
     node: str  # fully qualified node name
+    reliability: str = "reliable"  # as for an endpoint of a topic; of requests, and as a rule of responses as well
+    durability: str = "volatile"
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,6 +48,8 @@ TAGS: Mapping[type, str] = {
 _SCALARS = frozenset({str, int, bool, type(None)})
 #: The number of trailing fields of a fault that are written as one list.
 _DETAILS = 3
+#: The number of trailing fields of the end of a service that are written as one list, and its usual value.
+_QOS, _USUAL_QOS = 2, ["reliable", "volatile"]
 #: Index of the endpoints in the row of a snapshot of the graph.
 _ENDPOINTS = 3
 
@@ -93,6 +95,7 @@ def observation_to_json(observation: Observation) -> list[Any]:
         return without_last(row, False)  # noqa: FBT003 - the value
     if isinstance(observation, GraphSnapshot):
         row[_ENDPOINTS] = [without_last(end, 0) for end in row[_ENDPOINTS]]
+        row[-1] = [without_last([*end[:-_QOS], end[-_QOS:]], _USUAL_QOS) for end in row[-1]]
         return without_last(row, [])
     return row
 

@@ -393,7 +393,7 @@ class Discovery:
 
     def look(self, now_ns: int) -> None:
         """Record the graph if it has changed."""
-        self._recorder.look(self._graph_at(now_ns), self._observer.participants())
+        self._recorder.look(self._observer.with_qos(self._graph_at(now_ns)), self._observer.participants())
 
 
 def _listed(value: Any) -> list[Any]:

@@ -146,6 +146,10 @@ class Observer:
         students = [e for e in ends if e.participant >= 0 and UNKNOWN_NODE not in e.node]
         return GraphSnapshot(t_ns, tuple(nodes), tuple(sorted(students, key=_endpoint_order)), offered)
 
+    def with_qos(self, graph: GraphSnapshot) -> GraphSnapshot:
+        """Return a graph with the QoS of its servers and clients, which takes longer to look up."""
+        return replace(graph, services=self.services.with_qos(graph.services, _qos_words)) if graph.services else graph
+
     def participants(self) -> int:
         """Return how many participants with endpoints have appeared, without the grader's."""
         return len(self._participants)
@@ -154,17 +158,16 @@ class Observer:
         own = info.node_name in self._names
         prefix = bytes(info.endpoint_gid[:12])
         number = -1 if own else self._participants.setdefault(prefix, len(self._participants))
-        latched = info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
         manual = info.qos_profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC
-        best_effort = info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+        reliability, durability = _qos_words(info.qos_profile)
         return Endpoint(
             kind=kind,
             topic=topic,
             type=info.topic_type,
             node=_full_name(info.node_name, info.node_namespace),
             participant=number,
-            reliability="best_effort" if best_effort else "reliable",
-            durability="transient_local" if latched else "volatile",
+            reliability=reliability,
+            durability=durability,
             deadline_ns=_finite_ns(info.qos_profile.deadline),
             liveliness="manual_by_topic" if manual else "automatic",
             lease_ns=_finite_ns(info.qos_profile.liveliness_lease_duration),
@@ -411,6 +414,13 @@ def _make_node(domain: int) -> Node:
 
 def _subscribing(message: Any, topic: str, qos: QoSProfile) -> Callable[[Node], Any]:
     return lambda node: node.create_subscription(message, topic, _nothing, qos, raw=True)
+
+
+def _qos_words(profile: Any) -> tuple[str, str]:
+    """Return reliability and durability of a QoS profile, as traces name them."""
+    best_effort = profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    latched = profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    return "best_effort" if best_effort else "reliable", "transient_local" if latched else "volatile"
 
 
 def _is_reliable(reader: Any) -> bool:

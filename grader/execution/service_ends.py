@@ -5,6 +5,8 @@ They have no executor and no callbacks: the runner takes requests and responses 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from grader.core.dataclass import dataclass
@@ -111,6 +113,32 @@ class ServiceEnds:
                         sequence = header.request_id.sequence_number
                         found.append(Arrived(service, header.source_timestamp, response, None, number, sequence))
         return found
+
+    def with_qos(self, ends: tuple[ServiceEnd, ...], words: Callable[[Any], tuple[str, str]]) -> tuple[ServiceEnd, ...]:
+        """Return servers and clients with the QoS of their requests, as the middleware's topics have it.
+
+        The parts of actions, whose names are hidden, stay as they are.
+
+        Args:
+            ends: The servers and clients.
+            words: Returns reliability and durability of a QoS profile, as traces name them.
+        """
+        known: dict[tuple[str, str, str], tuple[str, str]] = {}
+        for service in {end.service for end in ends if "/_" not in end.service}:
+            for kind, look in (
+                ("service", self._node.get_subscriptions_info_by_topic),
+                ("client", self._node.get_publishers_info_by_topic),
+            ):
+                nobody: list[Any] = []
+                for info in asked(look, f"rq{service}Request", True, nothing=nobody):  # noqa: FBT003 - rclpy's
+                    node = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+                    known[kind, service, node] = words(info.qos_profile)
+        usual = ("reliable", "volatile")
+        return tuple(
+            replace(end, reliability=qos[0], durability=qos[1])
+            for end in ends
+            for qos in (known.get((end.kind, end.service, end.node), usual),)
+        )
 
     def graph(self, nodes: list[tuple[str, str]]) -> tuple[ServiceEnd, ...]:
         """Return the servers and clients of some nodes, sorted, without the servers that every node has.

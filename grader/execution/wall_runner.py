@@ -175,7 +175,8 @@ class WallRunner(Runner):
 
     def _look_at_graph(self, now_ns: int) -> bool:
         """Record the graph, subscribe to what is new, and return whether it has changed."""
-        changed = self._recorder.look(self._observer.graph(now_ns, services=True), self._observer.participants())
+        graph = self._observer.with_qos(self._observer.graph(now_ns, services=True))
+        changed = self._recorder.look(graph, self._observer.participants())
         self._end_if_full(now_ns)
         if changed:
             self._observer.watch(self._recorder.graph.endpoints)

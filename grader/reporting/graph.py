@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rich.cells import cell_len
 
 from grader.core.dataclass import dataclass
-from grader.core.trace import Endpoint, GraphSnapshot, unmet_policy
+from grader.core.trace import Endpoint, GraphSnapshot, ServiceEnd, unmet_policy
 from grader.reporting.escape import mermaid_label, shown
 
 #: Topics that every node has.
@@ -32,7 +32,7 @@ def draw_graph(graph: GraphSnapshot, *, width: int) -> list[str]:
     edges = graph_edges(graph)
     lines = [line for edge in edges[:MOST_EDGES] for line in _drawn(edge, width)]
     calls = call_edges(graph)
-    lines += [_called(call) for call in calls[:MOST_EDGES]]
+    lines += [line for call in calls[:MOST_EDGES] for line in _called(call)]
     left_out = max(0, len(edges) - MOST_EDGES) + max(0, len(calls) - MOST_EDGES)
     if left_out:
         lines.append(f"and {left_out} more")
@@ -47,6 +47,7 @@ class Call:
     client: str
     name: str
     server: str
+    quarrel: str = ""  # what keeps calls from passing
 
 
 def call_edges(graph: GraphSnapshot) -> list[Call]:
@@ -55,7 +56,7 @@ def call_edges(graph: GraphSnapshot) -> list[Call]:
     clients = [(kind, name, end) for kind, name, end in ends if end.kind == "client"]
     servers = [(kind, name, end) for kind, name, end in ends if end.kind == "service"]
     found = [
-        Call(kind, client.node, name, server.node)
+        Call(kind, client.node, name, server.node, _policies_of(client, server))
         for kind, name, client in clients
         for _, _, server in servers
         if (client.service, client.type) == (server.service, server.type)
@@ -64,6 +65,14 @@ def call_edges(graph: GraphSnapshot) -> list[Call]:
     found += [Call(kind, c.node, name, NOBODY) for kind, name, c in clients if (c.node, name) not in calling]
     found += [Call(kind, NOBODY, name, s.node) for kind, name, s in servers if (name, s.node) not in called]
     return list(dict.fromkeys(found))
+
+
+def _policies_of(client: ServiceEnd, server: ServiceEnd) -> str:
+    """Return what keeps calls from passing: requests go one way and responses the other, so both ends must be alike."""
+    for mine, other in ((client.reliability, server.reliability), (client.durability, server.durability)):
+        if mine != other:
+            return f"incompatible QoS: {mine} client, {other} server"
+    return ""
 
 
 def _offered(service: str) -> Iterator[tuple[str, str]]:
@@ -77,9 +86,9 @@ def _offered(service: str) -> Iterator[tuple[str, str]]:
 _ARROWS = {"service": "{} ┄┄{}┄┄▶ {}", "action": "{} ══{}══▶ {}"}
 
 
-def _called(call: Call) -> str:
+def _called(call: Call) -> list[str]:
     names = (shown(part, limit=_NAME_LIMIT) for part in (call.client, call.name, call.server))
-    return _ARROWS[call.kind].format(*names)
+    return [_ARROWS[call.kind].format(*names), *([f"  {call.quarrel}"] if call.quarrel else [])]
 
 
 def graph_edges(graph: GraphSnapshot) -> list[Edge]:
@@ -150,6 +159,10 @@ def draw_mermaid(graph: GraphSnapshot) -> str:
     )
 
 
+def _arrow(quarrel: str) -> str:
+    return f'-. "{mermaid_label(quarrel)}" .->' if quarrel else "-->"
+
+
 class _Drawing:
     """The boxes drawn so far; names appear only in labels, where they cannot be syntax."""
 
@@ -168,8 +181,7 @@ class _Drawing:
         if source != NOBODY:
             yield f"{self.node(source)} --> {topic}"
         if target != NOBODY:
-            arrow = f'-. "{mermaid_label(quarrel)}" .->' if quarrel else "-->"
-            yield f"{topic} {arrow} {self.node(target)}"
+            yield f"{topic} {_arrow(quarrel)} {self.node(target)}"
 
     def call(self, call: Call) -> Iterator[str]:
         """Yield the arrows from the client to the service or action and on to the server."""
@@ -177,7 +189,7 @@ class _Drawing:
         if call.client != NOBODY:
             yield f"{self.node(call.client)} --> {box}"
         if call.server != NOBODY:
-            yield f"{box} --> {self.node(call.server)}"
+            yield f"{box} {_arrow(call.quarrel)} {self.node(call.server)}"
 
     def _box(self, kind: str, name: str, opening: str, closing: str) -> str:
         key = (kind, name)

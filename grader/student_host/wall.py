@@ -156,7 +156,8 @@ class WallTime:
 
         @functools.wraps(look)
         def looking(executor: Any, timeout_sec: Any = None, *args: Any, **kwargs: Any) -> Any:
-            if timeout_sec is None or timeout_sec > 0:
+            timeout_s = getattr(timeout_sec, "timeout", timeout_sec)  # rclpy also passes an object that counts down
+            if timeout_s is None or timeout_s > 0:
                 waited()
             return look(executor, timeout_sec, *args, **kwargs)
 

@@ -58,7 +58,11 @@ _VALUES = st.dictionaries(st.sampled_from(["data", "linear", "float"]), _FIELDS,
     lambda value: value.keys() != {"float"}
 )
 _CDR = st.binary(max_size=12) | st.floats(width=32).map(lambda x: encode("std_msgs/msg/Float32", {"data": x}))
-_ENDS = st.builds(Endpoint, _TEXTS, _TEXTS, _TEXTS, _TEXTS, st.integers(-1, 9), _TEXTS, _TEXTS, st.integers(0, 9))
+_ENDS = st.builds(
+    Endpoint,
+    *(_TEXTS, _TEXTS, _TEXTS, _TEXTS, st.integers(-1, 9), _TEXTS, _TEXTS, st.integers(0, 9)),
+    lease_ns=st.integers(0, 2),
+)
 
 
 def _several(items: st.SearchStrategy[Any]) -> st.SearchStrategy[tuple[Any, ...]]:
@@ -67,7 +71,7 @@ def _several(items: st.SearchStrategy[Any]) -> st.SearchStrategy[tuple[Any, ...]
 
 #: Every kind of observation.
 OBSERVATIONS: Mapping[type, st.SearchStrategy[Any]] = {
-    Message: st.builds(Message, _TIMES, _TEXTS, _TYPES, _VALUES, _CDR),
+    Message: st.builds(Message, _TIMES, _TEXTS, _TYPES, _VALUES, _CDR, st.booleans()),
     Delivery: st.builds(Delivery, _TIMES, _TEXTS, _TYPES, _VALUES, _CDR),
     LogRecord: st.builds(LogRecord, _TIMES, _TEXTS, _TEXTS, _TEXTS, _TEXTS, _TEXTS, st.integers(0, 2**40)),
     OutputLine: st.builds(OutputLine, _TIMES, _TEXTS, _TEXTS, _TEXTS),
@@ -78,7 +82,7 @@ OBSERVATIONS: Mapping[type, st.SearchStrategy[Any]] = {
         _TIMES,
         _several(_TEXTS),
         _several(_ENDS),
-        _several(st.builds(ServiceEnd, _TEXTS, _TEXTS, _TEXTS, _TEXTS)),
+        _several(st.builds(ServiceEnd, _TEXTS, _TEXTS, _TEXTS, _TEXTS, st.sampled_from(["reliable", "best_effort"]))),
     ),
     Fault: st.builds(
         Fault,

@@ -237,6 +237,10 @@ class ScriptedObserver:
         ]
         return GraphSnapshot(t_ns, tuple(f"/{name[:-3]}" for name in self._world.claims), tuple(ends))
 
+    def with_qos(self, graph: GraphSnapshot) -> GraphSnapshot:
+        """Return the graph: its services have the usual QoS."""
+        return graph
+
     def participants(self) -> int:
         """Return how many processes have endpoints."""
         return len(self._world.claims)

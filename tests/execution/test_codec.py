@@ -47,10 +47,13 @@ FIELDS = st.recursive(
 )
 VALUES = st.dictionaries(st.sampled_from(["data", "linear", "header", "x"]), FIELDS, max_size=3)
 ENDPOINTS = st.builds(
-    Endpoint, TEXTS, TEXTS, TEXTS, TEXTS, st.integers(-1, 99), TEXTS, TEXTS, st.integers(0, 9), TIMES, TEXTS
+    Endpoint, TEXTS, TEXTS, TEXTS, TEXTS, st.integers(-1, 99), TEXTS, TEXTS, st.integers(0, 9), TIMES, TEXTS, LINES
 )
+RELIABILITIES = st.sampled_from(["reliable", "best_effort"])
+DURABILITIES = st.sampled_from(["volatile", "transient_local"])
+SERVICE_ENDS = st.builds(ServiceEnd, TEXTS, TEXTS, TEXTS, TEXTS, RELIABILITIES, DURABILITIES)
 OBSERVATIONS = {
-    Message: st.builds(Message, TIMES, TEXTS, TEXTS, VALUES, st.binary(max_size=16)),
+    Message: st.builds(Message, TIMES, TEXTS, TEXTS, VALUES, st.binary(max_size=16), st.booleans()),
     Delivery: st.builds(Delivery, TIMES, TEXTS, TEXTS, VALUES, st.binary(max_size=16)),
     LogRecord: st.builds(LogRecord, TIMES, TEXTS, TEXTS, TEXTS, TEXTS, TEXTS, LINES),
     OutputLine: st.builds(OutputLine, TIMES, TEXTS, TEXTS, TEXTS),
@@ -59,7 +62,7 @@ OBSERVATIONS = {
         TIMES,
         st.lists(TEXTS, max_size=3).map(tuple),
         st.lists(ENDPOINTS, max_size=3).map(tuple),
-        st.lists(st.builds(ServiceEnd, TEXTS, TEXTS, TEXTS, TEXTS), max_size=3).map(tuple),
+        st.lists(SERVICE_ENDS, max_size=3).map(tuple),
     ),
     Request: st.builds(Request, TIMES, TEXTS, TEXTS, LINES, TEXTS, LINES, VALUES, st.binary(max_size=16)),
     Response: st.builds(Response, TIMES, TEXTS, TEXTS, LINES, TEXTS, LINES, VALUES, st.binary(max_size=16)),

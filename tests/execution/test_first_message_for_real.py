@@ -23,6 +23,7 @@ CLOCKS = pytest.mark.parametrize("clock", ["virtual", "wall"])
 BEFORE = """
 import threading, time
 import rclpy
+import rclpy.executors
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
@@ -56,6 +57,11 @@ HEARD = {
     "from a timer": MAKE + "node.create_timer(0.3, send)\nrclpy.spin(node)",
     "after a pause": MAKE + "time.sleep(0.1)\nsend()\nrclpy.spin(node)",
     "after a spin": MAKE + "rclpy.spin_once(node, timeout_sec=0.2)\nsend()\nrclpy.spin(node)",
+    "after a spin until a future is done": MAKE
+    + "rclpy.spin_until_future_complete(node, rclpy.Future(), timeout_sec=0.2)\nsend()\nrclpy.spin(node)",
+    "after a spin of an executor": MAKE
+    + "executor = rclpy.executors.SingleThreadedExecutor()\nexecutor.add_node(node)\n"
+    + "executor.spin_once(timeout_sec=0.2)\nsend()\nexecutor.spin()",
     "once there is a subscription": MAKE
     + "while not publisher.get_subscription_count():\n    time.sleep(0.05)\nsend()\nrclpy.spin(node)",
     "at a match": """

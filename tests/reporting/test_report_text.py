@@ -39,7 +39,7 @@ from grader.core.quantities import NS_PER_S
 from grader.core.report import SUBMISSION_SUSPECTED, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.core.trace import GraphSnapshot, ServiceEnd
 from grader.reporting.escape import shown
-from grader.reporting.graph import draw_graph
+from grader.reporting.graph import draw_graph, draw_mermaid
 from grader.reporting.text import render_text
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -375,6 +375,28 @@ def test_services_are_drawn_from_client_to_server() -> None:
         "(nobody) ┄┄/mixed┄┄▶ /b",
         "/idle (no topics)",
     ]
+
+
+def test_a_service_whose_ends_differ_is_drawn_as_broken() -> None:
+    """Requests and responses both have to pass, so either end may be the one that asks for more."""
+    kind = "std_srvs/srv/Trigger"
+    ends = (
+        ServiceEnd("client", "/a", kind, "/one", "best_effort"),
+        ServiceEnd("service", "/a", kind, "/two"),
+        ServiceEnd("client", "/b", kind, "/one"),
+        ServiceEnd("service", "/b", kind, "/two", "reliable", "transient_local"),
+        ServiceEnd("client", "/c", kind, "/one", "best_effort"),
+        ServiceEnd("service", "/c", kind, "/two", "best_effort"),
+    )
+    graph = GraphSnapshot(0, ("/one", "/two"), (), ends)
+    assert draw_graph(graph, width=80) == [
+        "/one ┄┄/a┄┄▶ /two",
+        "  incompatible QoS: best_effort client, reliable server",
+        "/one ┄┄/b┄┄▶ /two",
+        "  incompatible QoS: volatile client, transient_local server",
+        "/one ┄┄/c┄┄▶ /two",
+    ]
+    assert [line.partition("-.")[2][:3] for line in draw_mermaid(graph).splitlines() if "-." in line] == [' "i', ' "i']
 
 
 def test_loose_ends_and_quarrels_are_drawn() -> None:

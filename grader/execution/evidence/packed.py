@@ -127,6 +127,8 @@ _START = _row_of(Start, "arguments", "launched_by", last=("given", tuple[str, st
 
 
 _WRITTEN, _NEWER = _row_of(WrittenFile), _row_of(NewerPython)
+#: The end of a service; its QoS follows in a list, if it is not the usual one.
+_SERVICE_END = _row_of(ServiceEnd, "reliability", "durability", last=("qos", tuple[str, str], ("reliable", "volatile")))
 
 
 def _start(row: Any) -> Start:
@@ -201,7 +203,12 @@ def _carrying(kind: Any, row: Any) -> Any:
 
 def _graph(row: Any) -> GraphSnapshot:
     ends = tuple(_same(Endpoint, end) for end in row.endpoints)
-    return GraphSnapshot(row.t_ns, row.nodes, ends, tuple(_same(ServiceEnd, end) for end in row.services))
+    return GraphSnapshot(row.t_ns, row.nodes, ends, tuple(map(_service_end, row.services)))
+
+
+def _service_end(row: Any) -> ServiceEnd:
+    *values, qos = msgspec.structs.astuple(row)
+    return ServiceEnd(*values, *qos)
 
 
 def _fault(row: Any) -> Fault:
@@ -241,7 +248,7 @@ _EXACT_ROWS: Mapping[type, Any] = {
         GraphSnapshot,
         "services",
         endpoints=tuple[_row_of(Endpoint, "lease_ns", last=("lease_ns", int, 0)), ...],  # type: ignore[misc]
-        last=("services", tuple[_row_of(ServiceEnd), ...], ()),  # type: ignore[misc]
+        last=("services", tuple[_SERVICE_END, ...], ()),  # type: ignore[valid-type]
     ),
     Fault: _row_of(Fault, "exit_code", "signal", "python", last=("details", _FaultDetails, _NO_DETAILS)),
 }
