@@ -30,16 +30,21 @@ TAKEN_S = 0.03
 
 
 class _Existed:
-    """Measures what a thread has done since a publisher was created."""
+    """Measures what a thread has done since a publisher was created.
 
-    def __init__(self) -> None:
+    Args:
+        host_s: Returns how long this module has made threads of the program wait so far, which is not counted.
+    """
+
+    def __init__(self, host_s: Callable[[], float]) -> None:
+        self._host_s, self._host_began_s = host_s, host_s()
         self.thread = originals.get_native_id()
         self._began_s, self._worked_s = originals.perf_counter(), originals.thread_time()
         self._starved_ns = originals.starved_ns(self.thread)
 
     def is_undiscovered(self) -> bool:
         """Return whether the thread, if it is the same, has neither waited nor worked for long."""
-        passed_s = originals.perf_counter() - self._began_s
+        passed_s = originals.perf_counter() - self._began_s - (self._host_s() - self._host_began_s)
         if self.thread != originals.get_native_id():
             return passed_s < EARLY_S
         worked_s = originals.thread_time() - self._worked_s
@@ -60,6 +65,7 @@ class WallTime:
         self._patience: Any = None
         self._exchanged = False
         self._early_reports = 0
+        self.waited_s = 0.0
         self.domain = 0
 
     def install_ros(self) -> None:
@@ -81,7 +87,7 @@ class WallTime:
         def made(self: Any, *args: Any, **kwargs: Any) -> None:
             make(self, *args, **kwargs)
             if not is_latched(self):
-                existed_s[self] = _Existed()
+                existed_s[self] = _Existed(lambda: time.waited_s)
 
         @functools.wraps(publish)
         def publish_when_matched(self: Any, msg: Any) -> Any:
@@ -89,11 +95,12 @@ class WallTime:
                 existed = existed_s.pop(self, None)
                 early = existed is not None and existed.is_undiscovered()
                 # In another domain there are no subscriptions: waiting would only delay the program.
-                owner = _owner_of(self, ros.MADE_NODES)
+                owner, began_s = _owner_of(self, ros.MADE_NODES), originals.perf_counter()
                 if owner is None:
                     originals.wait_until(self.handle.get_subscription_count, MATCH_S, pause_s=0.001)
                 elif is_in(time.domain, owner):
                     originals.wait_until(functools.partial(_is_watched, owner, self), MATCH_S, pause_s=0.002)
+                time.waited_s += originals.perf_counter() - began_s
                 matched.add(self)
                 if early:
                     began_ns = originals.time_ns()
