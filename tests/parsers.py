@@ -9,7 +9,7 @@ from pathlib import Path
 PACKAGE = Path(__file__).resolve().parent.parent / "grader"
 #: Module or function -> what it parses. A module stands for everything in it.
 PARSERS: Mapping[str, str] = {
-    **dict.fromkeys(("ast.parse", "ast.literal_eval", "compile", "tokenize", "symtable", "codeop"), "Python"),
+    **dict.fromkeys(("ast.parse", "ast.literal_eval", "compile", "tokenize", "symtable", "codeop", "libcst"), "Python"),
     **dict.fromkeys(("exec", "eval", "runpy", "code.InteractiveInterpreter"), "Python that runs"),
     **dict.fromkeys(("json.load", "json.loads", "json.JSONDecoder", "json.tool"), "JSON"),
     **dict.fromkeys(("tomllib", "tomli"), "TOML"),

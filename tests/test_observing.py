@@ -12,6 +12,7 @@ import pytest
 from grader.app.observe import ObserveRequest, observe
 from grader.core.errors import SubmissionError
 from grader.core.quantities import NS_PER_MS, NS_PER_S
+from grader.core.report import Summary
 from grader.core.trace import (
     ClockKind,
     Endpoint,
@@ -22,11 +23,12 @@ from grader.core.trace import (
     Message,
     Observation,
     Offer,
+    OutputLine,
     ServiceEnd,
     Trace,
 )
 from grader.judging.summary import summarise
-from grader.reporting.observed import render_summary, summary_to_json
+from grader.reporting.observed import render_summary, summary_to_json, without_libraries
 
 ROOT = Path(__file__).resolve().parent.parent
 FLOAT = "std_msgs/msg/Float32"
@@ -281,7 +283,7 @@ def test_packages_are_observed(path: Path, processes: tuple[str, ...], nodes: tu
     ("path", "said"),
     [
         (ROBOT / "talkr", "expected an executable (robot/talker or robot/listener), found none"),
-        (ROBOT / "launch", "expected a package or workspace with entry points, found none"),
+        (ROBOT / "launch", "expected a package or workspace with executables, found none"),
         (ROBOT / "config" / "talker.yaml", "expected a .py file, found none"),
     ],
 )
@@ -298,3 +300,142 @@ def test_a_file_that_is_none_is_one_line() -> None:
     done = subprocess.run([grade, "observe", "nope.py"], check=False, capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stderr.splitlines()[0] == "error: nope.py: expected a .py file, found none"
+
+
+CLOCKS = pytest.mark.parametrize("clock", ["virtual", "wall"])
+TALKER = """
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Talker(Node):
+    def __init__(self):
+        super().__init__("talker")
+        self.pub = self.create_publisher(String, "said", 10)
+        self.create_timer(0.2, self.tick)
+
+    def tick(self):
+        self.pub.publish({sent})
+
+
+rclpy.init({given})
+rclpy.spin(Talker())
+"""
+
+LACKING = {
+    "rosbag2_py": "rosbag2_py is a package of ROS 2 that is not installed here: the program may be right where it is",
+    "nav2_msgs": "nav2_msgs is not installed here: give the folder with its definitions as --interfaces",
+}
+
+
+def seen(folder: Path, clock: str = "virtual", **files: str) -> Summary:
+    """Observe files for a second."""
+    folder.chmod(0o755)
+    for name, text in files.items():
+        (folder / f"{name}.py").write_text(text)
+    paths = tuple(folder / f"{name}.py" for name in files)
+    return observe(ObserveRequest(paths, NS_PER_S, clock=clock), lambda _: None)
+
+
+@pytest.mark.ros
+@CLOCKS
+def test_a_fault_has_the_hint_of_the_report(tmp_path: Path, clock: str) -> None:
+    """In the text and in JSON; the traceback shows the program's own lines."""
+    summary = seen(tmp_path, clock, node=TALKER.format(sent='"hello"', given=""))
+    text, told = render_summary(summary), json.loads(summary_to_json(summary))
+    hint = "this publisher sends String objects, not str: make one, set its fields and publish it"
+    assert f"    hint: {hint}\n" in text
+    assert [fault["hint"] for fault in told["faults"]] == [hint]
+    shown = [line for line in text.splitlines() if "stderr: " in line]
+    assert 'File "node.py", line 14, in tick' in "".join(shown)
+    assert any("calls in Python and ROS)" in line for line in shown)
+    assert not any("site-packages" in line or "and 1" in line for line in shown)
+
+
+@pytest.mark.ros
+@CLOCKS
+@pytest.mark.parametrize(("package", "hint"), LACKING.items())
+def test_a_package_that_is_not_installed_is_no_mistake(tmp_path: Path, clock: str, package: str, hint: str) -> None:
+    """Of those that ROS has, and of interfaces."""
+    assert seen(tmp_path, clock, node=f"import rclpy\nimport {package}\n").hints == (hint,)
+
+
+@pytest.mark.ros
+@CLOCKS
+@pytest.mark.parametrize("given", ["domain_id=7", "args=None"])
+def test_a_node_in_another_domain_is_told(tmp_path: Path, clock: str, given: str) -> None:
+    """Instead of nothing at all."""
+    before = "import os\nos.environ['ROS_DOMAIN_ID'] = '7'\n" if "domain" not in given else ""
+    summary = seen(tmp_path, clock, node=before + TALKER.format(sent="String()", given=given))
+    assert summary.nodes == ()
+    assert summary.notes == (
+        "node.py: the node /talker is in the ROS domain 7, where nothing of it is seen; take out what sets domain_id "
+        "or ROS_DOMAIN_ID",
+    )
+
+
+@pytest.mark.ros
+@CLOCKS
+def test_two_nodes_of_one_name_are_told_apart_by_a_note(tmp_path: Path, clock: str) -> None:
+    """With the lines that give the name."""
+    text = TALKER.format(sent="String()", given="")
+    summary = seen(tmp_path, clock, one=text, two=text)
+    said = "one.py:9 and two.py:9: two nodes have the name /talker, and ROS cannot tell them apart"
+    assert [note.partition(": give")[0] for note in summary.notes] == [said]
+
+
+EVENTS = "rclpy.experimental.events_executor.EventsExecutor()"
+OUTSIDE = {
+    "subprocess.run([sys.executable, '-c', ''])": "node.py:11 starts another process, which runs in real time",
+    "signal.alarm(5)": "node.py:11 sets an alarm that rings in real time",
+    EVENTS: "node.py:11 makes an EventsExecutor, which waits in real time",
+}
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(("statement", "said"), OUTSIDE.items())
+def test_the_note_on_the_wall_clock_names_the_line(tmp_path: Path, statement: str, said: str) -> None:
+    """And what stands there."""
+    text = (
+        "import os\nimport signal\nimport subprocess\nimport sys\nimport rclpy\n"
+        "import rclpy.experimental.events_executor\n\n\ndef work():\n    rclpy.init()\n"
+        f"    {statement}\n\n\nwork()\nrclpy.spin(rclpy.create_node('n'))\n"
+    )
+    summary = seen(tmp_path, "auto", node=text)
+    reason = f"the node waits for something that is neither ROS nor time: {said}"
+    assert (summary.clock, summary.clock_reason) == (ClockKind.WALL, reason)
+    assert f"  note: recorded on the wall clock: {reason}\n" in render_summary(summary)
+    assert summary.faults == () or "alarm" in statement  # whose signal ends the program
+
+
+def test_output_that_only_looks_like_a_traceback_stays() -> None:
+    """Lines of standard output, and text that is indented without a call before it."""
+    texts = [
+        ("stdout", '  File "/usr/lib/python3/a.py", line 1, in f'),
+        ("stderr", "    indented"),
+        ("stderr", '  File "/usr/lib/python3/a.py", line 1, in f'),
+        ("stderr", "    g()"),
+        ("stderr", "    ^^^"),
+        ("stderr", "ValueError: x"),
+    ]
+    lines = [OutputLine(n, "a.py", stream, text) for n, (stream, text) in enumerate(texts)]
+    assert [line.text for line in without_libraries(lines)] == [
+        texts[0][1],
+        texts[1][1],
+        "  (1 call in Python and ROS)",
+        "ValueError: x",
+    ]
+
+
+SHARED = ROOT.parent / "shared" / "cases" / "fidelity"
+
+
+@pytest.mark.ros
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the programs of others are not here")
+@CLOCKS
+def test_services_of_others_are_in_the_graph(clock: str) -> None:
+    """Also of programs without a topic."""
+    files = (SHARED / "graph_server.py", SHARED / "graph_asks.py")
+    text = render_summary(observe(ObserveRequest(files, 2 * NS_PER_S, clock=clock), lambda _: None))
+    assert "Graph:\n  /asks ┄┄/ask┄┄▶ /server\n" in text

@@ -81,7 +81,7 @@ MakeScheduler = Callable[[int], ClassScheduler]
 
 
 #: How many submissions may wait on the wall clock beside each of those that need a processor; each takes memory.
-WAITING_PER_JOB = 2
+WAITING_PER_JOB = 3
 #: The hint of a failure.
 AGAIN = "run the same command again"
 #: Longest line read from a process.

@@ -243,6 +243,7 @@ class Summary:
     graph: GraphSnapshot | None  # the richest snapshot of the graph, if there is any
     isolation: str
     starts: tuple[Start, ...] = ()  # how each file was started
+    hints: tuple[str, ...] = ()  # one thing to do about each of `faults`; empty where no cause is very likely
 
 
 @dataclass(frozen=True, slots=True)

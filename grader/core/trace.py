@@ -171,6 +171,7 @@ class Endpoint:
     depth: int = 0  # history depth, 0 if unknown
     deadline_ns: int = 0  # offered or requested deadline, 0 for none
     liveliness: str = "automatic"  # `automatic` or `manual_by_topic`
+    lease_ns: int = 0  # offered or requested lease of the liveliness, 0 for none
 
 
 def unmet_policy(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:
@@ -182,12 +183,22 @@ def unmet_policy(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str]
         return "best_effort reliability", "reliable"
     if (publisher.durability, subscription.durability) == ("volatile", "transient_local"):
         return "volatile durability", "transient_local"
-    if subscription.deadline_ns and not 0 < publisher.deadline_ns <= subscription.deadline_ns:
-        offered = f"a deadline of {seconds(publisher.deadline_ns):g} s" if publisher.deadline_ns else "no deadline"
-        return offered, f"{seconds(subscription.deadline_ns):g} s"
+    if not keeps_within(publisher.deadline_ns, subscription.deadline_ns):
+        return _time_of("deadline", publisher.deadline_ns), f"{seconds(subscription.deadline_ns):g} s"
     if (publisher.liveliness, subscription.liveliness) == ("automatic", "manual_by_topic"):
         return "automatic liveliness", "manual_by_topic"
+    if not keeps_within(publisher.lease_ns, subscription.lease_ns):
+        return _time_of("liveliness lease", publisher.lease_ns), f"{seconds(subscription.lease_ns):g} s"
     return None
+
+
+def keeps_within(offered_ns: int, requested_ns: int) -> bool:
+    """Return whether a publisher's deadline or lease is as short as a subscription requests; 0 stands for none."""
+    return requested_ns == 0 or 0 < offered_ns <= requested_ns
+
+
+def _time_of(name: str, offered_ns: int) -> str:
+    return f"a {name} of {seconds(offered_ns):g} s" if offered_ns else f"no {name}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,6 +284,29 @@ Observation = Message | Delivery | Request | Response | LogRecord | OutputLine |
 
 
 @dataclass(frozen=True, slots=True)
+class NewerPython:
+    """What ended a program is right in the Python of the ROS release, and unknown to the older one that runs here."""
+
+    process: str  # file name of the student process
+    file: str  # the file that needs it, relative to the submission
+    line: int  # where it was found, from 1; 0 if unknown
+    needs: tuple[int, int]  # the oldest version of Python that has it
+    here: tuple[int, int]  # the version that the program ran on
+    release: str  # the ROS release, e.g. `jazzy`
+    python: tuple[int, int]  # the version that the release runs on
+    name: str = ""  # what the standard library has since then, e.g. `itertools.batched`; empty for syntax
+
+    @property
+    def sentence(self) -> str:
+        """What is lacking, and whose fault it is not."""
+        place = f"{self.file}:{self.line}" if self.line else self.file or self.process
+        needs, here, python = (".".join(map(str, version)) for version in (self.needs, self.here, self.python))
+        what = f"{self.name} came with" if self.name else "this is valid since"
+        runs = f"ROS 2 {self.release} runs on Python {python}, the grader here on Python {here}"
+        return f"{place}: {what} Python {needs}; {runs}, which is not the program's fault"
+
+
+@dataclass(frozen=True, slots=True)
 class WrittenFile:
     """A small file that a program wrote beside itself, as its process reports it; no check reads it."""
 
@@ -303,6 +337,7 @@ class Trace:
     # What a launch file asks for and the grader cannot do, as sentences: what is not met may be due to it
     left_out: tuple[str, ...] = ()
     written: tuple[WrittenFile, ...] = ()  # of programs that ended in time
+    newer: tuple[NewerPython, ...] = ()  # what programs ended of, and would not where the release's own Python runs
     # Whether a wait for the middleware timed out, so that something may be missing: a reason to record again
     incomplete: bool = False
     # The mistake in a simulation of the rubric's author that prevents judging, as `harness_problem` does; None without

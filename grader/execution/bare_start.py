@@ -27,8 +27,15 @@ _SETTING_UP = frozenset({"sys", "os", "warnings", "random", "logging", "np", "nu
 _NODES = frozenset({"Node", "LifecycleNode"})
 
 
-def bare_arguments(
-    here: Path, root: str, file: str, given: PlannedStart | None = None, scripts: Sequence[Sequence[str]] = ()
+def bare_arguments(  # noqa: PLR0913  what is known of a file
+    here: Path,
+    root: str,
+    file: str,
+    given: PlannedStart | None = None,
+    scripts: Sequence[Sequence[str]] = (),
+    *,
+    installed: bool = False,
+    imported: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """Return the Python arguments that run a file as its author would.
 
@@ -41,6 +48,8 @@ def bare_arguments(
         file: The file, relative to `root`.
         given: What it is started with; None for its file alone.
         scripts: Name, module and function of each console script of its package.
+        installed: Whether the file is installed as it is and run as a script.
+        imported: The folders of installed Python packages, relative to `root`.
     """
     given = given or PlannedStart(file)
     path = f"{root}/{file}"
@@ -51,9 +60,10 @@ def bare_arguments(
     tree = _parsed(here / file)
     if tree is None:
         return _by_import(script, [beside], path, setup, plain) if setup else ("-u", path, *plain)
-    layout = layout_of(str(here), file)
+    layout = layout_of(str(here), file, installed=installed)
     start = start_of(str(here), file, layout, tree, given.executable, scripts)
-    folders = [f for f in dict.fromkeys((start.base, layout.base, *package_folders(str(here)))) if f]
+    own = [str(here / folder) for folder in imported]
+    folders = [f for f in dict.fromkeys((start.base, layout.base, *package_folders(str(here)), *own)) if f]
     seen = [root + folder.removeprefix(str(here)) for folder in folders]
     if layout.module and not layout.base:  # its package is the submission's own folder
         seen.append(str(PurePosixPath(root).parent))

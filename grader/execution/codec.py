@@ -48,6 +48,8 @@ TAGS: Mapping[type, str] = {
 _SCALARS = frozenset({str, int, bool, type(None)})
 #: The number of trailing fields of a fault that are written as one list.
 _DETAILS = 3
+#: Index of the endpoints in the row of a snapshot of the graph.
+_ENDPOINTS = 3
 
 
 def trace_to_json(trace: Trace) -> dict[str, Any]:
@@ -64,6 +66,7 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
         **({"most_starved_ns": trace.most_starved_ns} if trace.most_starved_ns else {}),
         **({"left_out": list(trace.left_out)} if trace.left_out else {}),
         **({"written": [plain(file) for file in trace.written]} if trace.written else {}),
+        **({"newer": [plain(one) for one in trace.newer]} if trace.newer else {}),
         **({"author_mistake": asdict(trace.author_mistake)} if trace.author_mistake is not None else {}),
         "observations": [observation_to_json(o) for o in trace.observations],
     }
@@ -85,7 +88,15 @@ def observation_to_json(observation: Observation) -> list[Any]:
     row = [TAGS[type(observation)], *plain(observation)]
     if isinstance(observation, Fault):
         return [*row[:-_DETAILS], row[-_DETAILS:]]
-    return row[:-1] if isinstance(observation, GraphSnapshot) and not observation.services else row
+    if isinstance(observation, GraphSnapshot):
+        row[_ENDPOINTS] = [without_last(end, 0) for end in row[_ENDPOINTS]]
+        return without_last(row, [])
+    return row
+
+
+def without_last(row: list[Any], usual: Any) -> list[Any]:
+    """Leave out the last field if it has the value that readers take for a missing one."""
+    return row[:-1] if row[-1] == usual else row
 
 
 def plain(value: Any) -> Any:  # noqa: PLR0911 - one for each kind of value

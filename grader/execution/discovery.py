@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from typing import Any
 
-from grader.core.trace import GraphSnapshot
+from grader.core.trace import GraphSnapshot, keeps_within
 from grader.execution.exchanges import PlannedCalls, PlannedMessages
 from grader.execution.machine import Patience
 from grader.execution.observer import Observer
@@ -55,27 +55,40 @@ def readers_of(student: NodeProcess, topic: str) -> list[dict[str, Any]]:
     return [c for c in student.claims if c["kind"] == "subscription" and c["name"] == topic]
 
 
-def compatible(writer: dict[str, Any], reader: dict[str, Any]) -> bool:
-    """Return whether a publisher's QoS satisfies a subscription's: reliability, durability, deadline, liveliness."""
+#: The QoS of an endpoint that asks for nothing special; what a claim leaves out is as here.
+ORDINARY = {"reliable": True, "latched": False, "deadline_ns": 0, "manual": False, "lease_ns": 0}
+
+
+def fits(writer: Mapping[str, Any], reader: Mapping[str, Any]) -> bool:
+    """Return whether the QoS that a writer offers satisfies that of a reader: the policies of `unmet_policy`."""
+    offer, wish = {**ORDINARY, **writer}, {**ORDINARY, **reader}
     return (
-        (writer["name"], writer["type"]) == (reader["name"], reader["type"])
-        and (writer["reliable"] or not reader["reliable"])
-        and (writer["latched"] or not reader["latched"])
-        and (reader["deadline_ns"] == 0 or 0 < writer["deadline_ns"] <= reader["deadline_ns"])
-        and (writer["manual"] or not reader["manual"])
+        (offer["reliable"] or not wish["reliable"])
+        and (offer["latched"] or not wish["latched"])
+        and keeps_within(offer["deadline_ns"], wish["deadline_ns"])
+        and (offer["manual"] or not wish["manual"])
+        and keeps_within(offer["lease_ns"], wish["lease_ns"])
     )
 
 
-def offered(stream: PlannedMessages) -> dict[str, Any]:
-    """Describe the publisher of a stimulus of a fixed type as a process would describe its own."""
-    return {
-        "name": stream.topic,
-        "type": stream.type,
-        "reliable": not stream.best_effort,
-        "latched": stream.latched,
-        "deadline_ns": 0,
-        "manual": False,
-    }
+def meets(writer: Mapping[str, Any], reader: Mapping[str, Any]) -> bool:
+    """Return whether a publisher and a subscription have the same topic and type, so that only QoS keeps them apart."""
+    return (writer["name"], writer["type"]) == (reader["name"], reader["type"])
+
+
+def compatible(writer: Mapping[str, Any], reader: Mapping[str, Any]) -> bool:
+    """Return whether the messages of a publisher reach a subscription."""
+    return meets(writer, reader) and fits(writer, reader)
+
+
+def passes(sender: Mapping[str, Any], receiver: Mapping[str, Any]) -> bool:
+    """Return whether what one end of a service sends reaches the other; without QoS, an end is an ordinary one."""
+    return fits(sender.get("sends", ORDINARY), receiver.get("takes", ORDINARY))
+
+
+def answers(server: Mapping[str, Any], client: Mapping[str, Any]) -> bool:
+    """Return whether requests and responses pass between a server and a client, so that they see each other."""
+    return passes(client, server) and passes(server, client)
 
 
 def serves(claim: dict[str, Any], service: str, interface: str) -> bool:
@@ -83,11 +96,6 @@ def serves(claim: dict[str, Any], service: str, interface: str) -> bool:
     if claim["kind"] == "node":
         return interface.startswith(BACKGROUND_TYPES) and claim["name"] == service.rpartition("/")[0]
     return (claim["kind"], claim["name"], claim["type"]) == ("service", service, interface)
-
-
-def takes_ordinary(reader: dict[str, Any]) -> bool:
-    """Return whether a subscription is compatible with ordinary stimuli: no deadline, automatic liveliness."""
-    return reader["deadline_ns"] == 0 and not reader["manual"]
 
 
 #: The channels on which endpoints receive.
@@ -124,6 +132,7 @@ class Discovery:
     Attributes:
         streams: The topics that stimuli publish on now, with their types.
         fixed: The streams whose type a rubric has fixed.
+        latched: The other streams whose publisher is latched, because the first subscription asked for that.
         published: How many messages each stimulus has published.
         kept: How many messages each process has published on a topic of a latched publisher of its own.
         patience: The timeout for anything that was announced.
@@ -149,6 +158,11 @@ class Discovery:
         self._strangers: Counter[Key] = Counter()
         self.streams: dict[str, str] = {}
         self.fixed: dict[str, PlannedMessages] = {}
+        self.latched: set[str] = set()
+        #: How many publishers each stimulus has had, and for each endpoint of a process, by its number there, the
+        #: counterparts of the same type whose QoS has kept them apart: the middleware counts those that have gone, too.
+        self._writers: Counter[str] = Counter()
+        self._refused: dict[tuple[str, int], set[tuple[str, int]]] = {}
         self.published: Counter[str] = Counter()
         self.kept: Counter[tuple[str, str]] = Counter()
 
@@ -172,7 +186,7 @@ class Discovery:
 
     def _announce_kept(self) -> None:
         """Announce the messages that latched publishers resend to new transient-local subscriptions."""
-        writers = [("", offered(stream), self.published[topic]) for topic, stream in self.fixed.items()]
+        writers = [("", self.offered(topic), self.published[topic]) for topic in self.fixed]
         for talker in self._students:
             latched = [c for c in talker.claims if c["kind"] == "publisher" and c["latched"]]
             # how many a student's publisher keeps is not known, but that one comes is certain
@@ -189,21 +203,33 @@ class Discovery:
                 announce(students[reader], f"topic {topic}", count)
         self._served = set(served)
 
+    def offered(self, topic: str) -> dict[str, Any]:
+        """Describe the publisher of a stimulus as a process would describe its own."""
+        fixed = self.fixed.get(topic)
+        return {
+            **ORDINARY,
+            "name": topic,
+            "type": self.streams[topic],
+            "reliable": fixed is None or not fixed.best_effort,
+            "latched": topic in self.latched if fixed is None else fixed.latched,
+        }
+
+    def advertised(self, topic: str) -> None:
+        """Wait until the new publisher of a stimulus is matched with every compatible subscription."""
+        self._writers[topic] += 1
+        self.patience.wait(lambda: self.is_heard(topic))
+        self.tell_all()
+
     def is_heard(self, topic: str) -> bool:
         """Return whether the publisher of a stimulus is matched with every compatible subscription."""
-        stream, interface = self.fixed.get(topic), self.streams[topic]
-        best_effort = stream is not None and stream.best_effort
-        own = sum(not (reliable and best_effort) for reliable in self._observer.watching(topic, interface))
-        asking = [c for s in self._students if not s.ended for c in readers_of(s, topic)]
-        # a number stream is latched only if the first subscription asks for it
-        readers = sum(self.takes(c, topic) for c in asking if stream is not None or not c["latched"])
-        return self._observer.subscribers_matched(topic) >= readers + own
+        writer = self.offered(topic)
+        own = sum(writer["reliable"] or not reliable for reliable in self._observer.watching(topic, writer["type"]))
+        readers = sum(compatible(writer, c) for s in self._students if not s.ended for c in readers_of(s, topic))
+        return self._observer.subscribers_matched(topic) >= int(readers + own)
 
     def takes(self, reader: dict[str, Any], topic: str) -> bool:
         """Return whether a subscription is compatible with the stimulus on a topic."""
-        fixed = self.fixed.get(topic)
-        fits = takes_ordinary(reader) if fixed is None else compatible(offered(fixed), reader)
-        return bool(self.streams.get(topic) == reader["type"] and fits)
+        return topic in self.streams and compatible(self.offered(topic), reader)
 
     def await_departure(self, now_ns: int) -> None:
         """Wait until all other processes have seen that a process left the graph before it ended."""
@@ -220,10 +246,32 @@ class Discovery:
     def tell_all(self) -> None:
         """Make every process wait for the counterparts of its endpoints."""
         claims = self._claims()
+        self._count_refused()
         graph = self._observer.counts() if any(s.sees_graph for s in self._students) else {}
         for student in self._students:
             if not student.ended and (student.claims or student.told):
                 self._tell_matches(student, claims, graph)
+
+    def _count_refused(self) -> None:
+        """Note for each publisher and subscription of a process the counterparts whose QoS keeps them apart."""
+        writers: dict[tuple[str, str], list[tuple[tuple[str, int], dict[str, Any]]]] = {}
+        for topic, interface in self.streams.items():
+            writers.setdefault((topic, interface), []).append(((topic, self._writers[topic]), self.offered(topic)))
+        ends = [
+            ((student.name, claim.get("number", 0)), claim)
+            for student in self._students
+            for claim in student.claims
+            if claim["kind"] in ("publisher", "subscription")
+        ]
+        for end, claim in ends:
+            if claim["kind"] == "publisher":
+                writers.setdefault((claim["name"], claim["type"]), []).append((end, claim))
+        for reader, wish in ends:
+            same = writers.get((wish["name"], wish["type"]), []) if wish["kind"] == "subscription" else []
+            for writer, offer in same:
+                if not fits(offer, wish):
+                    self._refused.setdefault(reader, set()).add(writer)
+                    self._refused.setdefault(writer, set()).add(reader)
 
     def retry(self) -> None:
         """Wait once more for the counterparts that a process has missed, before time goes on."""
@@ -277,7 +325,7 @@ class Discovery:
         """Return whether the server for some calls exists and is matched."""
         service = self._services.resolved(calls.service)
         claims = [c for s in self._students if not s.ended for c in s.claims]
-        if service is None or not any(serves(c, service, calls.type) for c in claims):
+        if service is None or not any(serves(c, service, calls.type) and answers(c, {}) for c in claims):
             return False
         self._services.add_clients(calls)
         if self.patience.wait(lambda: self._observer.services.is_matched(service)):
@@ -286,17 +334,12 @@ class Discovery:
         return False
 
     def _watched(self, claim: dict[str, Any], writers: list[dict[str, Any]]) -> bool:
-        same = [
-            w
-            for w in writers
-            if (w["name"], w["type"], w["reliable"]) == (claim["name"], claim["type"], claim["reliable"])
-        ]
-        matched = self._observer.publishers_matched(claim["name"], claim["type"], reliable=claim["reliable"])
+        """Return whether the observer's subscription is matched with exactly the publishers of a topic and type."""
         if not self._observer.reads(claim["name"]):
             return True
-        # A best-effort subscription also matches reliable publishers, so it may have more matches than these.
-        most = len(same) + self._strangers[_key(claim)] + self._observer.publishes(claim["name"])
-        return len(same) <= matched and (matched <= most or not claim["reliable"])
+        same = sum(meets(writer, claim) for writer in writers)
+        matched = self._observer.publishers_matched(claim["name"], claim["type"])
+        return same <= matched <= same + self._strangers[_key(claim)] + self._observer.publishes(claim["name"])
 
     def _tell_matches(self, student: NodeProcess, claims: list[dict[str, Any]], graph: dict[str, int]) -> None:
         """Make a process wait for the counterparts of its endpoints, unless it already waited for the same ones."""
@@ -305,6 +348,9 @@ class Discovery:
             count = self._counterparts(claim, claims)
             if count:
                 expected.setdefault(claim["kind"], {}).setdefault(claim["name"], []).append(count)
+            number = claim.get("number", 0)
+            if refused := self._refused.get((student.name, number)):
+                expected.setdefault("refused", {})[str(number)] = [len(refused)]
         if student.sees_graph:
             expected["graph"] = {name: [count] for name, count in graph.items()}
         gone = sorted(student.told.get("client", {}).keys() - expected.get("client", {}).keys())
@@ -317,22 +363,23 @@ class Discovery:
         if answer is None or answer.get("kind") != "matched":
             self._mark_dead(student)
             return
-        student.nudged = True  # a match is an event that a node may have a callback for
+        student.nudged = True  # a match is an event that a node may have a callback for, and so is a refusal
         missing = [str(end).partition(" ") for end in _listed(answer.get("missing"))]
         student.unmatched = frozenset(f"{CHANNELS.get(kind, kind)} {name}" for kind, _, name in missing)
-        if missing:
+        untold = [str(end).partition(" ") for end in _listed(answer.get("untold"))]
+        if missing or untold:
             self.patience.lose()
-        for kind, _, name in missing:
+        late = [(end, "matched") for end in missing] + [(end, "told of its counterparts") for end in untold]
+        for (kind, _, name), what in late:
             if (kind == "publisher" or kind in CHANNELS) and is_name(name):
-                self._recorder.note(f"{student.name}: {kind} {name[:NAME_CHARACTERS]} was not matched in time")
+                self._recorder.note(f"{student.name}: {kind} {name[:NAME_CHARACTERS]} was not {what} in time")
 
     def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
         kind, name = claim["kind"], claim["name"]
         if kind == "publisher":
             students = sum(compatible(claim, c) for c in claims if c["kind"] == "subscription")
-            return students + sum(
-                1 for key in self._observer.watching(name, claim["type"]) if claim["reliable"] or not key
-            )
+            watching = self._observer.watching(name, claim["type"])
+            return students + sum(fits(claim, {"reliable": reliable}) for reliable in watching)
         if kind == "subscription":
             return self.takes(claim, name) + sum(compatible(c, claim) for c in claims if c["kind"] == "publisher")
         if kind == "service":
@@ -341,7 +388,8 @@ class Discovery:
             return students + self._services.ends_of("client", name)
         if kind != "client":
             return 0
-        return int(self._services.serves(name, claim["type"]) or any(serves(c, name, claim["type"]) for c in claims))
+        graders = self._services.serves(name, claim["type"]) and answers({}, claim)
+        return int(graders or any(serves(c, name, claim["type"]) and answers(c, claim) for c in claims))
 
     def look(self, now_ns: int) -> None:
         """Record the graph if it has changed."""

@@ -25,7 +25,7 @@ def read(path: Path) -> ast.Module | SyntaxError | None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # as error, a warning about a string would be a syntax error
         try:
-            text = _text(path)
+            text = text_of(path)
             return None if text is None else parsed(text, str(path))
         except SyntaxError as error:
             return error
@@ -33,7 +33,7 @@ def read(path: Path) -> ast.Module | SyntaxError | None:
             return None
 
 
-def _text(path: Path) -> bytes | None:
+def text_of(path: Path) -> bytes | None:
     """Return the content of a file; None if it is large, or a pipe or device, which might never end or begin."""
     if not stat.S_ISREG(path.stat().st_mode):
         return None

@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from grader.core.dataclass import dataclass
-from grader.core.projects import Project
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Fault, FaultKind, LogRecord, Mark, Observation, Offer, OutputLine, Trace
-from grader.execution.ending import START_CPU_S, reported_fault
-from grader.execution.executables import Executable, executables, find_executable, has_package
+from grader.execution.ending import START_CPU_S, graders_fault, reported_fault
+from grader.execution.executables import Executable, executables, find_executable, find_loose, has_package, why_unknown
 from grader.execution.notes import Places, left_out_words, quoted
 from grader.execution.plan import Plan, PlannedStart
 from grader.execution.student_process import NodeProcess
@@ -30,6 +29,42 @@ LONGEST_S, LOOK_S = 60.0, 0.02
 NODES, LEFT_OUT, ARGUMENTS, CHARACTERS, FILE_CHARACTERS = 16, 50, 200, 1_000, 1 << 20
 #: What packages and programs are called; anything else that a launch file names is quoted.
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,100}")
+#: Commands that neither send nor change anything in the ROS graph, whatever their arguments; and those of `ros2`, by
+#: their first two words.
+HARMLESS = frozenset(
+    {
+        *("cat", "chmod", "clear", "code", "cp", "date", "echo", "env", "false", "firefox", "gedit", "google-chrome"),
+        *(
+            "gz",
+            "hostname",
+            "ign",
+            "ls",
+            "mkdir",
+            "mv",
+            "notify-send",
+            "printenv",
+            "printf",
+            "pwd",
+            "rm",
+            "rmdir",
+            "rqt",
+        ),
+        *("rqt_graph", "rqt_plot", "rqt_console", "rviz2", "sleep", "tee", "touch", "true", "uname", "which", "whoami"),
+        *("xdg-open",),
+    }
+)
+HARMLESS_OF_ROS = frozenset(
+    {
+        *(("topic", verb) for verb in ("echo", "list", "info", "hz", "bw", "delay", "type", "find")),
+        *(("node", verb) for verb in ("list", "info")),
+        *(("service", verb) for verb in ("list", "type", "find", "info", "echo")),
+        *(("action", verb) for verb in ("list", "info", "type")),
+        *(("param", verb) for verb in ("list", "get", "dump", "describe")),
+        *(("bag", verb) for verb in ("record", "info")),
+        *(("interface", verb) for verb in ("list", "show", "package", "packages", "proto")),
+        *(("pkg", verb) for verb in ("list", "prefix", "executables", "xml")),
+    }
+)
 #: Packages with programs that only show what happens; leaving them out changes nothing for the nodes.
 ONLY_LOOKING = frozenset({"rviz2", "rqt", "rqt_gui", "rqt_graph", "rqt_plot", "rqt_console", "plotjuggler"})
 
@@ -65,6 +100,8 @@ def evaluated(student: NodeProcess, plan: Plan) -> Launched:
     if report is None:
         kind = FaultKind.KILLED if student.stopped else FaultKind.HUNG if why else FaultKind.EXITED
         return Launched(fault=Fault(0, student.name, kind, why or _ENDED))
+    if graders := graders_fault(student.name, report.get("fault")):
+        return Launched(harness_problem=graders)
     if "fault" in report:
         return Launched(fault=reported_fault(student.name, 0, report["fault"], plan.limits, student.places))
     return _launched(student.name, report, plan, student.places)
@@ -97,19 +134,23 @@ def _description(student: NodeProcess) -> tuple[dict[str, Any] | None, str]:
 
 def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) -> Launched:
     root, known = Path(plan.root), dict(plan.start_of(name).known)
-    left_out = [_left_out(name, one, places) for one in _dicts(report.get("left_out"), LEFT_OUT)]
+    left_out: list[str] = []
     notes: list[str] = []
+    for one in _dicts(report.get("left_out"), LEFT_OUT):
+        (notes if _is_harmless(one) else left_out).append(_left_out(name, one, places))
     made = Launched()
     for node in _dicts(report.get("nodes"), NODES):
         package, wanted = _text(node.get("package")), _text(node.get("executable"))
         near = _text(node.get("near")) if has_package(plan.projects, _text(node.get("near"))) else ""
-        found = None if near else find_executable(root, plan.projects, package, wanted)
+        known_package = has_package(plan.projects, package)
+        look = find_executable(root, plan.projects, package, wanted) if known_package else find_loose(root, wanted)
+        found = None if near else look
         where = _place(name, node, places)
         if found is None or found.file is None:
-            if _is_built_by_cmake(root, plan.projects, package) and found is None:
-                left_out.append(f"{where}: {_program(package, wanted)} was not started: {_BUILT_BY_CMAKE}")
+            if found is None and (why := why_unknown(root, plan.projects, package, wanted)):
+                left_out.append(f"{where}: {_program(package, wanted)} was not started: {why}")
                 continue
-            if has_package(plan.projects, package) or near:
+            if known_package or near:
                 text = _not_found(package, wanted, found, executables(root, plan.projects), near)
                 file, _, line = where.rpartition(":")
                 return Launched(
@@ -119,7 +160,7 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
             sentence = f"{where}: {_program(package, wanted)} was not started: {_lacking(package)}"
             (notes if package in ONLY_LOOKING else left_out).append(sentence)
             continue
-        if not found.target and not has_package(plan.projects, package):
+        if not known_package:
             notes.append(f"{where}: {_lacking(package)}; {found.file} was started")
         made = _added(made, name, node, found, where, known)
         if problem := made.starts[-1].problem:
@@ -169,23 +210,27 @@ def _lacking(package: str) -> str:
     return f"the submission has no package {package if _NAME.fullmatch(package) else quoted(package)}"
 
 
-_BUILT_BY_CMAKE = "CMake builds the programs of its package"
-
-
-def _is_built_by_cmake(root: Path, projects: Sequence[Project], package: str) -> bool:
-    """Return whether a package may have programs in C++, which nothing here can build."""
-    return any(one.name == package and (root / one.folder / "CMakeLists.txt").is_file() for one in projects)
-
-
 def _not_found(package: str, wanted: str, found: Executable | None, known: Sequence[Executable], near: str) -> str:
     if near:
         return f"PackageNotFoundError: package {quoted(package)} not found; the submission has {near}"
     if found is not None:
-        return f"SubstitutionFailure: the entry point {wanted} of {package} is {found.target}, which is not there"
+        return f"SubstitutionFailure: {found.problem}"
     names = ", ".join(one.name for one in known if one.package == package)
     name = f"'{wanted}'" if _NAME.fullmatch(wanted) else quoted(wanted)
     text = f"SubstitutionFailure: package '{package}' found, but executable {name} not found"
-    return f"{text}; its entry points are {names}" if names else f"{text}; it has no entry points"
+    return f"{text}; its executables are {names}" if names else f"{text}; it has no executables"
+
+
+def _is_harmless(one: Mapping[str, Any]) -> bool:
+    """Return whether what was left out changes nothing for the nodes: a command that takes no part in the ROS graph."""
+    if one.get("code") != "command":
+        return False
+    text = _text(one.get("text"))
+    words = text.split()
+    if not words or re.search(r"[;&|`$<>\n]", text):  # a shell may run more
+        return False
+    command = words[0].rpartition("/")[2]
+    return command in HARMLESS or (command == "ros2" and tuple(words[1:3]) in HARMLESS_OF_ROS)
 
 
 def _left_out(name: str, one: Mapping[str, Any], places: Places) -> str:

@@ -17,6 +17,7 @@ from pathlib import Path
 import grader
 from grader.core.checkup import Fact
 from grader.core.quantities import GIB, MIB
+from grader.core.releases import release_of
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.properties import confined, install_command, setting_command
 from grader.execution.weaknesses import BUBBLEWRAP, FAST_DDS, LINUX, kernel_version, known, repaired_here, version_of
@@ -91,13 +92,24 @@ _PERSISTENT = "/etc/sysctl.d/60-rclpy-grader.conf"
 def software(ros: RosInstallation | None) -> Iterator[Fact]:
     """Yield the versions of all software involved; those of ROS only if it is installed."""
     yield Fact("grader", grader.__version__)
-    yield Fact("Python", f"{platform.python_version()} ({sys.executable})")
+    yield _python(ros)
     if ros is not None:
         origin = "Python wheels" if ros.source == "wheels" else "the sourced installation"
         yield Fact("ROS 2", f"{ros.distro}, from {origin} in {ros.prefix}")
         yield Fact("rclpy", ros.rclpy_version)
         yield Fact("RMW", f"rmw_fastrtps_cpp {_package_version(ros.prefix, 'rmw_fastrtps_cpp')}{_fast_dds(ros)}")
     yield _bubblewrap()
+
+
+def _python(ros: RosInstallation | None) -> Fact:
+    """Report the version of Python, and whether it is older than the one that the ROS release is made for."""
+    value = f"{platform.python_version()} ({sys.executable})"
+    wanted = release_of(ros.distro).python if ros is not None else None
+    if ros is None or wanted is None or wanted <= sys.version_info[:2]:
+        return Fact("Python", value)
+    newer = ".".join(map(str, wanted))
+    lack = f"ROS 2 {ros.distro} runs on Python {newer}: what needs a program that is written for it is undecided here"
+    return Fact("Python", f"{value}; {lack}", remedy=f"install the grader with python{newer}")
 
 
 def weaknesses(ros: RosInstallation | None) -> Iterator[Fact]:

@@ -11,6 +11,10 @@ from typing import Any
 
 from grader.core.trace import Start, StartWay, main_not_called
 
+#: The full name of a node.
+_NODE = re.compile(r"(?:/[A-Za-z_][A-Za-z0-9_]{0,99}){1,20}")
+#: The highest ROS domain that has ports for its participants.
+MOST_DOMAIN = 232
 #: The size limit of a file in a submission.
 MOST_BYTES = 8 << 20
 NAME_CHARACTERS = 300
@@ -177,6 +181,20 @@ def _neighbour_imported(file: str, data: Mapping[str, Any], places: Places) -> s
     return f"{problem}; in a package, write: from . import {name}"
 
 
+def _other_domain(file: str, data: Mapping[str, Any], places: Places) -> str:
+    del places
+    node, domain = data.get("node"), data.get("domain")
+    if (
+        not isinstance(node, str)
+        or not _NODE.fullmatch(node)
+        or type(domain) is not int
+        or not 0 <= domain <= MOST_DOMAIN
+    ):
+        return ""
+    problem = f"{file}: the node {node} is in the ROS domain {domain}, where nothing of it is seen"
+    return f"{problem}; take out what sets domain_id or ROS_DOMAIN_ID"
+
+
 def _is_name(name: object) -> bool:
     return isinstance(name, str) and name.isidentifier() and len(name) <= _NAME_CHARACTERS
 
@@ -186,4 +204,5 @@ NOTES: Mapping[str, Callable[[str, Mapping[str, Any], Places], str]] = {
     "main_not_called": _main_not_called,
     "class_not_started": _class_not_started,
     "neighbour_imported": _neighbour_imported,
+    "other_domain": _other_domain,
 }

@@ -84,7 +84,8 @@ class Observer:
         self.node = _make_node(domain)
         self._nodes = [self.node]
         self._names = {self.node.get_name()}
-        self._readers: dict[tuple[str, str, bool], Any] = {}
+        self._readers: dict[tuple[str, str], Any] = {}
+        self._left: list[Taken] = []
         self._writers: dict[str, Any] = {}
         self._participants: dict[bytes, int] = {}
         self._logs: Any = None
@@ -169,38 +170,51 @@ class Observer:
             durability="transient_local" if latched else "volatile",
             deadline_ns=_finite_ns(info.qos_profile.deadline),
             liveliness="manual_by_topic" if manual else "automatic",
+            lease_ns=_finite_ns(info.qos_profile.liveliness_lease_duration),
         )
 
     def watch(self, endpoints: Iterable[Endpoint]) -> list[str]:
         """Subscribe to every topic that has a publisher; return the topics whose type is not installed.
 
+        One subscription takes all messages of a topic and type: a reliable one, or one with best effort if any
+        publisher has it. With two, the messages of a reliable publisher would be taken twice, and a best-effort
+        publisher would be told of a subscription that asks for more.
+
         Args:
             endpoints: Endpoints of students' nodes.
         """
         unknown = []
-        for end in endpoints:
-            key = (end.topic, end.type, end.reliability == "reliable")
-            if end.kind != "publisher" or key in self._readers:
+        publishers = [end for end in endpoints if end.kind == "publisher"]
+        best_effort = {(end.topic, end.type) for end in publishers if end.reliability != "reliable"}
+        for key in dict.fromkeys((end.topic, end.type) for end in publishers):
+            known = self._readers.get(key)
+            if known is not None and (key not in best_effort or not _is_reliable(known)):
                 continue
-            message = message_class(end.type)
+            topic, interface = key
+            message = message_class(interface)
             if message is None:
-                unknown.append(f"{end.topic} [{end.type}]")
+                unknown.append(f"{topic} [{interface}]")
                 continue
-            reliability = ReliabilityPolicy.RELIABLE if key[2] else ReliabilityPolicy.BEST_EFFORT
+            reliability = ReliabilityPolicy.BEST_EFFORT if key in best_effort else ReliabilityPolicy.RELIABLE
             qos = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=DEPTH, reliability=reliability)
             try:
-                self._readers[key] = self._make(_subscribing(message, end.topic, qos))
+                self._readers[key] = self._make(_subscribing(message, topic, qos))
             except rclpy_implementation.RCLError:
-                self.crowded = f"more than {PARTICIPANTS} types of messages on {end.topic[:NAME_CHARACTERS]}"
+                self.crowded = f"more than {PARTICIPANTS} types of messages on {topic[:NAME_CHARACTERS]}"
+                continue
+            if known is not None:
+                self._left += self._taken(topic, interface, known, DEPTH, AT_ONCE_BYTES)[0]
+                next(node for node in self._nodes if known in node.subscriptions).destroy_subscription(known)
         return unknown
 
     def reads(self, topic: str) -> bool:
         """Return whether this node subscribes to a topic."""
-        return any(name == topic for name, _, _ in self._readers)
+        return any(name == topic for name, _ in self._readers)
 
     def watching(self, topic: str, interface: str) -> list[bool]:
         """Return, for each subscription of this node to a topic and type, whether it is reliable."""
-        return [reliable for name, kind, reliable in self._readers if (name, kind) == (topic, interface)]
+        reader = self._readers.get((topic, interface))
+        return [] if reader is None else [_is_reliable(reader)]
 
     def publishes(self, topic: str) -> bool:
         """Return whether a stimulus is published on a topic now."""
@@ -246,9 +260,9 @@ class Observer:
                 found[f"client {service}"] = asked(node.count_clients, service, nothing=0)
         return {name: count for name, count in found.items() if count}
 
-    def publishers_matched(self, topic: str, interface: str, *, reliable: bool) -> int:
-        """Return how many publishers are matched with the subscription for a topic, type and reliability."""
-        reader = self._readers.get((topic, interface, reliable))
+    def publishers_matched(self, topic: str, interface: str) -> int:
+        """Return how many publishers are matched with the subscription for a topic and type."""
+        reader = self._readers.get((topic, interface))
         return 0 if reader is None else int(reader.get_publisher_count())
 
     def wake(self) -> None:
@@ -281,16 +295,24 @@ class Observer:
         Args:
             at_once: The most messages to take from one topic.
         """
-        taken: list[Taken] = []
+        taken, self._left = self._left, []
         left_bytes = AT_ONCE_BYTES
-        for (topic, interface, _), reader in sorted(self._readers.items()):
-            with reader.handle:
-                for _ in range(at_once):
-                    if left_bytes <= 0 or (found := reader.handle.take_message(reader.msg_type, True)) is None:  # noqa: FBT003
-                        break
-                    left_bytes -= len(found[0])
-                    taken.append(self._decoded(topic, interface, reader.msg_type, found[0]))
+        for (topic, interface), reader in sorted(self._readers.items()):
+            found, left_bytes = self._taken(topic, interface, reader, at_once, left_bytes)
+            taken += found
         return taken
+
+    def _taken(self, topic: str, interface: str, reader: Any, at_once: int, left_bytes: int) -> tuple[list[Taken], int]:
+        """Take the messages of one subscription, up to a number and a size; return how many bytes are left."""
+        taken: list[Taken] = []
+        with reader.handle:
+            while len(taken) < at_once and left_bytes > 0:
+                found = reader.handle.take_message(reader.msg_type, True)  # noqa: FBT003
+                if found is None:
+                    break
+                left_bytes -= len(found[0])
+                taken.append(self._decoded(topic, interface, reader.msg_type, found[0]))
+        return taken, left_bytes
 
     def take_rest(self) -> list[Taken]:
         """Take the messages that are still in transit from a process that died."""
@@ -391,6 +413,10 @@ def _make_node(domain: int) -> Node:
 
 def _subscribing(message: Any, topic: str, qos: QoSProfile) -> Callable[[Node], Any]:
     return lambda node: node.create_subscription(message, topic, _nothing, qos, raw=True)
+
+
+def _is_reliable(reader: Any) -> bool:
+    return bool(reader.qos_profile.reliability == ReliabilityPolicy.RELIABLE)
 
 
 def other_threads_run() -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import posixpath
 import random
 from collections.abc import Iterable, Iterator, Mapping
 from shlex import quote
@@ -141,7 +142,7 @@ class Plan:
         recordings: Recordings to play.
         clock: `virtual` or `wall`.
         limits: How much the processes may use, and how much is recorded.
-        charged: Whether time passes on the virtual clock while a program works.
+        charged: The share of a program's work for which time passes on the virtual clock; otherwise it stands still.
         stop_when_unfit: Whether a run on the virtual clock may end as soon as virtual time is known to be unsuitable.
         messages: Message streams.
         servers: Service servers.
@@ -196,7 +197,7 @@ class Plan:
     hash_seed: int = 0
     starts: tuple[PlannedStart, ...] = ()
     projects: tuple[Project, ...] = ()
-    charged: bool = False
+    charged: float = 0.0
 
     def start_of(self, process: str) -> PlannedStart:
         """Return what a process is started with."""
@@ -206,6 +207,21 @@ class Plan:
         """Return the console scripts of the package that a file is in; none if it is in none."""
         package = layout_of(self.root, file).package
         return next((project.scripts for project in self.projects if project.folder == package), ())
+
+    def is_installed(self, file: str, executable: str) -> bool:
+        """Return whether a file is started as its package installs it, as a script, and not by an entry point."""
+        package = layout_of(self.root, file).package
+        return any(
+            executable not in {script for script, _, _ in project.scripts}
+            and any(posixpath.join(project.folder, source) == file for _, source in project.programs)
+            for project in self.projects
+            if project.folder == package
+        )
+
+    @property
+    def imported(self) -> tuple[str, ...]:
+        """The folders of Python packages that CMake installs, relative to the submission."""
+        return tuple(posixpath.join(project.folder, path) for project in self.projects for path in project.imported)
 
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage

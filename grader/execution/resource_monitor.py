@@ -2,8 +2,8 @@
 
 The kernel's own limits apply to the address space and processor time of single processes. They miss the sum of several
 processes and the kernel's memory in sockets and pipes, and they count memory that is only mapped. The monitor adds up
-real usage. It notices a limit with a delay of
-one polling interval; the kernel's limits remain as a second line of defence.
+real usage. It notices a limit with a delay of a few polling intervals; the kernel's limits remain as a second line of
+defence.
 """
 
 from __future__ import annotations
@@ -35,6 +35,10 @@ from grader.execution.usage import (
 #: The polling interval, and the number of polls between two searches for new child processes.
 LOOK_S = 0.025
 SEARCH_EVERY = 10
+#: An interval may be so many times longer while nothing grows by more than GROWTH_BYTES: on the wall clock, this thread
+#: costs as much of a processor as the runner's. Memory fills at 1 GiB a second at most, so that a look comes 100 MiB
+#: late.
+LONGEST, GROWTH_BYTES = 4, MIB
 #: Allowance for the sandbox's own processes, which the kernel's limit does not count, with some margin so that the
 #: kernel's limit is hit first.
 WRAPPERS = 16
@@ -142,26 +146,30 @@ class ResourceMonitor:
         return 0 if their_own else min(self._waited_ns, self.real_ns)
 
     def _watch(self) -> None:
-        looks = 0
-        while not self._over.wait(LOOK_S):
-            if looks % SEARCH_EVERY == 0:
+        looks, intervals, search_at, used_bytes = 0, 1, 0, 0
+        while not self._over.wait(intervals * LOOK_S):
+            looks += intervals
+            search = looks >= search_at
+            if search:
+                search_at = looks + SEARCH_EVERY
                 self._look_for_children()
                 self._look_for_names()
                 self._look_for_waiting()
-            self._look_at_sockets(looks)
-            looks += 1
-            self._look()
+            much = self._look_at_sockets(looks, search=search)
+            before, used_bytes = used_bytes, self._look()
+            intervals = 1 if much or used_bytes > before + GROWTH_BYTES else min(2 * intervals, LONGEST)
 
-    def _look_at_sockets(self, looks: int) -> None:
-        """Find out what the processes hold in sockets and pipes, if it may be much."""
+    def _look_at_sockets(self, looks: int, *, search: bool) -> bool:
+        """Find out what the processes hold in sockets and pipes, if it may be much; return whether it may be."""
         many, connections = self._sockets.may_be_much()
         tcp = connections and looks % TCP_EVERY == 0
         pids = [pid for family in self._families.values() for pid in family]
-        if many or tcp or (looks % SEARCH_EVERY == 0 and descriptors(pids) > MANY_DESCRIPTORS):
+        if many or tcp or (search and descriptors(pids) > MANY_DESCRIPTORS):
             found = self._sockets.look(self._families.values(), tcp=connections)
             self._held = dict(zip(self._families, found, strict=True))
         elif not connections:
             self._held = {}
+        return many or connections or bool(self._held)
 
     def _look_for_children(self) -> None:
         """Find the families of processes; they are as before if nothing has been started since."""
@@ -171,7 +179,9 @@ class ResourceMonitor:
             self._families = {s.process.pid: set().union(*(found[root] for root in s.roots)) for s in self._students}
             self._last_pid = last
 
-    def _look(self) -> None:
+    def _look(self) -> int:
+        """Stop what has reached a limit, and return the memory of the processes and of this one in bytes."""
+        used_bytes = 0
         for student in self._students:
             held = self._held.get(student.process.pid, Held())
             used = usage(self._families.get(student.process.pid, ()))
@@ -181,11 +191,12 @@ class ResourceMonitor:
             student.most_bytes = max(student.most_bytes, used.memory_bytes)
             student.used_ns = max(student.used_ns, used.processor_ns)
             self._hold(student, self._reached(used))
-        self._look_at_itself()
+            used_bytes += used.memory_bytes
         self._look_at_time()
+        return used_bytes + self._look_at_itself()
 
-    def _look_at_itself(self) -> None:
-        """Stop all processes at a limit of the worker itself, which only the nodes' messages can cause."""
+    def _look_at_itself(self) -> int:
+        """Stop all processes at a limit of the worker itself, which only messages can cause; return its memory."""
         own_bytes = usage([os.getpid()]).memory_bytes
         if own_bytes > FULL_BYTES:
             os._exit(FULL_CODE)  # the middleware may go on filling it when the nodes have ended
@@ -194,6 +205,7 @@ class ResourceMonitor:
             self._hold_all(f"stopped at {size(UNREAD_BYTES)} of messages that were under way at once")
         if time.process_time_ns() - self._own_ns > self._own_s * NS_PER_S:
             self._hold_all(f"stopped at {processor_words(self._own_s)} to take what was sent")
+        return own_bytes
 
     def _look_at_time(self) -> None:
         if self._ending:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar
 
 from grader.core.trace import ClockKind, Mark, Observation, Trace
@@ -55,7 +56,8 @@ class Runner(ABC):
         self._starts_ns = dict(plan.starts_ns)
         self._simulations = Simulations(plan)
         self._due = in_order([*schedule(plan), *self._simulations.events()])
-        self._recorder = TraceRecorder(plan.limits)
+        participants = max(plan.limits.participants, len(plan.processes))  # each process needs one
+        self._recorder = TraceRecorder(replace(plan.limits, participants=participants))
         self._services = ServicePeers(
             plan,
             observer.services,

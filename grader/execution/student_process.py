@@ -215,10 +215,10 @@ class NodeProcess:
             self.workload = Workload(self.process.pid, t_ns)
         return self.workload
 
-    def claims_of(self, kind: str, name: str) -> bool:
-        """Return whether the process reports an endpoint of a kind and name; every node has some services."""
+    def claims_of(self, kind: str, name: str) -> list[dict[str, Any]]:
+        """Return the endpoints of a kind and name that the process reports; every node has some services."""
         node = name.rpartition("/")[0] if kind == "service" else ""
-        return any((c["kind"], c["name"]) in ((kind, name), ("node", node)) for c in self.claims)
+        return [c for c in self.claims if (c["kind"], c["name"]) in ((kind, name), ("node", node))]
 
     def note(self, report: Mapping[str, Any]) -> None:
         """Record a note: how the file is started, which comes first, or something that readers must know."""

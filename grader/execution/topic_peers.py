@@ -77,14 +77,15 @@ class TopicPeers(ABC):
     def _offer(self, stream: PlannedMessages) -> None:
         self._observer.advertise(stream.topic, stream.type, latched=stream.latched, best_effort=stream.best_effort)
 
-    def _advertise(self, topic: str, default: str) -> None:
-        """Create a publisher of the type and durability that the students' subscriptions ask for."""
+    def _advertise(self, topic: str, default: str) -> bool:
+        """Create a publisher as the students' subscriptions ask for it, with type and durability; return if latched."""
         asked = self._asked(topic)
         usable = [interface for interface, _ in asked if interface == default or numeric_field(interface) is not None]
         interface = usable[0] if usable and default != ODOMETRY else default
         latched = any(late for found, late in asked if found == interface)
         self._observer.advertise(topic, interface, latched=latched)
         self._streams[topic] = interface
+        return latched
 
     def _publish(self, delivery: Delivery, message: Any) -> None:
         self._recorder.add(delivery)
@@ -127,15 +128,13 @@ class VirtualTopicPeers(TopicPeers):
         self._discovery.fixed[stream.topic] = stream
         self._streams[stream.topic] = stream.type
         super()._offer(stream)
-        self._match(stream.topic)
+        self._discovery.advertised(stream.topic)
 
-    def _advertise(self, topic: str, default: str) -> None:
-        super()._advertise(topic, default)
-        self._match(topic)
-
-    def _match(self, topic: str) -> None:
-        self._discovery.patience.wait(lambda: self._discovery.is_heard(topic))
-        self._discovery.tell_all()
+    def _advertise(self, topic: str, default: str) -> bool:
+        latched = super()._advertise(topic, default)
+        (self._discovery.latched.add if latched else self._discovery.latched.discard)(topic)
+        self._discovery.advertised(topic)
+        return latched
 
     def _publish(self, delivery: Delivery, message: Any) -> None:
         super()._publish(delivery, message)

@@ -13,7 +13,7 @@ from typing import Any
 
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Observation, Offer
-from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, readers_of
+from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, passes, readers_of
 from grader.execution.ending import ending
 from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer, Taken, in_order
@@ -41,6 +41,10 @@ OUTSIDE = "the node waits for something that is neither ROS nor time"
 BUSY = "the node needs so much processor time that virtual time would hide it"
 #: The host's codes for a program that does not settle, with their reasons.
 UNSETTLED = {"threads": THREADS, "outside": OUTSIDE}
+
+
+#: The end of a service of a process that says nothing about its QoS, and each of the grader's.
+ORDINARY_END: Mapping[str, Any] = {}
 
 
 class VirtualRunner(Runner):
@@ -232,7 +236,7 @@ class VirtualRunner(Runner):
             self._has_lost = True
         if sent := counts(report.get("sent")):
             self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
-            self._collect_exchanges(sent)
+            self._collect_exchanges(student, sent)
             self._forward(student, sent)
         endpoints = report.get("endpoints")
         if isinstance(endpoints, list) and report["kind"] == "idle":
@@ -280,9 +284,10 @@ class VirtualRunner(Runner):
             for topic in sorted(t for t, n in expected.items() if n > 0):
                 self._recorder.note(f"some messages on {topic[:NAME_CHARACTERS]} did not arrive")
 
-    def _collect_exchanges(self, sent: Mapping[str, int]) -> None:
+    def _collect_exchanges(self, sender: NodeProcess, sent: Mapping[str, int]) -> None:
         """Wait until all requests and responses for the grader have been taken, and record them."""
-        expected = self._services.expected(sent)
+        reaching = {c: n for c, n in sent.items() if any(passes(end, ORDINARY_END) for end in _senders(sender, c))}
+        expected = self._services.expected(reaching)
         if not expected:
             return
 
@@ -314,13 +319,15 @@ class VirtualRunner(Runner):
                     if any(compatible(w, r) for w in writers for r in readers_of(student, name)):
                         announce(student, channel, count)
             elif kind in ("request", "response"):
-                self._announce_exchange(kind, name, count)
+                self._announce_exchange(kind, name, count, _senders(sender, channel))
 
-    def _announce_exchange(self, kind: str, service: str, count: int) -> None:
+    def _announce_exchange(
+        self, kind: str, service: str, count: int, senders: Sequence[Mapping[str, Any]] = (ORDINARY_END,)
+    ) -> None:
         """Announce requests to servers, or responses to clients: every client of a service receives all responses."""
         for student in self._students:
             ends = student.claims_of("service" if kind == "request" else "client", service)
-            if not student.ended and ends:
+            if not student.ended and any(passes(sender, end) for sender in senders for end in ends):
                 announce(student, f"{kind} {service}", count)
 
     def _hand_over(self) -> None:
@@ -372,6 +379,12 @@ class VirtualRunner(Runner):
                 self._do(RemoveServer(self._now_ns, server), self._now_ns)
 
 
+def _senders(process: NodeProcess, channel: str) -> Sequence[Mapping[str, Any]]:
+    """Return the ends of a service with which a process sends on a channel."""
+    kind, _, service = channel.partition(" ")
+    return process.claims_of("client" if kind == "request" else "service", service) or (ORDINARY_END,)
+
+
 def hopeless(students: Sequence[NodeProcess]) -> bool:
     """Return whether it is already certain that virtual time hides how late a node would be."""
     return any(student.workload is not None and student.workload.delay.hopeless for student in students)
@@ -385,11 +398,21 @@ def unfit(students: Sequence[NodeProcess], seen: Sequence[Observation], *, full:
         seen: The observations.
         full: Whether a limit has ended the recording.
     """
-    if any(isinstance(o, Fault) and o.kind is FaultKind.HUNG for o in seen):
-        return next((UNSETTLED[s.unsettled] for s in students if s.unsettled in UNSETTLED), "")
+    hung = {o.process: o for o in seen if isinstance(o, Fault) and o.kind is FaultKind.HUNG}
+    if hung:
+        unsettled = [s for s in students if s.unsettled in UNSETTLED]
+        return next((_with_place(UNSETTLED[s.unsettled], hung.get(s.name)) for s in unsettled), "")
     if full:
         return ""
     hiding = [s.workload for s in students if s.workload is not None and s.workload.delay.hides]
     if not hiding:
         return ""
     return OUTSIDE if any(workload.waited_ns > workload.used_ns for workload in hiding) else BUSY
+
+
+def _with_place(reason: str, fault: Fault | None) -> str:
+    """Return a reason with what a process did, and the line at which it did it."""
+    if fault is None:
+        return reason
+    place = f"{fault.file}:{fault.line}" if fault.file and fault.line else fault.process
+    return f"{reason}: {place} {fault.text}"

@@ -229,6 +229,8 @@ class Worker:
             "ros_arguments": start.ros_arguments,
             "parameter_files": start.parameter_files,
             "scripts": plan.scripts_of(file),
+            "installed": plan.is_installed(file, start.executable),
+            "imported": plan.imported,
             "seed": plan.host_seed,
             "clock": plan.clock,
             "charged": plan.charged,
@@ -286,7 +288,16 @@ class Worker:
         )
         process = with_copies(process, file, plan.limits)
         root = self._isolation.submission_of(process)
-        arguments = bare_arguments(Path(plan.root), root, file, plan.start_of(name), plan.scripts_of(file))
+        start = plan.start_of(name)
+        arguments = bare_arguments(
+            Path(plan.root),
+            root,
+            file,
+            start,
+            plan.scripts_of(file),
+            installed=plan.is_installed(file, start.executable),
+            imported=plan.imported,
+        )
         command = self._isolation.student_command(replace(process, arguments=arguments), plan.limits)
         student = BareProcess.begin(name, root, command, plan.limits)
         student.own_folder = _own_folder(command.environment)

@@ -1,4 +1,4 @@
-"""Tells a ROS package that this installation lacks from a module that a submission should bring."""
+"""Tells what this installation lacks, a ROS package or a newer Python, from what a submission should bring."""
 
 from __future__ import annotations
 
@@ -6,16 +6,18 @@ import ast
 from collections.abc import Mapping, Sequence
 
 from grader.core.dataclass import dataclass
-from grader.core.trace import Fault, FaultKind, Trace
+from grader.core.exercise import Location
+from grader.core.scenario import is_launch_file
+from grader.core.trace import Fault, FaultKind, NewerPython, Trace
 from grader.judging.findings import faults_before_stop
 from grader.judging.source import read, words
 
 #: Python packages that come with a desktop installation of ROS 2 and not with the wheels of rclpy.
 ROS_PACKAGES = frozenset(
     words(
-        "action_tutorials_interfaces angles catkin_pkg composition_interfaces cv_bridge domain_coordinator "
+        "action_tutorials_interfaces angles catkin_pkg composition_interfaces cv2 cv_bridge domain_coordinator "
         "image_geometry interactive_markers joint_state_publisher laser_geometry launch launch_ros "
-        "launch_testing launch_testing_ros launch_xml launch_yaml logging_demo map_msgs message_filters "
+        "launch_testing launch_testing_ros launch_xml launch_yaml logging_demo map_msgs matplotlib message_filters "
         "osrf_pycommon pcl_msgs pendulum_msgs PyKDL python_qt_binding qt_gui resource_retriever robot_state_publisher "
         "ros2action ros2bag ros2cli ros2component ros2doctor ros2interface ros2launch ros2lifecycle ros2node ros2param "
         "ros2pkg ros2run ros2service ros2topic rosbag2_interfaces rosbag2_py rosidl_runtime_py rqt_gui rqt_gui_py "
@@ -34,6 +36,8 @@ ROS_PACKAGES = frozenset(
 )
 
 
+#: Those that no ROS package holds, but that such an installation needs, with the extra of the grader that brings them.
+EXTRAS = {"cv2": "opencv", "matplotlib": "plots"}
 #: Endings of the names of packages that hold nothing but interfaces.
 INTERFACES = ("_msgs", "_interfaces")
 
@@ -56,6 +60,22 @@ def lacking_package(trace: Trace, processes: Sequence[str], sources: Mapping[str
         if fault.file.rpartition("/")[2] != fault.process or _imports(sources.get(fault.process, ""), found[1]):
             return LackingPackage(found[1], fault)
     return None
+
+
+def lacking_python(trace: Trace, processes: Sequence[str], place: Location | None) -> NewerPython | None:
+    """Return what programs of a scenario use of the Python of the ROS release, which is newer than the one here.
+
+    Args:
+        trace: The recording.
+        processes: The programs.
+        place: Where points are lost. A file that no Python can read is the student's to correct.
+    """
+    known = {(one.process, one.file) for one in trace.newer}
+    wrong = {f.file for f in trace.faults() if f.kind is FaultKind.SYNTAX_ERROR and (f.process, f.file) not in known}
+    if place is not None and place.file in wrong:
+        return None
+    launched = any(map(is_launch_file, processes))  # a launch file's nodes have names of their own
+    return next((one for one in trace.newer if launched or one.process in processes), None)
 
 
 def _imports(text: str, package: str) -> bool:

@@ -15,7 +15,7 @@ from grader.core.trace import Fault, FaultKind, Request, Response, Trace
 from grader.judging.authored import breach, is_authored, mistake_in, mistake_of
 from grader.judging.checks import CHECKS
 from grader.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
-from grader.judging.installation import INTERFACES, lacking_package
+from grader.judging.installation import EXTRAS, INTERFACES, lacking_package, lacking_python
 from grader.judging.values import student_endpoints
 from grader.judging.wording import quote, span
 
@@ -86,6 +86,7 @@ def run_check(
             return Answer(
                 problem=f"the machine was too busy: the nodes waited {waited} for a processor, which can be why"
             )
+    answer = _for_older_python(answer, scenario, trace)
     if not reads_sources(criterion.check):
         return _for_what_is_lacking(answer, scenario, trace, sources or {})
     return answer if answer.finding is None else replace(answer, finding=_placed(answer.finding, submission))
@@ -109,6 +110,18 @@ def for_beginning(criterion: Criterion) -> Criterion | None:
     return None if check is None else replace(criterion, check=check, check_name=check_name(criterion))
 
 
+def _for_older_python(answer: Answer, scenario: Scenario, trace: Trace) -> Answer:
+    """Return the answer; no answer if points are lost for what the Python of the ROS release has and this one lacks."""
+    if answer.finding is None or answer.finding.credit == 1:
+        return answer
+    lack = lacking_python(trace, scenario.processes, answer.finding.location)
+    if lack is None:
+        return answer
+    fault = next((f for f in trace.faults(lack.process) if (f.file, f.line) == (lack.file, lack.line)), None)
+    hint = f"grade again on Python {_version(lack.python)}, or write it as Python {_version(lack.here)} knows it"
+    return Answer(problem=lack.sentence, hint=hint, fault=fault)
+
+
 def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
     """Return the answer; no answer if points are lost where this installation lacks a package of ROS.
 
@@ -123,9 +136,16 @@ def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sourc
         return answer
     text = f"{fault_place(lack.fault)}: {lack.name} is a package of ROS 2 that is not installed where this was graded"
     hint = f"grade again where {lack.name} is installed, or leave the import out if the program does not need it"
+    if lack.name in EXTRAS:
+        text = f"{fault_place(lack.fault)}: {lack.name} comes with ROS 2 and is not installed where this was graded"
+        hint = f"grade again after pip install 'rclpy-grader[{EXTRAS[lack.name]}]', which brings {lack.name}"
     if lack.name.endswith(INTERFACES):
         hint = f"grade again with --interfaces and the folder of {lack.name}, which has its definitions"
     return Answer(problem=f"{text}, which is not the program's fault", hint=hint, fault=lack.fault)
+
+
+def _version(version: tuple[int, int]) -> str:
+    return ".".join(map(str, version))
 
 
 def _without_waiting(trace: Trace) -> Iterator[Trace]:

@@ -6,12 +6,16 @@ import itertools
 import math
 import statistics
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 from typing import TypeVar
 
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.report import Pace, Summary, TopicSummary
-from grader.core.trace import Message, Offer, Trace
-from grader.judging.judge_run import started
+from grader.core.trace import Fault, Message, Offer, Trace
+from grader.judging.diagnosis import hint_for, placed_in
+from grader.judging.installation import INTERFACES, lacking_package
+from grader.judging.judge_run import same_names, started
 from grader.judging.values import as_number
 
 #: The different values of a text field that a summary names, and the elements of an array that it looks at: enough for
@@ -19,9 +23,19 @@ from grader.judging.values import as_number
 MOST_TEXTS, MOST_ELEMENTS = 100, 2_000
 
 
-def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary:
-    """Return a summary of what the nodes of a trace did."""
+def summarise(
+    trace: Trace, processes: Sequence[str], isolation: str, sources: Mapping[str, str] = MappingProxyType({})
+) -> Summary:
+    """Return a summary of what the nodes of a trace did.
+
+    Args:
+        trace: The recording.
+        processes: The names of the programs.
+        isolation: The sandbox tier.
+        sources: The text of files by path, for hints: those that the programs are, and those that faults name.
+    """
     graphs = trace.graphs()
+    notes = (*started(trace), *same_names(trace), *trace.notes, *(one.sentence for one in trace.newer))
     names = {e.topic for g in graphs for e in g.endpoints}
     return Summary(
         processes=tuple(processes),
@@ -34,12 +48,27 @@ def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary
         records=trace.records(),
         lines=trace.lines(),
         faults=trace.faults(),
-        notes=(*started(trace), *trace.notes),
+        notes=placed_in(notes, sources),
         starts=trace.starts,
+        hints=tuple(_hint(fault, trace, sources) for fault in trace.faults()),
         # of those of equal size the last, whose parts have all been matched
         graph=max(reversed(graphs), key=lambda g: len(g.endpoints) + len(g.services) + len(g.nodes), default=None),
         isolation=isolation,
     )
+
+
+def _hint(fault: Fault, trace: Trace, sources: Mapping[str, str]) -> str:
+    """Return what to do about a fault. A program that ends with code 0 is done: nothing has to be done about it."""
+    if fault.exit_code == 0:
+        return ""
+    started_as = next((start.file for start in trace.starts if start.process == fault.process), fault.process)
+    text = sources.get(fault.file or started_as, "")
+    lack = lacking_package(replace(trace, observations=(fault,)), [fault.process], {fault.process: text})
+    if lack is None:
+        return hint_for(fault, trace, text)
+    if lack.name.endswith(INTERFACES):
+        return f"{lack.name} is not installed here: give the folder with its definitions as --interfaces"
+    return f"{lack.name} is a package of ROS 2 that is not installed here: the program may be right where it is"
 
 
 def _topic(trace: Trace, name: str) -> TopicSummary:

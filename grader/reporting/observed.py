@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 
 from grader.core.quantities import counted, seconds
 from grader.core.report import JsonObject, Pace, Summary, TopicSummary
@@ -32,7 +33,7 @@ def render_summary(summary: Summary) -> str:
 def _lines(summary: Summary) -> Iterator[str]:
     yield f"{', '.join(map(shown, summary.processes))}: {summary.duration_s:.1f} s on the {summary.clock.value} clock"
     if summary.clock_reason:
-        yield f"  note: {shown(summary.clock_reason)}"
+        yield f"  note: recorded on the {summary.clock.value} clock: {shown(summary.clock_reason)}"
     yield from (f"  note: {shown(note)}" for note in summary.notes)
     yield from _section("Nodes", map(shown, summary.nodes))
     yield from _section("Topics", (line for topic in summary.topics for line in _topic(topic)))
@@ -41,13 +42,12 @@ def _lines(summary: Summary) -> Iterator[str]:
     if summary.graph is not None and len(summary.graph.nodes) > 1:
         yield from _section("Graph", draw_graph(summary.graph, width=WIDTH))
     yield from _section("Log records", _cut(_record(r) for r in summary.records))
-    yield from _section(
-        "Other output", _cut(f"t = {seconds(o.t_ns):.3f} s {o.stream}: {shown(o.text)}" for o in summary.lines)
-    )
+    yield from _section("Other output", _cut(map(_line, without_libraries(summary.lines))))
     # A program that ends on its own, in peace, has no fault unless a rubric says so.
-    ended = [fault for fault in summary.faults if fault.exit_code == 0]
-    yield from _section("Ended", [line for fault in ended for line in _fault(fault)])
-    yield from _section("Faults", [line for fault in summary.faults if fault not in ended for line in _fault(fault)])
+    faults = list(_with_hints(summary))
+    yield from _section("Ended", [line for fault, _ in faults if fault.exit_code == 0 for line in _fault(fault)])
+    failed = [(fault, hint) for fault, hint in faults if fault.exit_code != 0]
+    yield from _section("Faults", [line for fault, hint in failed for line in _fault(fault, hint)])
     yield f"isolation {shown(summary.isolation)}"
 
 
@@ -127,10 +127,42 @@ def _record(record: LogRecord) -> str:
     return f"t = {seconds(record.t_ns):.3f} s [{shown(record.severity)}] [{shown(record.logger)}]: {shown(record.text)}"
 
 
-def _fault(fault: Fault) -> Iterator[str]:
+def _line(line: OutputLine) -> str:
+    return f"t = {seconds(line.t_ns):.3f} s {line.stream}: {shown(line.text)}"
+
+
+#: A frame in a traceback, as Python prints it. The files of a submission have relative paths.
+_FRAME = re.compile(r'  File "(?P<file>[^"]+)", line \d+')
+
+
+def without_libraries(lines: Sequence[OutputLine]) -> Iterator[OutputLine]:
+    """Yield output; in tracebacks, one line stands for each row of calls in Python and ROS."""
+    calls, skipping = 0, False
+    for line in lines:
+        frame = _FRAME.match(line.text) if line.stream == "stderr" else None
+        if frame is not None and frame["file"].startswith(("/", "<frozen")):
+            calls, skipping = calls + 1, True
+            continue
+        if skipping and frame is None and line.stream == "stderr" and line.text.startswith("    "):
+            continue  # the source of the call, and marks below it
+        if calls:
+            yield replace(line, text=f"  ({counted(calls, 'call')} in Python and ROS)")
+        calls, skipping = 0, False
+        yield line
+
+
+def _with_hints(summary: Summary) -> Iterator[tuple[Fault, str]]:
+    """Yield each fault with its hint, which may be empty."""
+    hints = (*summary.hints, *("" for _ in summary.faults[len(summary.hints) :]))
+    yield from zip(summary.faults, hints, strict=True)
+
+
+def _fault(fault: Fault, hint: str = "") -> Iterator[str]:
     place = f" ({shown(fault.file)}:{fault.line})" if fault.file else ""
     yield f"t = {seconds(fault.t_ns):.3f} s {shown(fault.process)}: {shown(fault.text)}{place}"
     yield from (f"  {shown(frame)}" for frame in fault.frames)
+    if hint:
+        yield f"  hint: {shown(hint)}"
 
 
 def summary_to_json(summary: Summary) -> str:
@@ -148,7 +180,10 @@ def summary_to_json(summary: Summary) -> str:
         "offers": [_fields(offer) for offer in summary.offers],
         "records": [_timed(record) for record in summary.records],
         "lines": [_timed(line) for line in summary.lines],
-        "faults": [_timed(fault, "exit_code", "signal", "python") for fault in summary.faults],
+        "faults": [
+            {**_timed(fault, "exit_code", "signal", "python"), "hint": hint or None}
+            for fault, hint in _with_hints(summary)
+        ],
         "notes": summary.notes,
     }
     return json.dumps(json_value(data), indent=2, allow_nan=False) + "\n"

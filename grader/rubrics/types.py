@@ -181,7 +181,7 @@ PythonFile = Annotated[
 ProgramName = Annotated[
     str,
     MatchingText(
-        r"[^/\\\x00-\x1f]+\.py|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-]+",
+        r"[^/\\\x00-\x1f]+\.py|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-][A-Za-z0-9_.-]*",
         "a file name such as fan_controller.py, without folders, or an executable such as my_package/talker",
         "fan_controller.py",
     ),
@@ -190,7 +190,7 @@ ProgramName = Annotated[
 HandedIn = Annotated[
     str,
     MatchingText(
-        r"[^/\\\x00-\x1f]+\.(?:py|ya?ml)|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-]+",
+        r"[^/\\\x00-\x1f]+\.(?:py|ya?ml)|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-][A-Za-z0-9_.-]*",
         "a file name such as fan_controller.py, without folders, or an executable such as my_package/talker",
         "fan_controller.py",
     ),

@@ -33,18 +33,24 @@ from .shadows import Shadows
 Notify = Callable[[dict[str, Any]], None]
 
 
-def path_of(root: str, file: str) -> list[str]:
+def path_of(request: Mapping[str, Any]) -> list[str]:
     """Return the first folders of sys.path: the folder of the script, or the folders that contain packages."""
-    layout = layout_of(root, file)
-    if not layout.module:
-        built = package_folders(root) if layout.package is not None else []
-        return list(dict.fromkeys((os.path.dirname(os.path.join(root, file)), *built)))
-    return list(dict.fromkeys(f for f in (layout.base, *package_folders(root)) if f))
+    root, file = request["root"], request["file"]
+    layout = _layout_of(request)
+    first = layout.base if layout.module else os.path.dirname(os.path.join(root, file))
+    if not layout.module and layout.package is None:
+        return [first]
+    imported = (os.path.join(root, folder) for folder in request.get("imported", ()))
+    return list(dict.fromkeys(f for f in (first, *package_folders(root), *imported) if f))
 
 
-def shadows_of(root: str, file: str) -> Shadows:
-    """Find the modules of a submission that hide other modules from one of its files."""
-    return Shadows(path_of(root, file))
+def _layout_of(request: Mapping[str, Any]) -> PackageLayout:
+    return layout_of(request["root"], request["file"], installed=request.get("installed", False))
+
+
+def shadows_of(request: Mapping[str, Any]) -> Shadows:
+    """Find the modules of a submission that hide other modules from the file that a request names."""
+    return Shadows(path_of(request))
 
 
 def command_line(request: Mapping[str, Any]) -> list[str]:
@@ -62,22 +68,23 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     """Run one file of a submission to its end; raises whatever the file raises.
 
     Args:
-        request: The submission's folder as `root`; the file, relative to it; the console scripts of its package; and
-            what it is started with.
+        request: The submission's folder as `root`; the file, relative to it; the console scripts of its package;
+            whether it is `installed` as it is; the folders of installed Python packages as `imported`; and what it is
+            started with.
         notify: Called with the way the file is started, before any of its code runs, and with notes for the report.
         install_ros: Called when the program imports rclpy, if a module of the submission hides another one.
     """
     root, file = request["root"], request["file"]
     path = os.path.join(root, file)
     tree = parse(path)  # raises a syntax error before any code has run
-    layout = layout_of(root, file)
+    layout = _layout_of(request)
     start = start_of(root, file, layout, tree, request.get("executable", ""), request.get("scripts", ()))
-    shadows = shadows_of(root, file)
+    shadows = shadows_of(request)
     how = {"way": start.way, "module": start.module, "function": start.function}
     notify({"code": "started", **how, "hidden": shadows.files})
     if shadows.files:
         shadows.fall(install_ros)
-    sys.path[:0] = [f for f in dict.fromkeys((start.base, *path_of(root, file))) if f]
+    sys.path[:0] = [f for f in dict.fromkeys((start.base, *path_of(request))) if f]
     if layout.module:
         _find_neighbours(tree, path, notify)
     sys.argv = [path, *command_line(request)]

@@ -13,7 +13,7 @@ import math
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib.machinery import ModuleSpec
 from types import FrameType, ModuleType
 from typing import Any
@@ -77,6 +77,8 @@ class Context:
 
     def share_of(self, package: str) -> str:
         """Return the folder of a package of the submission, which holds what its setup.py installs to share."""
+        if not isinstance(package, str):
+            raise TypeError(f"expected the name of a package, found {type(package).__name__}")
         if package in self.packages:
             return self.packages[package]
         if meant_by(package, self.packages):
@@ -118,6 +120,8 @@ class Action:
     """One entry of a launch description, and where it was written."""
 
     def __init__(self, *, condition: Any = None, **_: Any) -> None:
+        if condition is not None and not callable(getattr(condition, "evaluate", None)):
+            raise TypeError(f"condition: expected a condition such as IfCondition, found {type(condition).__name__}")
         self.condition = condition
         self.file, self.line = _written_at()
 
@@ -149,8 +153,28 @@ def _listed(parts: Any) -> list[Any]:
     return list(parts) if isinstance(parts, (list, tuple)) else [parts]
 
 
+def _pairs(given: Any, what: str) -> list[tuple[Any, Any]]:
+    """Return the pairs of names and values that an argument holds; raises what a launch file did wrong."""
+    if isinstance(given, (Absent, Unknown)):
+        return [(given, given)]
+    if not isinstance(given, Iterable):
+        raise TypeError(f"{what}: expected pairs of a name and a value, found {type(given).__name__}")
+    rows = list(given)
+    for row in rows:
+        if isinstance(row, str) or not isinstance(row, (tuple, list)) or len(row) != 2:
+            raise TypeError(f"{what}: expected pairs of a name and a value, found {row!r}")
+    return [(row[0], row[1]) for row in rows]
+
+
+def _several(given: Any) -> list[Any]:
+    """Return the items of an argument; what is left out stands for its items."""
+    return [given] if isinstance(given, (Absent, Unknown)) else list(given or ())
+
+
 def text_of(value: Any, context: Context) -> str:
     """Return a text, a substitution, or a sequence of these as one text."""
+    if not isinstance(context, Context):
+        raise TypeError(f"expected a launch context, found {type(context).__name__}")
     if isinstance(value, str):
         return value
     if isinstance(value, Substitution):
@@ -159,6 +183,8 @@ def text_of(value: Any, context: Context) -> str:
         return str(os.fspath(value))
     if isinstance(value, (list, tuple)):
         return "".join(text_of(part, context) for part in value)
+    if isinstance(value, Unknown):
+        raise LeftOutError("action", type(value).__name__)
     raise TypeError(f"expected a text or a substitution, found {type(value).__name__}: {value!r}")
 
 
@@ -240,7 +266,9 @@ def _made(name: str, make: Callable[..., str]) -> type[Substitution]:
     return type(name, (_Made,), {"make": staticmethod(make), "__doc__": f"The substitution {name} of launch."})
 
 
-def _joined(context: Context, parts: Iterable[Any]) -> str:
+def _joined(context: Context, parts: Any) -> str:
+    if not isinstance(parts, Iterable):
+        raise TypeError(f"expected a list of the parts of a path, found {type(parts).__name__}")
     return os.path.join(*[text_of(part, context) for part in parts])
 
 
@@ -313,7 +341,8 @@ class FindPackageShare(Substitution):
 
     def perform(self, context: Context) -> str:
         """Return the folder."""
-        return context.share_of(text_of(self.package, context))
+        package = text_of(self.package, context)
+        return context.share_of(package)
 
     def find(self, package: str) -> str:
         """Return the folder of a package at once."""
@@ -333,8 +362,8 @@ ROS_SUBSTITUTIONS: dict[str, Any] = {
 class Condition:
     """A condition of an action."""
 
-    def __init__(self, *parts: Any) -> None:
-        self.parts = parts
+    def __init__(self, first: Any, *parts: Any) -> None:
+        self.parts = (first, *parts)
 
     def evaluate(self, context: Context) -> bool:
         """Return whether the action is done."""
@@ -355,6 +384,9 @@ class UnlessCondition(Condition):
 
 class LaunchConfigurationEquals(Condition):
     """The action is done if a launch argument has a value."""
+
+    def __init__(self, name: Any, expected: Any) -> None:
+        super().__init__(name, expected)
 
     def evaluate(self, context: Context) -> bool:
         """Return whether the action is done."""
@@ -391,9 +423,12 @@ class DeclareLaunchArgument(Action):
         self, name: str, *, default_value: Any = None, description: str = "", choices: Any = None, **more: Any
     ) -> None:
         super().__init__(**more)
-        self.name, self.default, self.choices = name, default_value, choices
+        self.name, self.default = name, default_value
         if default_value is not None and not isinstance(default_value, (str, Substitution, list, tuple, os.PathLike)):
             raise TypeError(f"default_value: expected a text or a substitution, found {type(default_value).__name__}")
+        if not isinstance(name, str):
+            raise TypeError(f"name: expected a text, found {type(name).__name__}")
+        self.choices = list(choices or ())
 
     def visit(self, context: Context) -> Iterable[Any]:
         """Set the default, unless the argument is given."""
@@ -403,7 +438,7 @@ class DeclareLaunchArgument(Action):
             context.launch_configurations[self.name] = text_of(self.default, context)
         value = context.launch_configurations[self.name]
         if self.choices and value not in self.choices:
-            raise RuntimeError(f"Argument '{self.name}' provided value '{value}' is not valid: {list(self.choices)}")
+            raise RuntimeError(f"Argument '{self.name}' provided value '{value}' is not valid: {self.choices}")
         return ()
 
 
@@ -471,7 +506,15 @@ class OpaqueFunction(Action):
 
     def visit(self, context: Context) -> Iterable[Any]:
         """Call it."""
-        return self.function(context, *self.args, **self.kwargs) or ()
+        made = self.function(context, *self.args, **self.kwargs)
+        if made is not None and not isinstance(made, Iterable):
+            raise TypeError(f"expected a list of actions from {_called(self.function)}, found {type(made).__name__}")
+        return made or ()
+
+
+def _called(function: Any) -> str:
+    name = getattr(function, "__name__", "")
+    return f"{name}()" if name.isidentifier() else "the function"
 
 
 class PythonLaunchDescriptionSource:
@@ -490,7 +533,7 @@ class IncludeLaunchDescription(Action):
 
     def visit(self, context: Context) -> Iterable[Any]:
         """Set the arguments and visit what the file describes."""
-        for name, value in list(self.given):
+        for name, value in _pairs(self.given, "launch_arguments"):
             context.launch_configurations[text_of(name, context)] = text_of(value, context)
         if isinstance(self.source, LaunchDescription):
             return self.source.entities
@@ -556,8 +599,10 @@ class Node(Action):
         if unknown:
             raise TypeError(f"{type(self).__name__}() got an unexpected keyword argument '{unknown[0]}'")
         self.package, self.executable, self.name, self.namespace = package, executable, name, namespace
-        self.parameters, self.remappings = list(parameters or ()), list(remappings or ())
-        self.arguments, self.ros_arguments, self.more = list(arguments or ()), list(ros_arguments or ()), more
+        if isinstance(parameters, str) or not isinstance(parameters, (Sequence, type(None), Absent, Unknown)):
+            raise TypeError(f"Expecting list of parameters, got {parameters}")
+        self.parameters, self.remappings = _several(parameters), _pairs(remappings or (), "remappings")
+        self.arguments, self.ros_arguments, self.more = _several(arguments), _several(ros_arguments), more
 
     def visit(self, context: Context) -> Iterable[Any]:
         """Describe the node."""
@@ -732,7 +777,7 @@ class ExecuteProcess(Action):
         words = [text_of(part, context) for part in self.command]
         words = words[0].split() + words[1:] if words else []
         if words[:2] != ["ros2", "run"] or len(words) < 4:
-            raise LeftOutError("command", text=" ".join(words))
+            raise LeftOutError("command", " ".join(words[:3]), " ".join(words))
         split = words.index("--ros-args") if "--ros-args" in words else len(words)
         node = Node(package=words[2], executable=words[3], arguments=words[4:split], ros_arguments=words[split + 1 :])
         node.file, node.line = self.file, self.line

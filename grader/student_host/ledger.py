@@ -10,15 +10,24 @@ import functools
 import math
 import weakref
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from rclpy.context import Context
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-from rclpy.qos import DurabilityPolicy, LivelinessPolicy, ReliabilityPolicy
+from rclpy.node import Node
+from rclpy.qos import (
+    DeadlineBestAvailable,
+    DurabilityPolicy,
+    LivelinessLeaseDurationeBestAvailable,
+    LivelinessPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
 
 from . import originals
 from .actions import HAS_SERVER, ActionEnd, Receiver, type_name
+from .events import Events
 
 #: Topics that every node has; they are not counted.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -36,11 +45,15 @@ DEPARTURE_S = 0.5
 SHUTDOWN_S = 1.0
 #: Checks whether a context is valid, without counting as a look, which would let time pass.
 _CONTEXT_OK = Context.ok
+#: Look up the endpoints of a topic; like this, it is not a look of the program.
+_LOOKS = {"publisher": Node.get_publishers_info_by_topic, "subscription": Node.get_subscriptions_info_by_topic}
 
 
+#: The kinds of endpoints of topics.
+ENDS_OF_TOPICS = ("publisher", "subscription")
 TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
 #: The QoS of a lifecycle state machine's publisher, which is not an rclpy publisher.
-_ORDINARY = {"reliable": True, "latched": False, "deadline_ns": 0, "manual": False}
+_ORDINARY = {"reliable": True, "latched": False, "deadline_ns": 0, "manual": False, "lease_ns": 0}
 
 
 class Ledger:
@@ -77,12 +90,21 @@ class Ledger:
         self.contexts: list[weakref.ref[Any]] = []
         self._nodes: list[weakref.ref[Any]] = []
         self._actions: list[ActionEnd] = []
+        #: A number for each publisher and subscription, from 1, by which the grader tells those of one topic apart.
+        self.numbers: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
+        self._last_number = 0
+        #: The QoS of endpoints that took what was best when they were created.
+        self._resolved: weakref.WeakKeyDictionary[Any, QoSProfile] = weakref.WeakKeyDictionary()
+        self.events = Events()
         #: The topics on which the state machines of lifecycle nodes publish transitions.
         self.transitions: weakref.WeakKeyDictionary[Any, str] = weakref.WeakKeyDictionary()
 
     def add(self, kind: str, endpoint: Any) -> None:
         """Register a new endpoint."""
         self._endpoints[kind].append(weakref.ref(endpoint, self._collected))
+        if kind in ENDS_OF_TOPICS:
+            self._last_number += 1
+            self.numbers[endpoint] = self._last_number
         if kind == "subscription":
             if endpoint.topic_name in self._heard_on:
                 self._successors.add(endpoint)
@@ -98,6 +120,14 @@ class Ledger:
             self._left_out.remove(receiver)
             receiver._executor_event = False
             self.included += 1
+
+    def resolve(self, node: Any, kind: str, endpoint: Any) -> None:
+        """Look up the QoS of a new publisher or subscription of a node that asked for what is best."""
+        known = _LOOKS[kind](node, endpoint.topic_name)
+        mine = [one for one in known if (one.node_name, one.node_namespace) == (node.get_name(), node.get_namespace())]
+        if mine:  # the middleware numbers the endpoints of a process
+            newest = max(mine, key=lambda one: one.endpoint_gid[12:15])
+            self._resolved[endpoint] = newest.qos_profile
 
     def forget(self, endpoint: Any) -> None:
         """Discard the expected messages of an endpoint that is being destroyed."""
@@ -167,25 +197,31 @@ class Ledger:
         claims: list[dict[str, Any]] = []
         existing = self.nodes()
         seen = [node for node in existing if is_in(domain, node)]
-        self._elsewhere = {id(end.handle) for node in existing if node not in seen for end in _ends(node)}
-        for kind in ("publisher", "subscription"):
+        elsewhere = [end.handle for node in existing if node not in seen for end in _ends(node)]
+        self._elsewhere = set(map(id, elsewhere))
+        for handle in elsewhere:
+            self.events.leave_alone(handle)
+        for kind in ENDS_OF_TOPICS:
             for endpoint in self.alive(kind):
                 if endpoint.topic_name in BACKGROUND or self.is_elsewhere(endpoint.handle):
                     continue
-                qos = endpoint.qos_profile
                 claims.append(
                     {
                         "kind": kind,
                         "name": endpoint.topic_name,
                         "type": type_name(endpoint.msg_type),
-                        "reliable": _reliable(qos, kind),
-                        "latched": qos.durability == DurabilityPolicy.TRANSIENT_LOCAL,
-                        "deadline_ns": finite_ns(qos.deadline),
-                        "manual": qos.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC,
+                        "number": self.numbers[endpoint],
+                        **_qos(self._resolved.get(endpoint, endpoint.qos_profile), kind),
                     }
                 )
         claims += [
-            {"kind": kind, "name": service_name(endpoint), "type": type_name(endpoint.srv_type)}
+            {
+                "kind": kind,
+                "name": service_name(endpoint),
+                "type": type_name(endpoint.srv_type),
+                "sends": _qos(endpoint.qos_profile, "publisher"),
+                "takes": _qos(endpoint.qos_profile, "subscription"),
+            }
             for kind in ("client", "service")
             for endpoint in self.alive(kind)
             if (kind == "client" or not _is_background(endpoint)) and not self.is_elsewhere(endpoint.handle)
@@ -296,7 +332,8 @@ class Ledger:
         """Wait, in real time, until endpoints have the expected counterparts; return the names of those that do not.
 
         Args:
-            expected: Kind of endpoint -> name -> numbers of counterparts, one for each endpoint that has any.
+            expected: Kind of endpoint -> name -> numbers of counterparts, one for each endpoint that has any. Under
+                `refused`, for the number of an endpoint, how many counterparts its QoS has not fitted so far.
             wait_s: Time-out in seconds.
         """
         matched = originals.wait_until(lambda: not self._unmatched(expected), wait_s)
@@ -306,10 +343,41 @@ class Ledger:
             self._strangers.update(self._surplus(expected))
         return missing
 
+    def await_events(self, refused: dict[str, list[int]], wait_s: float) -> list[str]:
+        """Wait, in real time, until the middleware has told of all counterparts, and let the program know.
+
+        Args:
+            refused: What `await_matches` was given under this name.
+            wait_s: Time-out in seconds.
+
+        Returns:
+            The names of the endpoints of which it has not told everything.
+        """
+        most = {int(number): counts[0] for number, counts in refused.items()}
+        told = originals.wait_until(lambda: not self._untold(most), wait_s)
+        untold = [] if told else self._untold(most)
+        self.events.tell()
+        return untold
+
+    def _untold(self, refused: dict[int, int]) -> list[str]:
+        """Take the events of all endpoints; return the names of those that the middleware still has to tell of some.
+
+        Args:
+            refused: Number of an endpoint -> how many counterparts have been kept apart from it by their QoS.
+        """
+        return [
+            f"{kind} {endpoint.topic_name}"
+            for kind in ENDS_OF_TOPICS
+            for endpoint in self.alive(kind)
+            if not self.events.has_all(
+                endpoint.handle, matches=_matches(kind, endpoint), refused=refused.get(self.numbers[endpoint], 0)
+            )
+        ]
+
     def _surplus(self, expected: dict[str, dict[str, list[int]]]) -> dict[tuple[str, str], int]:
         """Count the counterparts, by kind and topic, that neither the grader expects nor an earlier wait has found."""
         over: Counter[tuple[str, str]] = Counter()
-        for kind in ("publisher", "subscription"):
+        for kind in ENDS_OF_TOPICS:
             for endpoint in self.alive(kind):
                 if endpoint.topic_name not in BACKGROUND:
                     over[kind, endpoint.topic_name] += _matches(kind, endpoint) or 0
@@ -329,7 +397,7 @@ class Ledger:
         for kind, names in expected.items():
             found: dict[str, list[float]] = {}
             for endpoint in self.alive(kind) if kind in self._endpoints else ():
-                name = endpoint.topic_name if kind in ("publisher", "subscription") else service_name(endpoint)
+                name = endpoint.topic_name if kind in ENDS_OF_TOPICS else service_name(endpoint)
                 if name in names:
                     has = self._clients_of(name) if kind == "service" else _matches(kind, endpoint)
                     found.setdefault(name, []).append(math.inf if has is None else has)
@@ -429,10 +497,37 @@ def _channel(receiver: Any) -> str:
     return str(receiver.topic_name) if hasattr(receiver, "topic_name") else service_name(receiver)
 
 
-def _reliable(qos: Any, kind: str) -> bool:
+def asks_for_best(values: Iterable[Any]) -> bool:
+    """Return whether one of some arguments is a QoS profile that depends on the endpoints that exist already."""
+    profiles = [value for value in values if isinstance(value, QoSProfile)]
+    return any(
+        profile.reliability == ReliabilityPolicy.BEST_AVAILABLE
+        or profile.durability == DurabilityPolicy.BEST_AVAILABLE
+        or profile.liveliness == LivelinessPolicy.BEST_AVAILABLE
+        or profile.deadline == DeadlineBestAvailable
+        or profile.liveliness_lease_duration == LivelinessLeaseDurationeBestAvailable
+        for profile in profiles
+    )
+
+
+def _qos(qos: Any, kind: str) -> dict[str, Any]:
+    """Describe the QoS of a publisher or subscription, as far as it decides who is matched."""
+    writes = kind == "publisher"
+    # a service that asks for what is best gets the usual
+    reliable = qos.reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_AVAILABLE)
+    latched = qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    # the defaults of DDS: a writer is reliable and transient local, a reader is neither
     if qos.reliability in (ReliabilityPolicy.SYSTEM_DEFAULT, ReliabilityPolicy.UNKNOWN):
-        return kind == "publisher"  # the defaults of DDS: a writer is reliable, a reader is not
-    return bool(qos.reliability != ReliabilityPolicy.BEST_EFFORT)
+        reliable = writes
+    if qos.durability in (DurabilityPolicy.SYSTEM_DEFAULT, DurabilityPolicy.UNKNOWN):
+        latched = writes
+    return {
+        "reliable": reliable,
+        "latched": latched,
+        "deadline_ns": finite_ns(qos.deadline),
+        "manual": qos.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC,
+        "lease_ns": finite_ns(qos.liveliness_lease_duration),
+    }
 
 
 def finite_ns(duration: Any) -> int:

@@ -19,6 +19,12 @@ NAMELESS = "submission"
 #: The most folders of a submission that are searched for packages.
 FOLDERS = 500
 
+#: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`. Folders
+#: with these names hold what is not the student's own either. Submissions are copied without them
+#: (`grader/submissions/collected.py`), but not every folder that is searched is such a copy.
+GENERATED = ("pyvenv.cfg", "COLCON_IGNORE")
+SKIPPED = frozenset({"__pycache__", "__MACOSX", "venv", "node_modules"})
+
 SCRIPT, MODULE, MAIN, ENTRY_POINT = "script", "module", "main", "entry_point"
 
 
@@ -67,8 +73,14 @@ def parsed(text: bytes, path: str) -> ast.Module:
     return ast.parse(text, path)
 
 
-def layout_of(root: str, file: str) -> PackageLayout:
-    """Find the package of a file: by an `__init__.py` in its folder, or a setup.py or package.xml above."""
+def layout_of(root: str, file: str, *, installed: bool = False) -> PackageLayout:
+    """Find the package of a file: by an `__init__.py` in its folder, or a setup.py or package.xml above.
+
+    Args:
+        root: The submission's folder.
+        file: The file, relative to `root`.
+        installed: Whether it is installed as it is and run as a script, wherever it is in its package.
+    """
     folder = os.path.dirname(file)
     above = [folder]
     while above[-1]:
@@ -79,6 +91,8 @@ def layout_of(root: str, file: str) -> PackageLayout:
     stem = os.path.splitext(os.path.basename(file))[0]
     if not chain and package is None:
         return PackageLayout()
+    if installed and package is not None:
+        return PackageLayout(package=package)
     if not chain and package is not None and _is_file(root, package, CMAKE) and not _is_file(root, package, "setup.py"):
         return PackageLayout(package=package)
     if not chain and package is not None:
@@ -102,12 +116,21 @@ def _is_file(root: str, folder: str, name: str) -> bool:
 def package_folders(root: str) -> list[str]:
     """Return the folders of all ROS packages in a submission, which can import each other once they are built."""
     found = []
-    for number, (folder, folders, files) in enumerate(os.walk(root)):
-        folders.sort()
+    for number, (folder, _, files) in enumerate(walk(root)):
         if number >= FOLDERS:
             break
         found += [folder] if any(marker in files for marker in MARKERS) else []
     return found
+
+
+def walk(root: str) -> Iterator[tuple[str, list[str], list[str]]]:
+    """Yield the folders of a submission as `os.walk` does, in order, without those that a tool has made."""
+    for folder, folders, files in os.walk(root):
+        if folder != root and any(marker in files for marker in GENERATED):
+            folders.clear()
+            continue
+        folders[:] = sorted(name for name in folders if name not in SKIPPED and not name.startswith("."))
+        yield folder, folders, files
 
 
 def start_of(  # noqa: PLR0913  what is known of a file

@@ -67,9 +67,9 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
     """Run the file that a request names; never returns.
 
     Args:
-        request: `fd` of the socket, `root` and `file` of the submission, `clock` and whether work is `charged` to it,
-            `seed` (hex), `log_format`, `limits`, `steady_ns` of `VirtualTime.start`, and `interfaces`, the folders of
-            interface packages that are not installed.
+        request: `fd` of the socket, `root` and `file` of the submission, `clock` and the share of the work that is
+            `charged` to it, `seed` (hex), `log_format`, `limits`, `steady_ns` of `VirtualTime.start`, and `interfaces`,
+            the folders of interface packages that are not installed.
         host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
             hide one that it has imported.
     """
@@ -111,7 +111,8 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
         time.give_up_outside = watchdog.give_up_outside
         Watch(link, request["root"]).install()
     home = os.environ.get("HOME", "")
-    written = Written((request["root"], os.getcwd(), home), os.path.join(home, "log"))
+    kept = tuple(os.path.join(home, name) for name in ("log", ".cache", ".config"))
+    written = Written((request["root"], os.getcwd(), home), kept)
     ending = play(request, describer, link, install_ros)
     try:
         ending |= clean_up(request["root"], time, watchdog)
@@ -168,6 +169,7 @@ def evaluate(request: dict[str, Any]) -> None:
         path = os.path.join(here, request["file"])
         sys.argv = [path]
         packages = {name: os.path.join(root, folder).rstrip("/") for name, folder in reversed(told["packages"])}
+        sys.path += [os.path.join(root, folder) for folder in request["imported"]]
         nodes, left_out = launch_files.describe((root, own), path, packages, dict(told["arguments"]))
         found = {"nodes": nodes, "left_out": left_out}
     except BaseException as error:  # whatever the launch file raises becomes a fault
@@ -377,7 +379,7 @@ def keep_interfaces(request: dict[str, Any]) -> None:
 
 def hides_modules(request: dict[str, Any]) -> bool:
     """Return whether a module of the submission hides one that this process has imported already."""
-    return bool(entry.shadows_of(request["root"], request["file"]).files)
+    return bool(entry.shadows_of(request).files)
 
 
 def flush() -> None:

@@ -1,8 +1,9 @@
 """Runs the student's threads one at a time and in a fixed order, and detects when all of them are blocked.
 
 Each thread is a green thread. It switches to another one only where the original program would block: in a sleep, a
-lock, a wait set or a selector. This makes programs with threads repeatable. When no thread can run, time has to
-advance: the thread that blocked last asks the grader.
+lock, a wait set or a selector; and at the first text that it writes after another thread has started or woken it. This
+makes programs with threads repeatable. When no thread can run, time has to advance: the thread that blocked last asks
+the grader.
 """
 
 from collections import deque
@@ -15,7 +16,7 @@ from . import originals
 class GreenThread:
     """One thread of the student's program, and what it waits for."""
 
-    __slots__ = ("deadline_ns", "gate", "native", "parked", "polled_in", "polls")
+    __slots__ = ("deadline_ns", "gate", "is_new", "native", "parked", "polled_in", "polls")
 
     def __init__(self) -> None:
         self.gate = originals.allocate_lock()
@@ -25,6 +26,8 @@ class GreenThread:
         self.polls = False
         self.polled_in = -1
         self.native = 0
+        #: Whether another thread has started or woken it, and it has neither blocked nor written anything since.
+        self.is_new = False
 
 
 class Scheduler:
@@ -42,6 +45,8 @@ class Scheduler:
         self._green_threads: dict[int, GreenThread] = {}
         self._parked: list[GreenThread] = []
         self._runnable: deque[GreenThread] = deque()
+        #: Those that let all others go on first, after they have written something.
+        self._last: deque[GreenThread] = deque()
         self._round = 0
         self.current = self._main = self._adopt()
         self._others_ran = False
@@ -97,6 +102,7 @@ class Scheduler:
             self._round,
             True,
         )
+        green_thread.is_new = False
         self._parked.append(green_thread)
         try:
             self._hand_on(green_thread)
@@ -111,12 +117,27 @@ class Scheduler:
         if green_thread.parked:
             self._parked.remove(green_thread)
             green_thread.parked = False
+            green_thread.is_new = not self.current.is_new  # `Thread.start` waits until the new thread wakes it
             self._runnable.append(green_thread)
             self._round += 1
+
+    def wrote(self) -> None:
+        """Let the other threads go on until they block, after one that they have started or woken has written a text.
+
+        In CPython a thread holds the interpreter's lock until it blocks, writes or has run for 5 ms. Where the one that
+        woke it waits for the lock, it gets it while the text is written, and is mostly far ahead by then.
+        """
+        green_thread = self.current
+        if green_thread.is_new and self.mine() is green_thread:
+            green_thread.is_new = False
+            if self._runnable:
+                self._last.append(green_thread)
+                self._hand_on(green_thread)
 
     def start(self, body: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Callable[[], None]:
         """Register a new green thread at once, and return the function that its OS thread must run."""
         green_thread = GreenThread()
+        green_thread.is_new = True
         self._runnable.append(green_thread)
         self._round += 1
 
@@ -155,9 +176,9 @@ class Scheduler:
     def _choose(self) -> GreenThread:
         """Choose the thread that runs next; if none can, let time advance until one can."""
         while True:
-            if self._runnable:
+            if waiting := self._runnable or self._last:
                 self._round += 1
-                return self._runnable.popleft()
+                return waiting.popleft()
             green_thread = self._poller()
             if green_thread is None and (green_thread := self._due()) is not None:
                 self._round += 1

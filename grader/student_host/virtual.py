@@ -37,9 +37,14 @@ INTERRUPT_S = 0.02
 
 
 class Work:
-    """Measures the work of the student's code since it last continued: real time without waits for a processor."""
+    """Measures the work of the student's code since it last continued: real time without waits for a processor.
 
-    def __init__(self) -> None:
+    Args:
+        share: The share of it that counts.
+    """
+
+    def __init__(self, share: float) -> None:
+        self._share = share
         self.restart(0)
 
     def restart(self, free_ns: int) -> None:
@@ -49,12 +54,13 @@ class Work:
         self._starved_ns = originals.starved_ns(self._thread)
 
     def done_ns(self) -> int:
-        """Return how long the work has taken."""
+        """Return the time that counts."""
         used_ns = originals.processor_ns() - self._used_ns
         waited_ns = round((originals.perf_counter() - self._began_s) * 1e9) - used_ns
         if waited_ns > UNEXPLAINED_NS and self._thread == originals.get_native_id():
             waited_ns -= originals.starved_ns(self._thread) - self._starved_ns
-        return used_ns + (waited_ns if waited_ns > UNEXPLAINED_NS else 0) - self._free_ns
+        taken_ns = used_ns + (waited_ns if waited_ns > UNEXPLAINED_NS else 0)
+        return round(self._share * taken_ns) - self._free_ns
 
 
 class VirtualTime:
@@ -104,6 +110,8 @@ class VirtualTime:
         ros.install_traffic(
             self._ledger, self.clock, self._settle, self.leave, lambda: self.give_up_outside("timed_event")
         )
+        ros.install_events_executor(lambda: self.give_up_outside("events_executor"))
+        ros.note_other_domains(lambda: self._domain, lambda note: self._link.send({"kind": "note", **note}))
         ros.install_looks(self.clock, self._ledger, self._settle)
         ros.install_own_signals(self._await_shutdown)
         ros.install_callers()
@@ -111,30 +119,36 @@ class VirtualTime:
         self._notice_output(ros)
 
     def _notice_output(self, ros: Any) -> None:
-        """Make the program report before time advances whenever it has written output, so that its time is exact."""
+        """Make the program report before time advances whenever it has written output, so that its time is exact.
 
-        def noticing(write: Callable[..., Any]) -> Callable[..., Any]:
+        Threads may take turns after a line or a log record: `print` writes the end of a line after the line.
+        """
+
+        def noticing(write: Callable[..., Any], ends: Callable[..., bool]) -> Callable[..., Any]:
             def write_and_note(*args: Any) -> Any:
                 self.unreported = True
-                return write(*args)
+                written = write(*args)
+                if ends(*args):
+                    self.scheduler.wrote()
+                return written
 
             return write_and_note
 
         for stream in (sys.stdout, sys.stderr):
-            stream.write = noticing(stream.write)  # type: ignore[method-assign]
-        ros.replace_log(noticing)
+            stream.write = noticing(stream.write, lambda text: text.endswith("\n"))  # type: ignore[method-assign]
+        ros.replace_log(lambda log: noticing(log, lambda *_: True))
 
-    def start(self, now_ns: int, steady_ns: int, *, charged: bool = False) -> None:
+    def start(self, now_ns: int, steady_ns: int, *, charged: float = 0.0) -> None:
         """Start virtual time in this thread, which may be of a fork of the process that made this object.
 
         Args:
             now_ns: Nanoseconds since 1970.
             steady_ns: When its monotonic clocks were at zero, in nanoseconds since 1970.
-            charged: Whether time passes while the program works.
+            charged: The share of the program's work that takes time; 0 if time stands still while it works.
         """
         self.clock.steady_ns = steady_ns
         if charged:
-            self._work = Work()
+            self._work = Work(charged)
             self.clock.charge = self._charge
         self.scheduler.current.native = originals.get_native_id()
         self._domain = int(os.environ.get("ROS_DOMAIN_ID", "0"))
@@ -270,7 +284,8 @@ class VirtualTime:
             if "match" in answer:
                 missing = self._ledger.await_matches(answer["match"], answer["wait_s"])
                 self._ledger.await_absence(answer.get("gone", []), answer["wait_s"])
-                answer = self._link.ask({"kind": "matched", "missing": missing})
+                untold = self._ledger.await_events(answer["match"].get("refused", {}), answer["wait_s"])
+                answer = self._link.ask({"kind": "matched", "missing": missing, "untold": untold})
             elif "expect" in answer:
                 self._ledger.expect(answer["expect"])
                 answer = self._link.ask({"kind": "arrived"})

@@ -81,6 +81,7 @@ class WallTime:
         rclpy.client.Client.call_async = noting(rclpy.client.Client.call_async)
         rclpy.service.Service.send_response = noting(rclpy.service.Service.send_response)
         ros.note_nodes()
+        ros.note_other_domains(lambda: self.domain, lambda note: self._link.send({"kind": "note", **note}))
         ros.install_departures(self._leave)
 
     def _leave(self) -> None:

@@ -20,10 +20,10 @@ class Written:
 
     Args:
         folders: The submission, the working directory and the home; one of them may be in another.
-        left_out: A folder in them that is not looked at: ROS writes logs there.
+        left_out: Folders in them that are not looked at: ROS writes logs there, and libraries what they keep.
     """
 
-    def __init__(self, folders: tuple[str, ...], left_out: str) -> None:
+    def __init__(self, folders: tuple[str, ...], left_out: tuple[str, ...]) -> None:
         self._folders = dict.fromkeys(folder for folder in folders if folder)
         self._left_out = left_out
         self._before = {path: state for _, path, state in self._entries()}
@@ -49,7 +49,7 @@ class Written:
         seen: set[str] = set()
         for top in self._folders:
             for folder, inner, names in os.walk(top):
-                inner[:] = [name for name in inner if os.path.join(folder, name) != self._left_out]
+                inner[:] = [name for name in inner if os.path.join(folder, name) not in self._left_out]
                 for name in names:
                     path = os.path.join(folder, name)
                     if path in seen:

@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 from grader.core import extras
 from grader.core.errors import HarnessError
-from grader.submissions.contained import run_contained
+from grader.execution.contained import run_contained
 from grader.submissions.members import FEWER, FILE, FOLDER, LINK, Member, UnusableArchiveError
 
 #: Kind of archive -> names of the format in libarchive, and the first bytes that tell them apart.

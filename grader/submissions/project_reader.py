@@ -5,7 +5,9 @@ gives up all privileges, files and networks first; its memory, processor time an
 `confine`). The input is a list of packages, each an object of `files`, the bytes of its project files as Latin-1 by
 name, and `names`, the paths of all files below its folder. For each package it writes a line as soon as it is read, so
 that what ends the process costs no package before it: a JSON object of `name` (null if none is given), `scripts`,
-`data_files` (null if not known), and `problems`, pairs of a file and one of `PROBLEMS`.
+`data_files` (null if not known), `programs` that are installed as they are, each with its file and whether it is made
+executable, names of programs that CMake builds as `built`, `imported` folders, `unread`, whether there may be other
+programs, and `problems`, pairs of a file and one of `PROBLEMS`.
 
 No code of a student is imported or run: setup.py is only parsed.
 """
@@ -18,18 +20,21 @@ import configparser
 import importlib
 import json
 import os
+import posixpath
 import re
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
-from grader.submissions.confinement import confine
+from grader.execution.confinement import confine
+from grader.submissions.cmake_files import Contents, contents_of
 from grader.submissions.setup_files import LimitError, given_to_setup
 
 #: Why a file was not read: it is no valid text of its format, or reading it would take too much.
 INVALID, TOO_COSTLY = "invalid", "too costly"
 PROBLEMS = (INVALID, TOO_COSTLY)
+CMAKE = "CMakeLists.txt"
 #: How much of a package.xml is searched for its name.
 NAME_BYTES = 1 << 16
 #: Encodings that a setup.py may declare, besides UTF-8; once confined, the process cannot load others.
@@ -90,10 +95,23 @@ def described(files: dict[str, bytes], names: Sequence[str], tomllib: Any) -> di
         *read("setup.cfg", _scripts_of_configuration, none),
     ]
     name = read("package.xml", _name_in_manifest, None) or given.get("name")
+    name = name if isinstance(name, str) else None
+    unread = Contents(unread=CMAKE in files)
+    by_cmake = read(CMAKE, lambda text: contents_of(text.decode("utf-8-sig", "replace"), name or "", names), unread)
+    for file in by_cmake.configurations:
+        lines += read(file, _scripts_of_configuration, none)
+    data_files = _data_files(given.get("data_files"))
     return {
-        "name": name if isinstance(name, str) else None,
+        "name": name,
         "scripts": [script for line in lines if (script := _script(line)) is not None],
-        "data_files": _data_files(given.get("data_files")),
+        "data_files": data_files,
+        "programs": [
+            *_programs_of_setup(given, data_files or (), name or ""),
+            *((one.name, one.file, one.runs) for one in by_cmake.installed),
+        ],
+        "built": by_cmake.built,
+        "imported": by_cmake.imported,
+        "unread": by_cmake.unread,
         "problems": problems,
     }
 
@@ -114,6 +132,19 @@ def _data_files(given: Any) -> list[tuple[str, list[str]]] | None:
             return None
         found.append((target, files))
     return found
+
+
+def _programs_of_setup(
+    given: dict[str, Any], data_files: Sequence[tuple[str, list[str]]], name: str
+) -> Iterator[tuple[str, str, str]]:
+    """Yield what setup.py installs as programs without an entry point: `scripts`, and data_files in their folder."""
+    scripts = given.get("scripts")
+    for file in scripts if isinstance(scripts, list) else ():
+        if isinstance(file, str):
+            yield posixpath.basename(file), file, "yes"
+    for target, files in data_files:
+        if f"{posixpath.normpath(target)}/".startswith(f"lib/{name}/"):
+            yield from ((posixpath.basename(file), file, "source") for file in files)
 
 
 def _script(line: str) -> tuple[str, str, str] | None:

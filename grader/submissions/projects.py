@@ -10,20 +10,22 @@ import stat
 import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from grader.core.errors import HarnessError
 from grader.core.projects import Project
-from grader.execution.executables import project_folders
+from grader.execution.contained import run_contained
+from grader.execution.executables import CMAKE_LISTS, files_below, project_folders
 from grader.submissions.collected import MAX_FILES, MAX_NAME_BYTES, MAX_PATH_BYTES, first_of, name_problem
-from grader.submissions.contained import run_contained
 
 MODULE = "grader.submissions.project_reader"
 #: The files of a package that are read.
-FILES = ("package.xml", "setup.py", "setup.cfg", "pyproject.toml")
+FILES = ("package.xml", "setup.py", "setup.cfg", "pyproject.toml", CMAKE_LISTS)
 #: The one to name if the process ended while it read a package.
-_COSTLIEST_FIRST = ("setup.py", "pyproject.toml", "setup.cfg")
+_COSTLIEST_FIRST = ("setup.py", CMAKE_LISTS, "pyproject.toml", "setup.cfg")
 #: Larger files are not read, in bytes: those of real packages have some thousands.
 MOST_BYTES = 256 << 10
 #: Limits of the process that reads: memory and output in bytes, processor time in seconds. The files of a real package
@@ -31,6 +33,8 @@ MOST_BYTES = 256 << 10
 MEMORY_BYTES, OUTPUT_BYTES, PROCESSOR_S = 320 << 20, 8 << 20, 10
 #: The most packages of a submission, and bytes of all their files together: courses hand in a handful.
 MOST_PACKAGES, TOTAL_BYTES = 50, 4 << 20
+#: The most files setup.cfg of Python packages in a CMake package that are read.
+MOST_CONFIGURATIONS = 10
 #: The most console scripts and pairs in data_files of a package, and the longest name of a package or a script.
 MOST_SCRIPTS, MOST_PAIRS, NAME_CHARACTERS = 100, 1_000, 100
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
@@ -72,7 +76,13 @@ def read_projects(root: Path) -> tuple[tuple[Project, ...], tuple[str, ...]]:
             elif content:
                 files[name] = content.decode("latin-1")
                 left -= len(content)
-        asked.append({"files": files, "names": list(_names(folder)) if b"glob" in _bytes(files, "setup.py") else []})
+        lists = CMAKE_LISTS in files or b"glob" in _bytes(files, "setup.py")
+        names = [*islice(files_below(folder), MAX_FILES)] if lists else []
+        if b"SCRIPTS_DESTINATION" in _bytes(files, CMAKE_LISTS):  # the console scripts of a Python package in this one
+            below = [name for name in names if name.endswith("/setup.cfg")][:MOST_CONFIGURATIONS]
+            contents = {name: _content(folder / name, min(MOST_BYTES, left)) for name in below}
+            files |= {name: content.decode("latin-1") for name, content in contents.items() if content}
+        asked.append({"files": files, "names": names})
     found = []
     answers = _answers(asked)
     for number, folder in enumerate(folders[:MOST_PACKAGES]):
@@ -80,7 +90,7 @@ def read_projects(root: Path) -> tuple[tuple[Project, ...], tuple[str, ...]]:
         first = next((name for name in _COSTLIEST_FIRST if name in asked[number]["files"]), "package.xml")
         answer = answers[number] if number < len(answers) else {"problems": [[first, "unread"]]}
         project, wrong = _checked(answer, place, folder.name)
-        found.append(project)
+        found.append(_with_programs(project, answer, folder))
         for file, problem in wrong:
             problems[problem, posixpath.join(place, file)] = None
     notes = list(_notes(problems))
@@ -113,18 +123,6 @@ def _content(path: Path, most: int) -> bytes | None:
 def _without_waiting(path: str, flags: int) -> int:
     """Open a file without blocking on a pipe."""
     return os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC)
-
-
-def _names(folder: Path) -> Iterator[str]:
-    """Yield the paths of all files below a folder."""
-    count = 0
-    for here, folders, files in os.walk(folder):
-        folders.sort()
-        for file in files:
-            count += 1
-            if count > MAX_FILES:
-                return
-            yield Path(here, file).relative_to(folder).as_posix()
 
 
 def _answers(asked: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -170,6 +168,55 @@ def _checked(answer: Mapping[str, Any], place: str, folder_name: str) -> tuple[P
     files, dropped = _data_files(answer.get("data_files"))
     told += [("setup.py", "names")] if dropped or len(scripts) < len(rows) else []
     return Project(place, name, tuple(scripts), files), told
+
+
+#: The most of a program that is read to find out what runs it, and how much of all programs of a package is looked at.
+_START_BYTES, MOST_PROGRAMS = 256, 500
+
+
+def _with_programs(project: Project, answer: Mapping[str, Any], folder: Path) -> Project:
+    """Return a package with the programs that are installed as they are, as told by the process, each checked."""
+    rows = answer.get("programs")
+    found: dict[str, dict[str, str]] = {"programs": {}, "unrunnable": {}}
+    foreign = [name for name in _strings(answer.get("built")) if _SCRIPT.fullmatch(name)]
+    for row in rows[:MOST_PROGRAMS] if isinstance(rows, list) else ():
+        if not isinstance(row, list) or len(row) != 3 or not all(isinstance(part, str) for part in row):
+            continue
+        name, file, runs = row[0], _normal(row[1]), row[2]
+        if not file or _SCRIPT.fullmatch(name) is None or name in (".", ".."):
+            continue
+        first = _first_line(folder / file)
+        if first.startswith("#!") and "python" not in first:
+            foreign.append(name)
+        elif file.endswith(".py") or first.startswith("#!"):
+            # permissions do not survive every archive, so that a first line which names an interpreter stands for them
+            executable = runs == "yes" or (runs == "source" and first.startswith("#!"))
+            found["programs" if executable else "unrunnable"].setdefault(name, file)
+        elif runs == "yes":
+            foreign.append(name)
+    imported = [normal for path in _strings(answer.get("imported")) if (normal := _normal(path or "."))]
+    return replace(
+        project,
+        programs=tuple(found["programs"].items())[:MOST_SCRIPTS],
+        unrunnable=tuple(found["unrunnable"].items())[:MOST_SCRIPTS],
+        foreign=tuple(dict.fromkeys(foreign))[:MOST_SCRIPTS],
+        imported=tuple(dict.fromkeys(path for path in imported if path != "."))[:MOST_SCRIPTS],
+        unread=answer.get("unread", (folder / CMAKE_LISTS).is_file()) is True,
+    )
+
+
+def _first_line(path: Path) -> str:
+    try:
+        with open(path, "rb", opener=_without_waiting) as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                return ""
+            return file.read(_START_BYTES).partition(b"\n")[0].decode("latin-1")
+    except OSError:
+        return ""
+
+
+def _strings(value: Any) -> list[str]:
+    return [one for one in value[:MOST_PAIRS] if isinstance(one, str)] if isinstance(value, list) else []
 
 
 def _pairs(value: Any) -> Iterator[tuple[Any, Any]]:

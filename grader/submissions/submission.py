@@ -12,8 +12,9 @@ from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
 from grader.core.errors import SubmissionError
+from grader.core.projects import Project
 from grader.core.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
-from grader.execution.executables import Executable, executables
+from grader.execution.executables import Executable, executables, find_executables
 from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, listed, shown
 from grader.submissions.projects import read_projects
 from grader.submissions.staging import collect_folder, read_start, write_files
@@ -95,8 +96,8 @@ def stage_collected(
     projects, problems = read_projects(into) if wanted else ((), ())  # without, it is staged for its digest alone
     programs = executables(into, projects)
     files = {
-        name: _look_for_executable(name, programs, collected.files, wanted)
-        if "/" in name
+        name: _look_for_executable(name, into, projects, programs, collected.files, wanted)
+        if "/" in name and name not in meant
         else _look_for(name, collected.files, wanted, programs, meant.get(name, ""))
         for name in wanted
     }
@@ -222,17 +223,22 @@ def _name(source: Path) -> str:
     return source.name if source.name not in ("", "..") else source.resolve().name or "/"
 
 
-def _look_for_executable(
-    wanted: str, programs: Sequence[Executable], files: Sequence[tuple[str, bytes]], all_wanted: Sequence[str]
+def _look_for_executable(  # noqa: PLR0913  what a submission consists of
+    wanted: str,
+    root: Path,
+    projects: Sequence[Project],
+    programs: Sequence[Executable],
+    files: Sequence[tuple[str, bytes]],
+    all_wanted: Sequence[str],
 ) -> StudentFile:
-    """Find `PACKAGE/NAME` among the entry points of a submission; `*` stands for any package."""
+    """Find `PACKAGE/NAME` among the programs of a submission; `*` stands for any package."""
     package, _, name = wanted.partition("/")
-    named = [one for one in programs if one.name == name and package in ("*", one.package)]
+    named = find_executables(root, projects, package, name)
     found = [one for one in named if one.file is not None]
     if found:
         others = tuple(dict.fromkeys(one.file or "" for one in found[1:] if one.file != found[0].file))
         return StudentFile(wanted, found[0].file, others=others, executable=name)
-    problem = f"the entry point {named[0].words} is {named[0].target}, which is not in the submission" if named else ""
+    problem = named[0].problem if named else ""
     similar = difflib.get_close_matches(wanted, [one.words for one in programs], MAX_SIMILAR, SIMILARITY)
     rest = [one.words for one in programs if one.words not in similar]
     rest = rest or sorted((path for path, _ in files if _may_be_node(path, all_wanted)), key=_nearest_the_top)
@@ -260,7 +266,7 @@ def _look_for(
     exact = sorted((name for name in names if PurePosixPath(name).name == wanted), key=_nearest_the_top)
     if exact:
         return StudentFile(wanted, exact[0], others=tuple(exact[1:]))
-    installed = [one for one in programs if f"{one.name}.py" == wanted and one.file is not None]
+    installed = [one for one in programs if wanted in (one.name, f"{one.name}.py") and one.file is not None]
     if len(installed) == 1:
         return StudentFile(wanted, installed[0].file, executable=installed[0].name)
     similar = tuple(_similar(wanted, names, all_wanted))

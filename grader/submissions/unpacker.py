@@ -25,7 +25,7 @@ try:
 except (ImportError, OSError, TypeError, AttributeError):  # without the C library its name is None
     libarchive = None
 
-from grader.submissions.confinement import confine
+from grader.execution.confinement import confine
 
 DAMAGED, ENCRYPTED, TOO_MANY, TOO_MUCH, NO_LIBRARY = 10, 11, 12, 13, 14
 FAULTS = (DAMAGED, ENCRYPTED, TOO_MANY, TOO_MUCH, NO_LIBRARY)

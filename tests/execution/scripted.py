@@ -165,9 +165,9 @@ class ScriptedStudent:
         self.workload = self.workload or ScriptedWorkload(self, t_ns)
         return self.workload
 
-    def claims_of(self, kind: str, name: str) -> bool:
-        """Return whether it has an endpoint of a kind and name."""
-        return any((c["kind"], c["name"]) == (kind, name) for c in self.claims)
+    def claims_of(self, kind: str, name: str) -> list[dict[str, Any]]:
+        """Return its endpoints of a kind and name."""
+        return [c for c in self.claims if (c["kind"], c["name"]) == (kind, name)]
 
     def tell(self, answer: dict[str, Any]) -> None:
         """Take an answer of the conductor."""
@@ -221,7 +221,7 @@ class ScriptedObserver:
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._watched: set[tuple[str, str, bool]] = set()
+        self._watched: set[tuple[str, str]] = set()
         self.published: list[tuple[str, Any]] = []
         self.crowded = ""
         self.advertised: list[tuple[str, str, bool]] = []
@@ -247,7 +247,7 @@ class ScriptedObserver:
 
     def watch(self, endpoints: Iterable[Endpoint]) -> list[str]:
         """Watch every publisher."""
-        self._watched |= {(e.topic, e.type, True) for e in endpoints if e.kind == "publisher"}
+        self._watched |= {(e.topic, e.type) for e in endpoints if e.kind == "publisher"}
         return []
 
     def students_nodes(self, existing: Collection[str] | None = None) -> list[str]:
@@ -269,13 +269,13 @@ class ScriptedObserver:
 
     def reads(self, topic: str) -> bool:
         """Return whether a topic is watched."""
-        return any(name == topic for name, _, _ in self._watched)
+        return any(name == topic for name, _ in self._watched)
 
     def watching(self, topic: str, interface: str) -> list[bool]:
         """Return the subscriptions on a topic."""
-        return [reliable for name, kind, reliable in self._watched if (name, kind) == (topic, interface)]
+        return [True] if (topic, interface) in self._watched else []
 
-    def publishers_matched(self, topic: str, interface: str, *, reliable: bool) -> int:
+    def publishers_matched(self, topic: str, interface: str) -> int:
         """Return how many publishers are matched: all."""
         claims = [c for claims in self._world.claims.values() for c in claims]
         return sum((c["kind"], c["name"], c["type"]) == ("publisher", topic, interface) for c in claims)

@@ -198,7 +198,7 @@ def test_a_recording_in_virtual_time_is_the_same_each_time(run: Record) -> None:
 def test_time_passes_while_a_program_works_where_it_is_charged(run: Record) -> None:
     """The recording that decides: what a program publishes after its work comes later, and so does its next pause."""
     program = "while True:\n publish()\n publisher.publish(Header(frame_id='after'))\n time.sleep(0.05)"
-    plain, charged = (run(program, clock=VIRTUAL, charged=charged) for charged in (False, True))
+    plain, charged = (run(program, clock=VIRTUAL, charged=charged) for charged in (0.0, 1.0))
     for trace, least_s, most_s in ((plain, 0, 0.0001), (charged, 0.015, 0.06)):
         published = trace.messages("/pace")
         before, after = ([m.t_ns for m in published if m.value["frame_id"] == which] for which in ("", "after"))

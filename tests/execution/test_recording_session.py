@@ -9,7 +9,7 @@ import pytest
 from grader.core.trace import ClockKind, Message, Trace
 from grader.execution.plan import Plan
 from grader.execution.real_time_budget import RealTimeBudget
-from grader.execution.recording_session import AUTO, CHARGED_NOTE, DRIFTS, VIRTUAL, WALL, RecordingSession
+from grader.execution.recording_session import AUTO, CHARGED_NOTE, DRIFTS, UNCLEAR, VIRTUAL, WALL, RecordingSession
 from grader.execution.supervisor import Job
 
 
@@ -116,16 +116,22 @@ def test_all_recordings_of_a_submission_share_one_budget() -> None:
 class PacedRecorder:
     """Records one node that has work before its pauses: its rate depends on what is counted, and on the machine."""
 
-    def __init__(self, *, charged_ms: int, wall_ms: int = 60, busy: str = "") -> None:
-        self.charged_ms, self.wall_ms, self.busy = charged_ms, wall_ms, busy
+    def __init__(
+        self, *, charged_ms: int | Sequence[int], wall_ms: int = 60, busy: str = "", sure_ms: int = 50
+    ) -> None:
+        self.charged_ms = iter([charged_ms] if isinstance(charged_ms, int) else charged_ms)
+        self.wall_ms, self.sure_ms, self.busy = wall_ms, sure_ms, busy
         self.recorded: list[str] = []
 
     def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
         for job in jobs:
             clock = ClockKind(job.plan.clock)
-            self.recorded.append("charged" if job.plan.charged else clock.value)
+            charged = job.plan.charged
+            self.recorded.append(f"charged {charged:.0%}" if 0 < charged < 1 else "charged" if charged else clock.value)
             wall = clock is ClockKind.WALL
-            period_ms = self.wall_ms if wall else self.charged_ms if job.plan.charged else 50
+            period_ms = self.wall_ms if wall else 50
+            if charged:
+                period_ms = next(self.charged_ms) if charged == 1 else self.sure_ms
             messages = tuple(Message(t * 10**6, "/x", "T", {}, b"") for t in range(0, 3000, period_ms))
             yield Trace(
                 job.plan.scenario,
@@ -169,9 +175,24 @@ def test_the_wall_clock_decides_where_work_slows_a_node_down() -> None:
 @pytest.mark.parametrize("busy", ["held up", "starved"])
 def test_on_a_busy_machine_the_measured_work_decides(busy: str) -> None:
     """With a note, because this clock is not the one that decides elsewhere."""
-    trace = decided(PacedRecorder(charged_ms=60, wall_ms=150, busy=busy))
+    recorder = PacedRecorder(charged_ms=60, sure_ms=56, wall_ms=150, busy=busy)
+    trace = decided(recorder)
     assert (trace.clock, len(trace.messages("/x")), trace.harness_problem) == (ClockKind.VIRTUAL, 50, "")
     assert trace.notes == (CHARGED_NOTE,)
+    assert recorder.recorded == ["virtual", "charged", "wall", "charged 75%"]
+
+
+def test_a_busy_machine_makes_no_node_slow() -> None:
+    """Work takes longer there: of several recordings the fastest is right."""
+    recorder = PacedRecorder(charged_ms=[56, 54, 50], wall_ms=150, busy="held up")
+    trace = decided(recorder)
+    assert (len(trace.messages("/x")), trace.notes) == (60, (CHARGED_NOTE,))
+    assert recorder.recorded == ["virtual", "charged", "wall", "charged 75%", "charged", "charged"]
+
+
+def test_a_pace_that_a_busy_machine_leaves_unclear_is_not_judged() -> None:
+    trace = decided(PacedRecorder(charged_ms=[56, 54, 55], wall_ms=150, busy="starved"))
+    assert (trace.harness_problem, trace.notes) == (UNCLEAR, ())
 
 
 def test_a_clock_that_was_asked_for_is_not_doubted() -> None:

@@ -140,6 +140,26 @@ def test_the_guard_ends_with_its_block(machine: dict[int, Usage]) -> None:
     assert threading.active_count() == before
 
 
+def test_looks_are_rare_while_nothing_grows(machine: dict[int, Usage], monkeypatch: pytest.MonkeyPatch) -> None:
+    """They cost processor time; memory that begins to grow is looked at often again."""
+    intervals = []
+    student = Watched()
+    used = iter([*[100] * 5, 130, 160, *[160] * 4])
+
+    class Over:
+        def wait(self, interval_s: float) -> bool:
+            intervals.append(round(interval_s / module.LOOK_S))
+            mib = next(used, None)
+            machine[student.process.pid] = Usage(memory_bytes=(mib or 0) * MIB)
+            return mib is None
+
+    guard = ResourceMonitor(processes(student), Limits())
+    monkeypatch.setattr(guard, "_over", Over())
+    monkeypatch.setattr(guard._sockets, "may_be_much", lambda: (False, False))
+    guard._watch()
+    assert intervals == [1, 1, 2, 4, 4, 4, 1, 1, 2, 4, 4, 4]
+
+
 def test_children_are_looked_for_only_if_something_was_started(
     machine: dict[int, Usage], monkeypatch: pytest.MonkeyPatch
 ) -> None:

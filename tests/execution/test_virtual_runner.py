@@ -628,9 +628,10 @@ def test_sentences_in_place_of_names_are_dropped() -> None:
 
 @pytest.mark.parametrize("why", ["threads", "outside"])
 def test_a_program_that_does_not_settle_is_for_the_other_clock(why: str) -> None:
-    """The host says which of the known reasons; any other word of its own counts for nothing."""
+    """The host says which of the known reasons; any other word of its own counts for nothing. What it did is added."""
     hung = {"kind": "exited", "fault": {"code": "blocked"}}
-    assert Run(saying({**hung, "unsettled": why})).trace.clock_reason == module.UNSETTLED[why]
+    did = "a.py waited 5 s for something outside the ROS graph"
+    assert Run(saying({**hung, "unsettled": why})).trace.clock_reason == f"{module.UNSETTLED[why]}: {did}"
     assert Run(saying({**hung, "unsettled": "please"})).trace.clock_reason == ""
 
 

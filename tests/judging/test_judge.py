@@ -316,6 +316,21 @@ def test_a_file_that_cannot_start_costs_one_line(kind: FaultKind, text: str, sai
     assert [(f.kind, f.line, f.scenario) for f in report.faults] == [(kind.value, 12, "alone")]
 
 
+@pytest.mark.parametrize(
+    ("module", "hint"),
+    [("cv2", "pip install 'rclpy-grader[opencv]'"), ("matplotlib", "'rclpy-grader[plots]'"), ("tf2_kdl", "tf2_kdl is")],
+)
+def test_what_a_desktop_of_ros_has_costs_nothing_where_it_is_not_installed(module: str, hint: str) -> None:
+    """The criteria are undecided, with what to install."""
+    rec = Recording(0.0, process=FILE)
+    rec.fault(0.0, FaultKind.EXCEPTION, f"ModuleNotFoundError: No module named '{module}'", 1)
+    sources = {FILE: f"import {module}\n"}
+    verdicts = judge_exercise(EXERCISE_1, {"alone": rec.trace()}, handed_in(FILE), sources).verdicts
+    assert {v.outcome for v in verdicts} == {Outcome.UNDECIDED}
+    assert module in verdicts[0].reason
+    assert hint in verdicts[0].hint
+
+
 def test_what_was_earned_before_a_crash_stays() -> None:
     """A log record before an exception in the constructor counts."""
     report = graded_1(Recording(5.0, process=FILE).log(0.0, "starting").crashed(0.0, "TypeError: no"))

@@ -61,6 +61,27 @@ def environment():
     )
 
 
+def windows():
+    try:
+        import matplotlib.pyplot as plt
+    except ImportError:
+        return "no matplotlib"
+    figure = plt.figure()
+    start = time.monotonic()
+    plt.pause(0.2)
+    return plt.get_backend(), type(figure.canvas.manager).__name__, time.monotonic() - start >= 0.2
+
+
+def fonts():
+    try:
+        import matplotlib
+        from matplotlib import font_manager
+    except ImportError:
+        return "no matplotlib"
+    own = matplotlib.get_data_path()
+    return sorted(os.path.relpath(font.fname, own) for font in font_manager.fontManager.ttflist)
+
+
 ROWS = {
     "processors": lambda: (
         os.cpu_count(), os.sched_getaffinity(0), multiprocessing.cpu_count(), [os.sysconf(n) for n in SYSTEM],
@@ -100,6 +121,8 @@ ROWS = {
         sys.flags, [os.path.basename(a) for a in (*sys.argv, *sys.orig_argv[1:])], sys._xoptions, sys.getrecursionlimit(),
         sys.getswitchinterval(), sys.warnoptions,
     ),
+    "windows": windows,
+    "fonts": fonts,
     "free threading": lambda: (getattr(sys, "_is_gil_enabled", lambda: True)(), threading.active_count() > 0),
 }
 

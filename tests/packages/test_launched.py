@@ -12,7 +12,8 @@ import pytest
 from grading import grade_until_decided
 
 from grader.app.request import GradeRequest
-from grader.core.report import ExerciseReport, Outcome
+from grader.core.exercise import Outcome
+from grader.core.report import ExerciseReport
 
 pytestmark = pytest.mark.ros
 
@@ -87,7 +88,7 @@ def test_an_executable_that_is_not_there_is_a_fault(graded: Callable[..., Exerci
     assert set(outcomes(report).values()) <= {"not_met", "blocked"}
     (fault,) = report.faults
     assert (fault.file, fault.line) == (LAUNCH, line_of(LAUNCH, "        Node("))
-    assert "executable 'talk' not found; its entry points are talker, listener" in fault.text
+    assert "executable 'talk' not found; its executables are talker, listener" in fault.text
 
 
 def test_what_is_left_out_costs_no_points(graded: Callable[..., ExerciseReport]) -> None:
@@ -106,6 +107,58 @@ def test_what_is_left_out_costs_no_points(graded: Callable[..., ExerciseReport])
     verdict = next(verdict for verdict in report.verdicts if verdict.id == "names")
     assert verdict.outcome is Outcome.UNDECIDED
     assert "turtle_sim/node was not started" in verdict.reason
+
+
+def with_command(command: str) -> tuple[Edit, ...]:
+    """Return the edits after which the launch file runs a command, and a criterion is not met."""
+    action = f"ExecuteProcess(cmd={command}, shell=True),"
+    return (
+        (LAUNCH, "from launch.actions import ", "from launch.actions import ExecuteProcess, "),
+        (LAUNCH, 'name="speaker",', ""),
+        (LAUNCH, "        Node(\n", f"        {action}\n        Node(\n"),
+    )
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["['true']", "['/bin/sleep', '5']", "['rviz2', '-d', 'a.rviz']", "['gz', 'sim']", "['ros2 topic echo /talk']"],
+)
+def test_a_command_that_takes_no_part_in_the_graph_excuses_nothing(
+    graded: Callable[..., ExerciseReport], command: str
+) -> None:
+    """It is named, and a criterion that is not met stays so."""
+    report = graded(*with_command(command))
+    assert outcomes(report)["names"] == "not_met"
+    assert any("the command " in note and "was left out" in note for note in report.notes)
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["['ros2', 'topic', 'pub', '/x', 'std_msgs/msg/String']", "['bash', '-c', 'true']", "['echo', 'a; ros2']"],
+)
+def test_a_command_that_may_take_part_leaves_a_criterion_undecided(
+    graded: Callable[..., ExerciseReport], command: str
+) -> None:
+    """What it would do is not known."""
+    assert outcomes(graded(*with_command(command)))["names"] == "undecided"
+
+
+BREAKS = "import sys\nsys.modules['_grader_host.launch_files'].DEEPEST = None\n"
+
+
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+def test_a_mistake_of_the_evaluator_costs_no_points(graded: Callable[..., ExerciseReport], clock: str) -> None:
+    """Everything is undecided, with a line for a bug report, and there is no fault."""
+    report = graded((LAUNCH, "import os\n", f"import os\n{BREAKS}"), clock=clock)
+    # where nothing is included, nothing fails
+    assert outcomes(report) == {**dict.fromkeys(outcomes(report), "undecided"), "faster": "met"}
+    assert report.faults == ()
+    said = "the grader's own code failed in the process of robot.launch.py: TypeError, launch_files.py line "
+    for verdict in report.verdicts:
+        if verdict.outcome is not Outcome.UNDECIDED:
+            continue
+        assert said in verdict.reason
+        assert "please report this line" in verdict.reason
 
 
 def test_a_misspelt_package_is_a_fault(graded: Callable[..., ExerciseReport]) -> None:
@@ -127,7 +180,7 @@ def test_a_program_that_cmake_builds_costs_no_points(graded: Callable[..., Exerc
     report = graded((LAUNCH, "        Node(\n", f"        {node}\n        Node(\n"))
     assert set(outcomes(report).values()) == {"met"}
     line = line_of(LAUNCH, "        Node(")
-    said = f"{LAUNCH}:{line}: drive_cpp/listener was not started: CMake builds the programs of its package"
+    said = f"{LAUNCH}:{line}: drive_cpp/listener was not started: it is not a Python program"
     assert said in report.notes
 
 
@@ -201,7 +254,7 @@ def test_a_launch_file_starts_nothing_outside_of_the_submission(
     assert not any("antigravity" in start.file or "this.py" in start.file for start in report.starts)
     if package == "robot":
         assert set(outcomes(report).values()) <= {"not_met", "blocked"}
-        assert "not found; its entry points are talker, listener" in report.faults[0].text
+        assert "not found; its executables are talker, listener" in report.faults[0].text
     else:
         assert set(outcomes(report).values()) == {"met"}
         assert any("was not started: the submission has no package elsewhere" in note for note in report.notes)

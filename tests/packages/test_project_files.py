@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 
 from grader.core.projects import Project
+from grader.execution import contained
 from grader.execution.executables import executables, find_executable
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.shares import install_shares
-from grader.submissions import contained, projects
+from grader.submissions import projects
 from grader.submissions.projects import read_projects
 
 COSTLY = "setup.py: not read, because that would take too much memory or time"
@@ -223,7 +224,7 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss << 10)
 
 def test_a_process_that_is_ended_costs_no_package_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What it has told by then counts; the others have names and no more."""
-    monkeypatch.setattr(projects, "OUTPUT_BYTES", 100)
+    monkeypatch.setattr(projects, "OUTPUT_BYTES", 200)
     made(tmp_path / "a", {"setup.py": f"{SETUP}setup(name='a')\n"})
     made(tmp_path / "b", {"setup.py": scripts("'node = own.node:main'")})
     found, notes = read_projects(tmp_path)

@@ -28,7 +28,8 @@ from hypothesis.strategies._internal.core import DataObject
 
 from grader.core.errors import SubmissionError
 from grader.core.submission import Submission
-from grader.submissions import archives, contained, foreign_archives
+from grader.execution import contained
+from grader.submissions import archives, foreign_archives
 from grader.submissions.foreign_archives import is_installed
 from grader.submissions.submission import stage_submission
 
@@ -499,7 +500,7 @@ def test_a_process_that_reads_what_students_made_can_do_nothing_else() -> None:
     """No file, socket, process, signal or memory beyond its limit, though a library were taken over."""
     code = """
 import os, resource, socket
-from grader.submissions.confinement import confine
+from grader.execution.confinement import confine
 confine({"memory": 768 << 20, "processor": 60, "output": 1 << 20})
 tries = {
     "read": lambda: open("/etc/hostname"), "write": lambda: open("/tmp/x", "w"), "net": socket.socket,

@@ -47,6 +47,11 @@ class Stage:
         at_ns = self.time.clock.now_ns - EPOCH_NS
         self._said.append(f"{at_ns / 1e6:.2f}".rstrip("0").rstrip(".") + f" {text}")
 
+    def write(self, text: object) -> None:
+        """Note something that the program has written to a standard stream."""
+        self.say(text)
+        self.time.scheduler.wrote()
+
     def fault(self, error: BaseException) -> None:
         """Note what ended a thread."""
         self.say(f"fault {type(error).__name__}: {error}")
@@ -87,7 +92,8 @@ def perform(request: dict[str, Any], pipe: int) -> None:
             stand_in_for_ros(stage.say)
             entry.run_file(request, stage.note, lambda: stage.say("ros"))
         else:
-            exec(compile(request["code"], "program", "exec"), {"__name__": "__main__", "say": stage.say})
+            names = {"__name__": "__main__", "say": stage.say, "write": stage.write}
+            exec(compile(request["code"], "program", "exec"), names)
     except SystemExit as leaving:
         stage.say(f"exit {program.exit_code(leaving)}")
     except BaseException as error:  # the program under test may raise anything

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import pytest
 from staging_programs import play
+from thread_orders import IMPORTS, ORDERS
 
 
 def test_sleeping_threads_interleave() -> None:
@@ -495,3 +498,27 @@ def test_the_low_level_module_is_virtual_as_well() -> None:
         _thread.start_new_thread(work, (0.5,))
         say(done.acquire(timeout=2))
     """) == ["500 work", "500 True", "500 end"]
+
+
+@pytest.mark.parametrize("name", ORDERS)
+def test_who_goes_on_first(name: str) -> None:
+    """A new thread runs until it blocks or writes; whoever wakes another one goes on, also where both write."""
+    code, expected = ORDERS[name]
+    said = play(IMPORTS + "note = say\n" + textwrap.dedent(code))
+    assert " ".join(line.partition(" ")[2] for line in said[:-1]) == expected
+
+
+def test_a_thread_that_writes_waits_for_nobody_who_waits() -> None:
+    """Threads that nothing has woken do not go on because another one writes, and a lock stays with its owner."""
+    assert play("""
+        import threading, time
+        lock = threading.Lock()
+        def work():
+            with lock:
+                write("a 1"); write("a 2")
+        with lock:
+            thread = threading.Thread(target=work)
+            thread.start()
+            write("main 1"); time.sleep(1); write("main 2")
+        thread.join()
+    """) == ["0 main 1", "1000 main 2", "1000 a 1", "1000 a 2", "1000 end"]

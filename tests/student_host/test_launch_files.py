@@ -12,6 +12,7 @@ from unittest.mock import patch
 import pytest
 
 from grader.execution.notes import left_out_words
+from grader.student_host.faults import Describer
 from grader.student_host.launch_files import describe
 
 IMPORTS = """
@@ -244,3 +245,131 @@ def test_a_misspelt_package_is_told(described: Callable[..., Described], package
     """A name with a part or a number more may be that of another package."""
     nodes, _ = described(f"Node(package='{package}', executable='talker')")
     assert [node["near"] for node in nodes] == [near]
+
+
+#: What a launch file may do wrong, each in the list of its actions; `ros2 launch` refuses all of it.
+MISTAKES = (
+    "Node(package='robot')",
+    "Node(package=5, executable='x')",
+    "Node(package='robot', executable=None)",
+    "Node(**TALKER, parameters={'a': 1})",
+    "Node(**TALKER, parameters=5)",
+    "Node(**TALKER, parameters='x')",
+    "Node(**TALKER, parameters=[5])",
+    "Node(**TALKER, parameters=[{5: 1}])",
+    "Node(**TALKER, parameters=[{'a': object()}])",
+    "Node(**TALKER, parameters=[{'a': [1, 'x', object()]}])",
+    "Node(**TALKER, remappings=[('a')])",
+    "Node(**TALKER, remappings={'a':'b'})",
+    "Node(**TALKER, remappings=[('a',5)])",
+    "Node(**TALKER, remappings=('a','b'))",
+    "Node(**TALKER, arguments=[5])",
+    "Node(**TALKER, arguments=5)",
+    "Node(**TALKER, name=5)",
+    "Node(**TALKER, namespace=5)",
+    "Node(**TALKER, ros_arguments=[None])",
+    "Node(**TALKER, condition=5)",
+    "Node(**TALKER, condition='true')",
+    "Node(**TALKER, condition=IfCondition(5))",
+    "Node(**TALKER, condition=IfCondition('maybe'))",
+    "DeclareLaunchArgument(5, default_value='x')",
+    "DeclareLaunchArgument('a', default_value=5)",
+    "DeclareLaunchArgument('a', default_value=[5])",
+    "DeclareLaunchArgument('a', default_value='x', choices=5)",
+    "DeclareLaunchArgument(['a'], default_value='x')",
+    "DeclareLaunchArgument('a')",
+    "SetLaunchConfiguration('a', 5)",
+    "SetLaunchConfiguration('a')",
+    "GroupAction(Node(**TALKER))",
+    "GroupAction(5)",
+    "GroupAction([5])",
+    "GroupAction([], launch_configurations=5)",
+    "TimerAction(period='x', actions=[])",
+    "TimerAction(period=None, actions=[])",
+    "TimerAction(period=1.0, actions=Node(**TALKER))",
+    "TimerAction(period=1.0)",
+    "OpaqueFunction(function=5)",
+    "OpaqueFunction(function=lambda c: 5)",
+    "OpaqueFunction(function=lambda c: [5])",
+    "OpaqueFunction(function=lambda: [])",
+    "OpaqueFunction(function=lambda c: 1/0)",
+    "OpaqueFunction(function=lambda c: Node(**TALKER))",
+    "OpaqueFunction(function=lambda c, x: [], args=5)",
+    "IncludeLaunchDescription('x.py')",
+    "IncludeLaunchDescription(5)",
+    "IncludeLaunchDescription(PythonLaunchDescriptionSource(5))",
+    "IncludeLaunchDescription(PythonLaunchDescriptionSource('/nope.launch.py'))",
+    "IncludeLaunchDescription(PythonLaunchDescriptionSource(FindPackageShare('robot').perform(5)))",
+    "IncludeLaunchDescription(FindPackageShare('robot'), launch_arguments={'a':'b'})",
+    "IncludeLaunchDescription(FindPackageShare('robot'), launch_arguments=5)",
+    "IncludeLaunchDescription(FindPackageShare('robot'), launch_arguments=[('a',5)])",
+    "ExecuteProcess(cmd=5)",
+    "ExecuteProcess(cmd=[5])",
+    "ExecuteProcess()",
+    "SetEnvironmentVariable('A', 5)",
+    "SetEnvironmentVariable(5, 'A')",
+    "SetRemap('a')",
+    "SetRemap(5, 'b')",
+    "PushRosNamespace(5)",
+    "PushRosNamespace()",
+    "LogInfo(msg=5)",
+    "LogInfo()",
+    "LogInfo(5)",
+    "5",
+    "'text'",
+    "None",
+    "Node",
+    "LaunchDescription(5)",
+    "LaunchDescription(Node(**TALKER))",
+    "[Node(**TALKER)]",
+    "Node(**TALKER, name=LaunchConfiguration('nope'))",
+    "Node(**TALKER, name=LaunchConfiguration(5))",
+    "Node(**TALKER, name=EnvironmentVariable(5))",
+    "Node(**TALKER, name=PathJoinSubstitution(5))",
+    "Node(**TALKER, name=PathJoinSubstitution([5]))",
+    "Node(**TALKER, name=PythonExpression(5))",
+    "Node(**TALKER, name=PythonExpression(['1/0']))",
+    "Node(**TALKER, name=PythonExpression(['nope']))",
+    "Node(**TALKER, name=PythonExpression(['1 +']))",
+    "Node(**TALKER, name=TextSubstitution(text=5))",
+    "Node(**TALKER, name=FindPackageShare(5))",
+    "Node(**TALKER, name=FindPackageShare('robt'))",
+    "Node(**TALKER, name=FindPackageShare())",
+    "Node(**TALKER, name=get_package_share_directory(5))",
+    "Node(**TALKER, name=get_package_share_directory(None))",
+    "Node(**TALKER, name=get_package_share_directory(['robot']))",
+    "Node(**TALKER, parameters=[ParameterFile(5)])",
+    "Node(**TALKER, parameters=[{'a': ParameterValue('x', value_type=int)}])",
+    "Node(**TALKER, parameters=[{'a': ParameterValue(LaunchConfiguration('nope'))}])",
+    "Node(**TALKER, parameters=[{'a': {'b': None}}])",
+    "Node(**TALKER, parameters=[{'a': {1,2}}])",
+    "Node(**TALKER, parameters=[None])",
+    "LifecycleNode(**TALKER)",
+    "IfCondition('true')",
+    "LaunchConfiguration('x')",
+    "Node(**TALKER, condition=IfCondition())",
+    "Node(**TALKER, condition=LaunchConfigurationEquals(0))",
+    "Node(**TALKER, condition=LaunchConfigurationEquals('a', 5))",
+    "Node(**TALKER, condition=UnlessCondition(PythonExpression([5])))",
+)
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_of_a_launch_file_is_its_own(
+    described: Callable[..., Described], tmp_path: Path, mistake: str
+) -> None:
+    """Whichever line of the evaluator raises, no mistake is taken for one of the grader's code."""
+    with pytest.raises(BaseException) as raised:  # noqa: PT011  whatever ros2 launch would raise
+        described(mistake)
+    assert Describer(str(tmp_path)).exception(raised.value)["code"] == "exception"
+
+
+@pytest.mark.parametrize("argument", ["parameters", "name", "remappings", "arguments"])
+@pytest.mark.parametrize("made", ["OnProcessExit(5)", "xacro.load()"])
+def test_a_node_with_an_argument_that_is_left_out_is_left_out(
+    described: Callable[..., Described], argument: str, made: str
+) -> None:
+    """What it would be is not known."""
+    nodes, left_out = described(f"Node(**TALKER, {argument}={made})", before="import xacro\n")
+    assert nodes == []
+    assert len(left_out) == 1

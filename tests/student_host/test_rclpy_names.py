@@ -60,7 +60,8 @@ ASSIGNED = {
 #: Class written in C++ -> its methods and attributes; the empty name stands for functions and bare classes.
 CPP = {
     "": (
-        *("ActionClient", "ActionServer", "Clock", "ClockType", "InvalidHandle", "LifecycleStateMachine", "RCLError"),
+        *("ActionClient", "ActionServer", "Clock", "ClockType", "EventHandle", "EventsExecutor", "InvalidHandle"),
+        *("LifecycleStateMachine", "RCLError"),
         *(
             "SignalHandlerOptions",
             "WaitSet",
@@ -81,8 +82,9 @@ CPP = {
     ),
     "Timer": ("time_until_next_call",),
     "Node": ("get_count_clients",),
-    "Publisher": ("get_subscription_count",),
-    "Subscription": ("get_publisher_count", "pointer", "take_message"),
+    "Publisher": ("get_subscription_count", "get_topic_name"),
+    "Subscription": ("get_publisher_count", "get_topic_name", "pointer", "take_message"),
+    "EventHandle": ("__init__", "take_event"),
     "GuardCondition": ("pointer",),
     "Client": ("pointer", "send_request", "service_server_is_available", "take_response"),
     "Service": ("pointer", "service_take_request"),
@@ -149,7 +151,7 @@ def names_used(path: Path) -> Iterator[str]:
                 yield node.attr
 
 
-@pytest.mark.parametrize("file", ["ros", "ledger", "actions", "link", "wall"])
+@pytest.mark.parametrize("file", ["ros", "ledger", "events", "actions", "link", "wall"])
 def test_the_tables_hold_what_the_host_uses(file: str) -> None:
     """A new use of a private name has to be entered."""
     known = {name for table in (PYTHON, CPP) for names in table.values() for name in names} | set(ASSIGNED)

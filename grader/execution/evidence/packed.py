@@ -23,6 +23,7 @@ from grader.core.trace import (
     LogRecord,
     Mark,
     Message,
+    NewerPython,
     Observation,
     Offer,
     OutputLine,
@@ -123,7 +124,7 @@ def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: An
 _START = _row_of(Start, "arguments", "launched_by", last=("given", tuple[str, str], ("", "")))
 
 
-_WRITTEN = _row_of(WrittenFile)
+_WRITTEN, _NEWER = _row_of(WrittenFile), _row_of(NewerPython)
 
 
 def _start(row: Any) -> Start:
@@ -146,6 +147,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("most_starved_ns", int, 0),
         ("left_out", tuple[str, ...], ()),
         ("written", tuple[_WRITTEN, ...], ()),  # type: ignore[valid-type]
+        ("newer", tuple[_NEWER, ...], ()),  # type: ignore[valid-type]
         ("author_mistake", AuthorMistake | None, None),
     ]
     return msgspec.defstruct("Trace", written)
@@ -168,6 +170,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         most_starved_ns=row.most_starved_ns,
         left_out=row.left_out,
         written=tuple(_same(WrittenFile, file) for file in row.written),
+        newer=tuple(_same(NewerPython, one) for one in row.newer),
         author_mistake=row.author_mistake,
     )
 
@@ -229,7 +232,7 @@ _EXACT_ROWS: Mapping[type, Any] = {
     GraphSnapshot: _row_of(
         GraphSnapshot,
         "services",
-        endpoints=tuple[_row_of(Endpoint), ...],  # type: ignore[misc]
+        endpoints=tuple[_row_of(Endpoint, "lease_ns", last=("lease_ns", int, 0)), ...],  # type: ignore[misc]
         last=("services", tuple[_row_of(ServiceEnd), ...], ()),  # type: ignore[misc]
     ),
     Fault: _row_of(Fault, "exit_code", "signal", "python", last=("details", _FaultDetails, _NO_DETAILS)),

@@ -11,7 +11,7 @@ import grader
 from grader.core.releases import DEFAULT, release_of
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.protocol import StudentProcess
-from grader.student_host.machine import ADDRESS, ADDRESS_6, HOST_NAME, SHELL, USER, USER_ID
+from grader.student_host.machine import ADDRESS, ADDRESS_6, BACKEND, HOST_NAME, SHELL, USER, USER_ID
 
 PACKAGE = Path(grader.__file__).resolve().parent
 
@@ -103,6 +103,7 @@ def student_environment(process: StudentProcess, home: Path) -> dict[str, str]:
         "USER": USER,
         "LOGNAME": USER,
         "SHELL": SHELL,
+        **BACKEND,
         "PYTHON_GIL": "1",  # only one thread at a time, also where Python was built without the lock
         "ROS_LOG_DIR": str(home / "log"),
         # With this, an int in a float field raises an exception with a line, instead of aborting.

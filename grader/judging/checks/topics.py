@@ -91,6 +91,9 @@ def _demand(subscription: Endpoint) -> str:
         )
     if subscription.liveliness == "manual_by_topic":
         return "manual_by_topic liveliness, which a publisher with automatic liveliness does not offer"
+    if subscription.lease_ns:
+        lease = f"a liveliness lease of {number(seconds(subscription.lease_ns))} s"
+        return f"{lease}, which a publisher without one does not offer"
     return ""
 
 

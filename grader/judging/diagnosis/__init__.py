@@ -6,6 +6,7 @@ import ast
 import logging
 from collections.abc import Mapping
 from dataclasses import field, replace
+from fractions import Fraction
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Check, Criterion, Exercise, Outcome, ProblemKind
@@ -14,6 +15,7 @@ from grader.core.submission import Submission
 from grader.core.trace import Fault, Trace, main_not_called, same_node_name
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import RandomInRange
+from grader.judging.checks.programs import NoFault
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis import (
@@ -33,7 +35,7 @@ from grader.judging.diagnosis import (
 )
 from grader.judging.diagnosis.rules import Case, Clue, Rule
 from grader.judging.diagnosis.wiring import bare_statements
-from grader.judging.findings import FAULT_KEY
+from grader.judging.findings import FAULT_KEY, fault_evidence, fault_hint, fault_sentence
 from grader.judging.source import Source, argument, chain, first_line, last_name, read, text_of
 
 #: Modules of rules, in the order of evaluation; the rules of each follow the order of the text.
@@ -92,6 +94,23 @@ def clue_for(case: Case) -> tuple[str, Clue] | None:
         if clue is not None:
             return rule.id, clue
     return None
+
+
+def hint_for(fault: Fault, trace: Trace, text: str) -> str:
+    """Return one thing to do about a fault without a rubric; empty if no cause is very likely.
+
+    Args:
+        fault: The fault.
+        trace: Its recording.
+        text: The file in which it arose, or that its process runs; empty if that is not known.
+    """
+    reason = fault_sentence(fault)
+    evidence = {FAULT_KEY: fault_evidence(fault)}
+    verdict = Verdict("fault", "", Outcome.NOT_MET, Fraction(0), Fraction(1), reason, evidence=evidence)
+    criterion = Criterion("fault", "", Fraction(1), trace.scenario, NoFault())
+    sources = {fault.process: read(fault.file or fault.process, text)} if text else {}
+    found = clue_for(Case(criterion, verdict, trace, sources, fault))
+    return found[1].hint if found is not None else fault_hint(fault)
 
 
 @dataclass(slots=True)
@@ -162,7 +181,11 @@ def _fault_of(verdict: Verdict, trace: Trace) -> Fault | None:
 
 def placed(notes: tuple[str, ...], submission: Submission, sources: Mapping[str, str]) -> tuple[str, ...]:
     """Return the notes; one that nothing calls main(), or that two nodes have one name, gets the lines to look at."""
-    files = {submission.files[name].found or name: text for name, text in sources.items()}
+    return placed_in(notes, {submission.files[name].found or name: text for name, text in sources.items()})
+
+
+def placed_in(notes: tuple[str, ...], files: Mapping[str, str]) -> tuple[str, ...]:
+    """Return notes as `placed` does, for the texts of files by their paths."""
     uncalled = {main_not_called(file): file for file in files}
     found = [_placed(uncalled[note], files[uncalled[note]]) if note in uncalled else note for note in notes]
     return tuple(_with_names(note, files) for note in found)

@@ -17,7 +17,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.time import Time
 
-__all__ = ["ApproximateTimeSynchronizer", "Cache", "SimpleFilter", "Subscriber", "TimeSynchronizer"]
+__all__ = ["ApproximateTimeSynchronizer", "Cache", "Chain", "SimpleFilter", "Subscriber", "TimeSynchronizer"]
 
 #: Queue of a subscription without QoS of its own.
 DEPTH = 10
@@ -44,7 +44,7 @@ class SimpleFilter:
 class Subscriber(SimpleFilter):
     """Passes on the messages of a subscription: `Subscriber(node, Image, "image", qos_profile=10)`."""
 
-    def __init__(self, node: Node, msg_type: Any, topic: str, qos_profile: Any = DEPTH, **options: Any) -> None:
+    def __init__(self, node: Node, msg_type: Any, topic: str, *, qos_profile: Any = DEPTH, **options: Any) -> None:
         super().__init__()
         self.node, self.msg_type, self.topic = node, msg_type, topic
         self.sub = node.create_subscription(msg_type, topic, self.callback, qos_profile, **options)
@@ -72,14 +72,13 @@ class Cache(SimpleFilter):
         allow_headerless: Whether messages without a header are kept, by the time of their arrival.
     """
 
-    def __init__(self, f: Any = None, cache_size: int = 1, allow_headerless: bool = False) -> None:
+    def __init__(self, f: Any, cache_size: int = 1, allow_headerless: bool = False) -> None:
         super().__init__()
         self.cache_msgs: list[Any] = []
         self.cache_times: list[Time] = []
         self.cache_size, self.allow_headerless = cache_size, allow_headerless
         self.lock = threading.RLock()
-        if f is not None:
-            self.connectInput(f)
+        self.connectInput(f)
 
     def connectInput(self, f: Any) -> None:
         """Keep the messages of another filter."""
@@ -101,6 +100,8 @@ class Cache(SimpleFilter):
 
     def getInterval(self, from_stamp: Time, to_stamp: Time) -> list[Any]:
         """Return the messages from one time to another, both included."""
+        if from_stamp > to_stamp:
+            raise AssertionError
         return [msg for stamp, msg in self._pairs() if from_stamp <= stamp <= to_stamp]
 
     def getElemAfterTime(self, stamp: Time) -> Any:
@@ -133,6 +134,50 @@ class Cache(SimpleFilter):
     def getLast(self) -> Any:
         """Return the newest message, or None."""
         return self.cache_msgs[-1] if self.cache_msgs else None
+
+
+class Chain(SimpleFilter):
+    """Passes messages through filters, one after the other.
+
+    Args:
+        message_filter: The filter whose messages go in; None to give them to `add`.
+    """
+
+    def __init__(self, message_filter: Any = None) -> None:
+        super().__init__()
+        self.incoming_connection: int | None = None
+        self._filters: list[Any] = []
+        if message_filter is not None:
+            self.connectInput(message_filter)
+
+    def connectInput(self, message_filter: Any) -> None:
+        """Take the messages of another filter."""
+        if self.incoming_connection is not None:
+            raise RuntimeError("Already connected")
+        self.incoming_connection = message_filter.registerCallback(self.add)
+
+    def add(self, message: Any) -> None:
+        """Give a message to the first filter, or pass it on if there is none."""
+        if self._filters:
+            self._filters[0].add(message)
+        else:
+            self.signalMessage(message)
+
+    def addFilter(self, message_filter: Any) -> None:
+        """Put a filter behind the last one."""
+        number = len(self._filters)
+        self._filters.append(message_filter)
+        message_filter.registerCallback(lambda *msgs: self._pass_on(number, msgs))
+
+    def _pass_on(self, number: int, msgs: tuple[Any, ...]) -> None:
+        if number + 1 < len(self._filters):
+            self._filters[number + 1].add(*msgs)
+        else:
+            self.signalMessage(*msgs)
+
+    def getFilter(self, index: int) -> Any:
+        """Return a filter by its place."""
+        return self._filters[index]
 
 
 class TimeSynchronizer(SimpleFilter):
@@ -176,7 +221,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
     Args:
         fs: The filters.
         queue_size: How many messages of each wait for the others.
-        slop: The largest difference, in seconds.
+        slop: The stamps of a set differ by less than this, in seconds.
         allow_headerless: Whether messages without a header count by the time of their arrival.
         sync_arrival_time: Whether all messages count by the time of their arrival.
     """
@@ -208,7 +253,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
                 else sorted((t for t in queue if abs(t - own_ns) <= slop_ns), key=lambda t: abs(t - own_ns))
                 for queue in self.queues
             ]
-            chosen = next((times for times in itertools.product(*near) if max(times) - min(times) <= slop_ns), None)
+            chosen = next((times for times in itertools.product(*near) if max(times) - min(times) < slop_ns), None)
             found = [queue.pop(time) for queue, time in zip(self.queues, chosen, strict=True)] if chosen else None
         if found:
             self.signalMessage(*found)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import bisect
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -150,14 +150,11 @@ def _ns(time: Any) -> int:
     return int(time.nanoseconds)
 
 
-def _checked(frame: str, argument: str) -> str:
+def _invalid(frame: str) -> str:
+    """Return why a text is no name of a frame; empty if it is one."""
     if not frame:
-        raise InvalidArgumentException(f"Invalid argument passed to {argument} in tf2: frame_id cannot be empty")
-    if frame.startswith("/"):
-        raise InvalidArgumentException(
-            f"Invalid argument \"{frame}\" passed to {argument} in tf2: frame_ids cannot start with a '/'"
-        )
-    return frame
+        return "in tf2 frame_ids cannot be empty"
+    return "in tf2 frame_ids cannot start with a '/'" if frame.startswith("/") else ""
 
 
 class BufferCore:
@@ -190,12 +187,10 @@ class BufferCore:
         shift, turn = transform.transform.translation, transform.transform.rotation
         translation = np.array([shift.x, shift.y, shift.z], dtype=float)
         rotation = np.array([turn.w, turn.x, turn.y, turn.z], dtype=float)
-        problem = _problem(parent, child, translation, rotation)
-        if problem:
-            print(
-                f'Error: ignoring transform for child_frame_id "{child}" from authority "{authority}" {problem}',
-                file=sys.stderr,
-            )
+        problems = list(_problems(parent, child, authority, translation, rotation))
+        for problem in problems:
+            print(f"Error:   {problem}", file=sys.stderr)
+        if problems:
             return
         sample = _Sample(_ns(transform.header.stamp), parent, translation, rotation / np.linalg.norm(rotation))
         with self._lock:
@@ -219,6 +214,8 @@ class BufferCore:
             time: When; 0 is the latest time at which all frames between the two are known.
         """
         with self._lock:
+            if target_frame == source_frame:  # also for a frame that does not exist
+                return _message(_ns(time) or self._latest_ns(target_frame), target_frame, source_frame, *_nothing())
             target, source = self._known(target_frame, "target_frame"), self._known(source_frame, "source_frame")
             stamp_ns = _ns(time) or self._latest_common_ns(target, source)
             translation, rotation = self._between(target, source, stamp_ns)
@@ -229,6 +226,8 @@ class BufferCore:
     ) -> TransformStamped:
         """Return the transform between two frames at two times, over a frame that does not move in between."""
         with self._lock:
+            self._known(target_frame, "target_frame")
+            self._known(source_frame, "source_frame")
             fixed = self._known(fixed_frame, "fixed_frame")
             there = self.lookup_transform_core(fixed, source_frame, source_time)
             back = self.lookup_transform_core(target_frame, fixed, target_time)
@@ -237,18 +236,31 @@ class BufferCore:
 
     def can_transform_core(self, target_frame: str, source_frame: str, time: Any) -> tuple[bool, str]:
         """Return whether a transform is available, and why not."""
-        try:
-            self.lookup_transform_core(target_frame, source_frame, time)
-        except TransformException as error:
-            return False, str(error)
-        return True, ""
+        if target_frame == source_frame:
+            return True, ""
+        return self._answer(
+            {"target_frame": target_frame, "source_frame": source_frame},
+            lambda: self.lookup_transform_core(target_frame, source_frame, time),
+        )
 
     def can_transform_full_core(
         self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str
     ) -> tuple[bool, str]:
         """Return whether a transform between two times is available, and why not."""
+        return self._answer(
+            {"target_frame": target_frame, "source_frame": source_frame, "fixed_frame": fixed_frame},
+            lambda: self.lookup_transform_full_core(target_frame, target_time, source_frame, source_time, fixed_frame),
+        )
+
+    def _answer(self, frames: Mapping[str, str], look: Callable[[], object]) -> tuple[bool, str]:
+        """Return whether a look-up succeeds, and why not, after a look at its arguments."""
+        names = self._names()
+        for argument, frame in frames.items():
+            why = _invalid(frame) or ("" if frame in names else "frame does not exist")
+            if why:
+                return False, f'Invalid frame ID "{frame}" passed to canTransform argument {argument} - {why}'
         try:
-            self.lookup_transform_full_core(target_frame, target_time, source_frame, source_time, fixed_frame)
+            look()
         except TransformException as error:
             return False, str(error)
         return True, ""
@@ -291,8 +303,12 @@ class BufferCore:
             return {*self._frames, *(sample.parent for frame in self._frames.values() for sample in frame.samples[-1:])}
 
     def _known(self, frame: str, argument: str) -> str:
-        if _checked(frame, f"lookupTransform argument {argument}") not in self._names():
-            raise LookupException(f'"{frame}" passed to lookupTransform argument {argument} does not exist. ')
+        argument = f"lookupTransform argument {argument}"
+        why = _invalid(frame)
+        if why:
+            raise InvalidArgumentException(f'Invalid argument "{frame}" passed to {argument} - {why}')
+        if frame not in self._names():
+            raise LookupException(f'"{frame}" passed to {argument} does not exist. ')
         return frame
 
     def _ancestors(self, frame: str, stamp_ns: int) -> list[str]:
@@ -314,9 +330,13 @@ class BufferCore:
         if shared is None:
             raise ConnectivityException(
                 f"Could not find a connection between '{target}' and '{source}' because they are not part of the same "
-                "tree. Tf has two or more unconnected trees."
+                "tree.Tf has two or more unconnected trees."
             )
         return up[: up.index(shared)], down[: down.index(shared)]
+
+    def _latest_ns(self, name: str) -> int:
+        frame = self._frames.get(name)
+        return 0 if frame is None or frame.static else frame.samples[-1].stamp_ns
 
     def _latest_common_ns(self, target: str, source: str) -> int:
         up, down = self._common(target, source, 0)
@@ -334,28 +354,36 @@ class BufferCore:
 
     def _upwards(self, frames: Sequence[str], stamp_ns: int) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the transform from the first of some frames, each the child of the next, to the parent of the last."""
-        found = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+        found = _nothing()
         for name in frames:
             sample = self._frames[name].at(stamp_ns)
             found = _chained((sample.translation, sample.rotation), found)
         return found
 
 
-def _problem(parent: str, child: str, translation: NDArray[Any], rotation: np.ndarray) -> str:
-    """Return why a transform makes no sense; empty if it does."""
+def _problems(
+    parent: str, child: str, authority: str, translation: NDArray[Any], rotation: NDArray[Any]
+) -> Iterator[str]:
+    """Yield why a transform makes no sense, each with the word that tf2 begins it with."""
+    whose = f'authority "{authority}"'
+    given = f'Ignoring transform for child_frame_id "{child}" from {whose} because of'
+    turn = " ".join(f"{part:f}" for part in rotation[[1, 2, 3, 0]])
     if parent == child:
-        return "because it has the same frame_id and child_frame_id"
-    if not child:
-        return "because child_frame_id is not set"
-    if not parent:
-        return "because frame_id is not set"
-    if not (np.isfinite(translation).all() and np.isfinite(rotation).all()):
-        return "because of a nan value in the transform"
-    if abs(float(np.dot(rotation, rotation)) - 1) > NORMALIZED:
-        return (
-            f"because of an invalid quaternion in the transform ({', '.join(f'{x:f}' for x in rotation[[1, 2, 3, 0]])})"
+        yield (
+            f"TF_SELF_TRANSFORM: Ignoring transform from {whose} with frame_id and  child_frame_id "
+            f'"{child}" because they are the same'
         )
-    return ""
+    if not child:
+        yield f"TF_NO_CHILD_FRAME_ID: Ignoring transform from {whose} because child_frame_id not set "
+    if not parent:
+        yield (
+            f'TF_NO_FRAME_ID: Ignoring transform with child_frame_id "{child}"  from {whose} because frame_id not set'
+        )
+    if np.isnan(translation).any() or np.isnan(rotation).any():
+        shift = " ".join(f"{part:f}" for part in translation)
+        yield f"TF_NAN_INPUT: {given} a nan value in the transform ({shift}) ({turn})"
+    if not abs(float(np.dot(rotation, rotation)) - 1) < NORMALIZED:
+        yield f"TF_DENORMALIZED_QUATERNION: {given} an invalid quaternion in the transform ({turn})"
 
 
 Parts = tuple[NDArray[Any], NDArray[Any]]
@@ -365,6 +393,11 @@ def _chained(outer: Parts, inner: Parts) -> Parts:
     """Return the transform that applies the inner one first."""
     translation = outer[0] + transforms3d.quaternions.rotate_vector(inner[0], outer[1])
     return translation, transforms3d.quaternions.qmult(outer[1], inner[1])
+
+
+def _nothing() -> Parts:
+    """Return the transform that changes nothing."""
+    return np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def _inverse(parts: Parts) -> Parts:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import time as clocks
 from collections.abc import Callable
 from typing import Any
 
-import rclpy
 from geometry_msgs.msg import TransformStamped
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.task import Future
 from rclpy.time import Time
 from tf2_msgs.srv import FrameGraph
-from tf2_py import BufferCore
+from tf2_py import BufferCore, TransformException
 
 from .buffer_interface import BufferInterface
 
@@ -38,7 +38,6 @@ class Buffer(BufferCore, BufferInterface):
         BufferCore.__init__(self, cache_time)
         BufferInterface.__init__(self)
         self._waiting: list[Callable[[], None]] = []
-        self._clock = node.get_clock() if node is not None else Clock(clock_type=ClockType.ROS_TIME)
         if node is not None:
             self.srv = node.create_service(FrameGraph, "tf2_frames", self._describe)
 
@@ -127,30 +126,32 @@ class Buffer(BufferCore, BufferInterface):
         return found if return_debug_tuple else found[0]
 
     def _waited(self, look: Callable[[], tuple[bool, str]], timeout: Duration) -> tuple[bool, str]:
-        found = look()
-        start = self._clock.now()
-        while not found[0] and start <= self._clock.now() < start + timeout and rclpy.ok():
+        """Look until it is found, in the time of the system, also where a node follows a simulation."""
+        clock = Clock()
+        start, found = clock.now(), look()
+        while not found[0] and start <= clock.now() < start + timeout:
             clocks.sleep(LOOK_S)
             found = look()
         return found
 
     def wait_for_transform_async(self, target_frame: str, source_frame: str, time: Time) -> Future:
-        """Return a future that is done, with the result True, once a transform is available."""
-        return self._future(lambda: self.can_transform_core(target_frame, source_frame, time)[0])
+        """Return a future that is done, with the transform as its result, once it is available."""
+        return self._future(lambda: self.lookup_transform_core(target_frame, source_frame, time))
 
     def wait_for_transform_full_async(
         self, target_frame: str, target_time: Time, source_frame: str, source_time: Time, fixed_frame: str
     ) -> Future:
         """Return a future that is done once a transform between two times is available."""
         asked = (target_frame, target_time, source_frame, source_time, fixed_frame)
-        return self._future(lambda: self.can_transform_full_core(*asked)[0])
+        return self._future(lambda: self.lookup_transform_full_core(*asked))
 
-    def _future(self, is_available: Callable[[], bool]) -> Future:
+    def _future(self, look_up: Callable[[], TransformStamped]) -> Future:
         future: Future = Future()
 
         def look() -> None:
-            if not future.done() and is_available():
-                future.set_result(True)
+            if not future.done():
+                with contextlib.suppress(TransformException):
+                    future.set_result(look_up())
 
         def forget(_: Future) -> None:
             if look in self._waiting:

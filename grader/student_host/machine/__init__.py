@@ -9,6 +9,8 @@ from __future__ import annotations
 import contextlib
 import functools
 import grp
+import importlib.machinery
+import importlib.util
 import os
 import platform
 import pwd
@@ -34,6 +36,16 @@ RELEASE, VERSION = "6.8.0-generic", "#1 SMP"
 NODE = 0x02_00_00_00_00_01
 UMASK = 0o022
 #: Signals that Python ignores in every process.
+#: The variable that chooses matplotlib's backend, and its value. Its own choice would be a backend without windows.
+BACKEND = {"MPLBACKEND": "module://matplotlib.backends.backend_tkagg"}
+_FOLDER = os.path.dirname(os.path.abspath(__file__))
+#: What `backend_NAME.py` begins with for those that open windows.
+_TOOLKITS = ("gtk", "macosx", "qt", "tk", "wx")
+#: What OpenCV does with windows and returns nothing.
+_WINDOW_FUNCTIONS = (
+    *("imshow", "namedWindow", "destroyWindow", "destroyAllWindows", "moveWindow", "resizeWindow", "setWindowTitle"),
+    *("setWindowProperty", "createTrackbar", "setTrackbarPos", "setTrackbarMin", "setTrackbarMax", "setMouseCallback"),
+)
 _IGNORED_BY_PYTHON = frozenset({signal.SIGPIPE, signal.SIGXFSZ})
 
 
@@ -47,6 +59,7 @@ def install() -> None:
     _install_host()
     _install_names()
     _install_folders()
+    sys.meta_path.insert(0, Display())
 
 
 def even_inherited() -> None:
@@ -222,3 +235,79 @@ def _install_folders() -> None:
     accessor = getattr(pathlib, "_NormalAccessor", None)  # Python 3.10 keeps its own references
     if accessor is not None:
         accessor.listdir, accessor.scandir = staticmethod(sorted_listdir), staticmethod(sorted_scandir)
+
+
+class Display:
+    """Finds the modules that open windows, or look for the fonts of the machine, and lets them do without either."""
+
+    def find_spec(self, name: str, path: Any = None, target: Any = None) -> Any:
+        """Return the spec of one of these modules; None for any other."""
+        if name == "cv2":
+            return self._changed(name, path, target, _without_windows)
+        if not name.startswith("matplotlib."):
+            return None
+        if name == "matplotlib.font_manager":
+            return self._changed(name, path, target, None)
+        package, _, last = name.rpartition(".backend_")
+        if package != "matplotlib.backends" or not last.startswith(_TOOLKITS) or last.endswith("cairo"):
+            return None
+        return importlib.util.spec_from_file_location(name, os.path.join(_FOLDER, "windows.py"))
+
+    def _changed(self, name: str, path: Any, target: Any, change: Callable[[Any], None] | None) -> Any:
+        """Return the spec of a module as others find it, whose import changes something."""
+        others = (finder for finder in sys.meta_path if finder is not self and hasattr(finder, "find_spec"))
+        spec = next((found for other in others if (found := other.find_spec(name, path, target)) is not None), None)
+        if spec is None or spec.loader is None:
+            return spec
+        execute = spec.loader.exec_module
+
+        def exec_module(module: ModuleType) -> None:
+            if change is None:
+                _with_own_fonts(lambda: execute(module))
+                return
+            execute(module)
+            change(sys.modules.get(name, module))
+
+        with contextlib.suppress(AttributeError):
+            spec.loader.exec_module = exec_module  # type: ignore[method-assign]
+        return spec
+
+
+def _with_own_fonts(work: Callable[[], None]) -> None:
+    """Import matplotlib's list of fonts without those of this system, which are others on each machine."""
+    import subprocess
+
+    started, walked = subprocess.check_output, os.walk
+
+    def check_output(*arguments: Any, **named: Any) -> Any:
+        raise FileNotFoundError(2, os.strerror(2), "fc-list")
+
+    def walk(top: Any, *arguments: Any, **named: Any) -> Any:
+        return walked(top, *arguments, **named) if "mpl-data" in str(top) else iter(())
+
+    subprocess.check_output, os.walk = check_output, walk
+    try:
+        work()
+    finally:
+        subprocess.check_output, os.walk = started, walked
+
+
+def _without_windows(cv2: Any) -> None:
+    """Let OpenCV open windows that nobody sees, in which nobody types: its build for servers has none, and raises."""
+    import time
+
+    def wait_key(delay: int = 0) -> int:
+        while delay <= 0:
+            time.sleep(0.1)
+        time.sleep(delay / 1000)
+        return -1
+
+    def nothing(*arguments: Any, **named: Any) -> None:
+        pass
+
+    for name in _WINDOW_FUNCTIONS:
+        setattr(cv2, name, nothing)
+    cv2.waitKey = cv2.waitKeyEx = wait_key
+    cv2.pollKey = lambda: -1
+    cv2.startWindowThread = cv2.getTrackbarPos = lambda *arguments: 0
+    cv2.getWindowProperty = lambda *arguments: 1.0

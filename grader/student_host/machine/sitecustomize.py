@@ -5,7 +5,7 @@ import sys
 
 _FOLDER = os.path.dirname(os.path.abspath(__file__))
 _PATH = os.path.join(_FOLDER, "__init__.py")
-_names = {"__name__": "machine"}
+_names = {"__name__": "machine", "__file__": _PATH}
 with open(_PATH, "rb") as _source:
     exec(compile(_source.read(), _PATH, "exec"), _names)  # noqa: S102 - as a module, it could hide the student's own
 _names["install"]()  # type: ignore[operator]

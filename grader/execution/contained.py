@@ -20,7 +20,7 @@ def run_contained(module: str, limits: Mapping[str, object], given: BinaryIO, ou
 
     Args:
         module: Its dotted name; it takes the limits as JSON, as the only argument.
-        limits: See `grader.submissions.confinement.confine`.
+        limits: See `grader.execution.confinement.confine`.
         given: Its standard input, a file.
         out: Its standard output, a file.
 
