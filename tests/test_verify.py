@@ -51,6 +51,31 @@ DIFFERING = {
         "kernel",
     ),
 }
+#: Nodes in one executor, which keeps them in a set, with timers that are due at the same instants.
+SEVERAL_NODES = """
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class One(Node):
+    def __init__(self, number):
+        super().__init__(f"node_{number}")
+        self.publisher = self.create_publisher(String, f"/note_{number}", 10)
+        self.create_timer(0.1, self.tick)
+
+    def tick(self):
+        self.get_logger().info("tick")
+        self.publisher.publish(String(data=self.get_name()))
+
+
+rclpy.init()
+executor = SingleThreadedExecutor()
+for node in {One(number) for number in range(9)}:
+    executor.add_node(node)
+executor.spin()
+"""
 #: What repeats although it is drawn, or differs between machines.
 REPEATING = {
     "plain": program(),
@@ -79,6 +104,11 @@ REPEATING = {
     "two_topics_at_once": program(
         begin="self.others = [self.create_publisher(Twist, f'/x{n}', 10) for n in (3, 1, 2)]",
         each="[other.publish(message) for other in self.others]",
+    ),
+    "several_nodes": SEVERAL_NODES,
+    "thread_that_raises": program(
+        imports="import threading",
+        begin="threading.Thread(target=int, args=('no number',)).start()",
     ),
     "threads": program(
         imports="import threading, time",

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from . import entry, launch_files, machine, originals
-from .faults import Describer
+from .faults import Describer, report_threads
 from .link import Link, Log
 from .outside import install_alarms, install_processes
 from .quick_imports import import_without_needless
@@ -189,12 +189,7 @@ def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | Wal
 
     from .wall import WallTime
 
-    def excepthook(args: Any) -> None:
-        if args.exc_value is not None and not issubclass(args.exc_type, SystemExit):
-            report_fault(args.exc_value)
-        originals.excepthook(args)
-
-    threading.excepthook = excepthook
+    report_threads(report_fault)
     return WallTime(link)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import pytest
@@ -138,6 +138,16 @@ def test_measured_times_of_the_grader_do_not_count() -> None:
     """They decide about another recording, which shows whether they matter."""
     first = trace(*USUAL)
     assert first_difference(first, replace(first, may_drift=True, most_starved_ns=5, incomplete=True), {}) is None
+
+
+def test_every_part_of_a_recording_is_compared_or_left_out_on_purpose() -> None:
+    """A new field of a trace has to be put here, and into the comparison if it should repeat."""
+    compared = {"observations", "clock_reason", "stop_ns", "starts", "written", "left_out", "newer", "notes", "reached"}
+    same_by_plan = {"scenario", "clock"}
+    failures = {"harness_problem", "suspected", "author_mistake"}  # then nothing is compared
+    measured = {"may_drift", "most_starved_ns", "incomplete"}
+    names = {field.name for field in fields(Trace) if field.init}
+    assert names == compared | same_by_plan | failures | measured
 
 
 def test_the_place_of_a_difference() -> None:
