@@ -63,6 +63,11 @@ class Taken:
     sent_ns: int = 0  # when it was sent, by the system clock; 0 if that is not known
 
 
+def in_order(messages: Iterable[Taken]) -> list[Taken]:
+    """Sort messages of one instant by topic and type, because which topic's arrive first is up to the middleware."""
+    return sorted(messages, key=lambda taken: (taken.topic, taken.type))
+
+
 class Observer:
     """A node in its own context, and a few more nodes if topics have several types.
 
@@ -328,7 +333,7 @@ class Observer:
             quiet = 0 if taken else quiet + 1
             if len(found) > DEPTH:
                 break
-        return found
+        return in_order(found)
 
     def subscribe_to_logs(self) -> None:
         """Subscribe to /rosout; its publishers are latched, so earlier log records arrive as well."""

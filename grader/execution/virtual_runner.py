@@ -16,7 +16,7 @@ from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Observation, Of
 from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, passes, readers_of
 from grader.execution.ending import ending
 from grader.execution.exchanges import PlannedCalls
-from grader.execution.observer import Observer
+from grader.execution.observer import Observer, Taken, in_order
 from grader.execution.plan import Plan
 from grader.execution.runner import Runner
 from grader.execution.stimuli import APPEARANCES, AddServer, Ask, Event, RemoveServer
@@ -33,6 +33,8 @@ MOST_REPORTS, CLAIMS = 10_000, 1_000
 #: Nodes may take messages so often while none of them lets time pass. After HOPS, each time also takes as long as a
 #: message needs between two processes; after MOST_HOPS they answer each other without end, and the run is over.
 HOPS, HOP_NS, MOST_HOPS = 200, 250_000, 4_000
+#: More messages of one report are not held back until all of them have arrived.
+MOST_ARRIVED = 1_000
 #: Reasons for recording on the wall clock.
 THREADS = "the node's threads wait for each other without blocking"
 OUTSIDE = "the node waits for something that is neither ROS nor time"
@@ -277,17 +279,26 @@ class VirtualRunner(Runner):
         expected = Counter({topic: n for topic, n in sent.items() if self._observer.reads(topic)})
         if not expected:
             return
-
+        arrived: list[Taken] = []
         first = Counter(early)
 
         def complete() -> bool:
-            for message in self._observer.take():
-                self._record(self._now_ns, message, early=first[message.topic] > 0)
-                first[message.topic] -= 1
-                expected[message.topic] -= 1
+            taken = self._observer.take()
+            arrived.extend(taken)
+            expected.subtract(message.topic for message in taken)
+            if len(arrived) > MOST_ARRIVED:
+                record_arrived()
             return bool(self._recorder.full) or all(count <= 0 for count in expected.values())
 
-        if not self._discovery.patience.wait(complete):
+        def record_arrived() -> None:
+            for message in in_order(arrived):
+                self._record(self._now_ns, message, early=first[message.topic] > 0)
+                first[message.topic] -= 1
+            arrived.clear()
+
+        in_time = self._discovery.patience.wait(complete)
+        record_arrived()
+        if not in_time:
             for topic in sorted(t for t, n in expected.items() if n > 0):
                 self._recorder.note(f"some messages on {topic[:NAME_CHARACTERS]} did not arrive")
 

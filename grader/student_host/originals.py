@@ -3,7 +3,6 @@
 import _thread
 import contextlib
 import os
-import threading
 import time
 from collections.abc import Callable
 
@@ -16,7 +15,6 @@ get_ident = _thread.get_ident
 get_native_id = _thread.get_native_id
 start_new_thread = _thread.start_new_thread
 urandom = os.urandom
-excepthook = threading.excepthook
 exit_now = os._exit
 kill = os.kill
 

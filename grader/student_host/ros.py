@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import inspect
+import itertools
 import os
 import signal
 import sys
@@ -203,6 +204,26 @@ def _watch_jumps(clock: Clock, clocks: RosClocks, threshold: JumpThreshold, **ca
 def _set(clock: Clock, time: Time) -> None:
     with contextlib.suppress(_rclpy.InvalidHandle), clock.handle:
         clock.handle.set_ros_time_override(time._time_handle)
+
+
+def install_order() -> None:
+    """Give sets of nodes and of clocks the same order in each run: their hashes are addresses otherwise.
+
+    An executor keeps its nodes in a set, whose order decides whose callback runs first at one instant, and a node with
+    simulated time the clocks that it sets.
+    """
+    known: dict[int, tuple[int, weakref.ref[Any]]] = {}
+    numbers = itertools.count(1)
+
+    def numbered(thing: Any) -> int:
+        """Return a number by the order in which things are first put into a set."""
+        key = id(thing)
+        if key not in known:
+            known[key] = next(numbers), weakref.ref(thing, lambda _: known.pop(key, None))
+        return known[key][0]
+
+    for kind in (rclpy.node.Node, rclpy.clock.Clock):
+        kind.__hash__ = numbered
 
 
 def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock) -> None:

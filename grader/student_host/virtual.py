@@ -106,6 +106,7 @@ class VirtualTime:
         self._ledger = Ledger()
         self._clocks = ros.RosClocks(self.clock)
         self.clock.real_ns = ros.system_ns
+        ros.install_order()
         ros.install_clocks(self._clocks, self.scheduler, self.clock)
         ros.install_wait_sets(self.scheduler, self.clock, self._ledger)
         ros.install_traffic(
