@@ -41,6 +41,9 @@ ARRIVAL_S = 1.0
 ONE_WAIT_NS = 10_000_000
 #: How long, in real time, to wait until a counterpart has disappeared.
 DEPARTURE_S = 0.5
+#: A publisher that was created before so much work has been discovered, although virtual time stands still: where other
+#: nodes run already, this takes some milliseconds.
+DISCOVERED_NS = 200_000_000
 #: How long, in real time, contexts may take to shut down at a signal.
 SHUTDOWN_S = 1.0
 #: Checks whether a context is valid, without counting as a look, which would let time pass.
@@ -61,6 +64,10 @@ class Ledger:
 
     def __init__(self) -> None:
         self.sent: Counter[str] = Counter()
+        #: How many of them were sent before anybody could have discovered their publisher.
+        self.early: Counter[str] = Counter()
+        #: For each publisher that was created since the program last waited, how much it had worked then.
+        self._fresh: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
         #: The services that every node has, as long as nobody has called them: waiting for them would take a third of
         #: an executor's time. How many are waited for by now; a wait set that was made before lacks the latest.
         self._left_out: weakref.WeakSet[Any] = weakref.WeakSet()
@@ -144,9 +151,26 @@ class Ledger:
         del reference
         self.remove()
 
-    def note_sent(self, channel: str, handle: Any) -> None:
-        """Count one message, and keep its sender alive until the message has arrived."""
+    def note_created(self, publisher: Any, work_ns: int) -> None:
+        """Note a new publisher, unless who discovers it later gets its messages as well."""
+        if not is_latched(publisher):
+            self._fresh[publisher.handle] = work_ns
+
+    def note_waited(self) -> None:
+        """Note that the program waits, or knows of the graph: whoever is there has discovered its publishers."""
+        self._fresh.clear()
+
+    def note_sent(self, channel: str, handle: Any, work_ns: int) -> None:
+        """Count one message, and keep its sender alive until the message has arrived.
+
+        Args:
+            channel: Where it is sent.
+            handle: The handle of its sender.
+            work_ns: How much processor time the program has used so far.
+        """
         self.sent[channel] += 1
+        if handle in self._fresh and work_ns - self._fresh[handle] < DISCOVERED_NS:
+            self.early[channel] += 1
         self._sending[id(handle)] = handle
 
     @property
@@ -495,6 +519,11 @@ def service_name(endpoint: Any) -> str:
 
 def _channel(receiver: Any) -> str:
     return str(receiver.topic_name) if hasattr(receiver, "topic_name") else service_name(receiver)
+
+
+def is_latched(publisher: Any) -> bool:
+    """Return whether who discovers a publisher later gets its last messages as well."""
+    return bool(_qos(publisher.qos_profile, "publisher")["latched"])
 
 
 def asks_for_best(values: Iterable[Any]) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import inspect
+import itertools
 import os
 import signal
 import sys
@@ -203,6 +204,26 @@ def _watch_jumps(clock: Clock, clocks: RosClocks, threshold: JumpThreshold, **ca
 def _set(clock: Clock, time: Time) -> None:
     with contextlib.suppress(_rclpy.InvalidHandle), clock.handle:
         clock.handle.set_ros_time_override(time._time_handle)
+
+
+def install_order() -> None:
+    """Give sets of nodes and of clocks the same order in each run: their hashes are addresses otherwise.
+
+    An executor keeps its nodes in a set, whose order decides whose callback runs first at one instant, and a node with
+    simulated time the clocks that it sets.
+    """
+    known: dict[int, tuple[int, weakref.ref[Any]]] = {}
+    numbers = itertools.count(1)
+
+    def numbered(thing: Any) -> int:
+        """Return a number by the order in which things are first put into a set."""
+        key = id(thing)
+        if key not in known:
+            known[key] = next(numbers), weakref.ref(thing, lambda _: known.pop(key, None))
+        return known[key][0]
+
+    for kind in (rclpy.node.Node, rclpy.clock.Clock):
+        kind.__hash__ = numbered
 
 
 def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock) -> None:
@@ -472,12 +493,13 @@ def replace_log(wrap: Callable[[Callable[..., Any]], Callable[..., Any]]) -> Non
     _rclpy.rclpy_logging_rcutils_log = wrap(_rclpy.rclpy_logging_rcutils_log)
 
 
-def install_traffic(
+def install_traffic(  # noqa: PLR0913 - all that the traffic depends on
     ledger: Ledger,
     clock: VirtualClock,
     settle: Callable[[], None],
     leave: Callable[[], None],
     give_up: Callable[[], None],
+    work_ns: Callable[[], int],
 ) -> None:
     """Count what is published and taken, and let the grader match every endpoint before it is used.
 
@@ -487,6 +509,7 @@ def install_traffic(
         settle: Yields to the grader at the same instant.
         leave: The same, but returns only after all sent messages have arrived; called before a sender is destroyed.
         give_up: Called for an endpoint whose events the middleware times on the real clock.
+        work_ns: Returns how much processor time the program has used.
     """
     ledger.events.install(BACKGROUND)
     _install_endpoints(ledger, settle, leave, give_up)
@@ -503,11 +526,13 @@ def install_traffic(
         if ledger.is_elsewhere(handle):
             return send()
         clock.busy_sending()
-        ledger.note_sent(name, handle)
+        early = ledger.early[name]
+        ledger.note_sent(name, handle, work_ns())
         try:
             return send()
         except BaseException:
             ledger.sent[name] -= 1  # nothing was sent, e.g. because the context was shut down
+            ledger.early[name] = early
             raise
 
     publish = rclpy.publisher.Publisher.publish
@@ -529,6 +554,14 @@ def install_traffic(
     def counted_respond(self: Any, response: Any, header: Any) -> Any:
         return counted(f"response {service_name(self)}", self.handle, lambda: respond(self, response, header))
 
+    make = rclpy.publisher.Publisher.__init__
+
+    @functools.wraps(make)
+    def made(self: Any, *args: Any, **kwargs: Any) -> None:
+        make(self, *args, **kwargs)
+        ledger.note_created(self, work_ns())
+
+    rclpy.publisher.Publisher.__init__ = made
     rclpy.publisher.Publisher.publish = counted_publish
     rclpy.client.Client.call_async = counted_call
     rclpy.service.Service.send_response = counted_respond
@@ -717,6 +750,21 @@ def see_whole_graph(ledger: Ledger, settle: Callable[[], None]) -> None:
         ledger.sees_graph = ledger.changed = True
     if ledger.changed:
         settle()
+    ledger.note_waited()
+
+
+def _note_found(ledger: Ledger, cls: Any, name: str) -> None:
+    """Note that a program has found a server: on a real clock, this takes the time in which it is discovered itself."""
+    look = getattr(cls, name)
+
+    @functools.wraps(look)
+    def looked(self: Any, *args: Any, **kwargs: Any) -> Any:
+        found = look(self, *args, **kwargs)
+        if found:
+            ledger.note_waited()
+        return found
+
+    setattr(cls, name, looked)
 
 
 def install_departures(leave: Callable[[], None], remove: Callable[[], None] = lambda: None) -> None:
@@ -831,8 +879,10 @@ def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None
     looking(rclpy.context.Context, "ok", lambda: None)
     looking(rclpy.task.Future, "done", lambda: None)
     looking(rclpy.client.Client, "service_is_ready", at_the_graph)
+    _note_found(ledger, rclpy.client.Client, "service_is_ready")
     _install_counts(clock, at_the_graph)
     looking(_rclpy.ActionClient, "is_action_server_available", at_the_graph)
+    _note_found(ledger, _rclpy.ActionClient, "is_action_server_available")
     for name in GRAPH_LOOKS:
         looking(rclpy.node.Node, name, lambda: at_the_graph(whole=True))
 
