@@ -146,6 +146,7 @@ PROGRAMS = {
             executor.add_node(each)
             threading.Thread(target=executor.spin, daemon=True).start()
         client = node.create_client(Trigger, "/count_up")
+        client.wait_for_service()  # a call before that would be lost on the wall clock
         other.create_timer(0.6, lambda: say("timer", client.call(Trigger.Request()).message))
         for _ in range(4):
             say("main", client.call(Trigger.Request()).message)
