@@ -283,10 +283,6 @@ def _how_to_install(executable: str, submission: Submission) -> str:
     package, name = executable.split("/")
     here = [project for project in submission.projects if package in ("*", project.name)]
     by_cmake = bool(here) and all(project.by_cmake for project in here)
-    if any(name == other for project in here for other, _ in project.unrunnable):
-        return (
-            f"install {name} so that it can be run: with install(PROGRAMS ...), or executable and with a first line #!"
-        )
     if by_cmake or name.endswith(".py"):
         file = name if name.endswith(".py") else f"{name}.py"
         rename = "" if file == name else f" RENAME {name}"
