@@ -90,6 +90,9 @@ class Message:
     type: str  # e.g. `geometry_msgs/msg/Twist`
     value: Mapping[str, Any]  # fields as plain JSON values, nested by name; NaN and infinities are floats
     cdr: bytes = b""  # the bytes as they came over the wire
+    # Whether it was sent as soon as its publisher existed, before any subscription could have discovered it, and not
+    # transient local: outside of the grader nobody would have heard it
+    before_discovery: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,6 +89,8 @@ def observation_to_json(observation: Observation) -> list[Any]:
     row = [TAGS[type(observation)], *plain(observation)]
     if isinstance(observation, Fault):
         return [*row[:-_DETAILS], row[-_DETAILS:]]
+    if isinstance(observation, Message):
+        return without_last(row, False)  # noqa: FBT003 - the value
     if isinstance(observation, GraphSnapshot):
         row[_ENDPOINTS] = [without_last(end, 0) for end in row[_ENDPOINTS]]
         return without_last(row, [])

@@ -138,7 +138,8 @@ def _for_what_is_lacking(
     lack = lacking_package(trace, scenario.processes, sources) if lost else None
     if lack is None:
         return answer
-    text = f"{fault_place(lack.fault)}: {lack.name} is a package of ROS 2 that is not installed where this was graded"
+    kind = "part" if "." in lack.name else "package"
+    text = f"{fault_place(lack.fault)}: {lack.name} is a {kind} of ROS 2 that is not installed where this was graded"
     hint = f"grade again where {lack.name} is installed, or leave the import out if the program does not need it"
     if lack.name in EXTRAS:
         text = f"{fault_place(lack.fault)}: {lack.name} comes with ROS 2 and is not installed where this was graded"
