@@ -11,7 +11,7 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import SubmissionError
 from grader.core.projects import Project
 from grader.core.submission import Submission
-from grader.execution.executables import CMAKE_LISTS, executables, find_executables
+from grader.execution.executables import executables, find_executables
 from grader.submissions.collected import Collected, first_of, listed
 from grader.submissions.projects import read_projects
 from grader.submissions.submission import collect_submission, stage_collected, stage_submission
@@ -102,13 +102,16 @@ def _of_folder(path: Path) -> Targets:
     found = tuple(Target(one.words, root) for one in known if one.file is not None)
     if not found:
         text = f"{path}: expected a package or workspace with executables, found none"
-        raise SubmissionError(text, "; ".join([*notes, _how_to_have_some(root, projects)]))
+        raise SubmissionError(text, "; ".join([*notes, _how_to_have_some(projects)]))
     return Targets(found, (*notes, *problems))
 
 
-def _how_to_have_some(root: Path, projects: Sequence[Project]) -> str:
+def _how_to_have_some(projects: Sequence[Project]) -> str:
     """Return what to do about packages without executables, by how they are built."""
-    by_cmake = [project for project in projects if (root / project.folder / CMAKE_LISTS).is_file()]
+    by_cmake = [project for project in projects if project.by_cmake]
+    files = [file for project in projects for _, file in project.unrunnable]
+    if files:
+        return f"install {first_of(files)} with PROGRAMS, so that it can be run"
     ways = ["add console_scripts to setup.py"] if len(by_cmake) < len(projects) else []
     ways += ["add install(PROGRAMS ... DESTINATION lib/${PROJECT_NAME}) to CMakeLists.txt"] if by_cmake else []
     return ", or ".join(["name the files of the nodes to run", *ways])

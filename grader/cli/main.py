@@ -372,7 +372,8 @@ def _observe(  # noqa: PLR0913  one parameter an option
 ) -> int:
     """Run nodes together, without a rubric, and say what they do.
 
-    A PROGRAM is a .py file, a launch file, a package or workspace with all its executables, or one as FOLDER/NAME.
+    A PROGRAM is a .py file, a launch file, a package or workspace with all its executables, or one of these as
+    FOLDER/NAME or FOLDER/PACKAGE/NAME.
     Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
     """
     from grader.app import observe

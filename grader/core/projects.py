@@ -22,6 +22,7 @@ class Project:
         foreign: The names of programs that are not in Python.
         imported: Folders with installed Python packages, relative to the package, besides its own.
         unread: Whether it may have programs that its files do not tell.
+        by_cmake: Whether it has a CMakeLists.txt.
     """
 
     folder: str
@@ -33,3 +34,4 @@ class Project:
     foreign: tuple[str, ...] = ()
     imported: tuple[str, ...] = ()
     unread: bool = False
+    by_cmake: bool = False

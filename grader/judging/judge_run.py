@@ -286,13 +286,25 @@ class VerdictBuilder:
             hint = f"if {quote(others[0], 80)} is your solution, rename it to {unnamed}"
             evidence["likely"] = others[0]
         if "/" in unnamed:  # an executable
-            package, name = unnamed.replace("*", "my_package").split("/")
-            hint = f'add it to console_scripts in setup.py, such as "{name} = {package}.{name}:main"'
+            hint = _how_to_install(unnamed, self.submission)
             evidence.pop("likely", None)
         reason = f"{unnamed}: {looked_for.problem or 'not in the submission'}"
         found = () if looked_for.problem else (*similar, *others)
         reason += f"; found {listed(found, len(found))}{' instead' if similar else ''}" if found else ""
         return _without_points(criterion, Outcome.NOT_MET, reason, hint=hint, evidence=evidence)
+
+
+def _how_to_install(executable: str, submission: Submission) -> str:
+    """Return the hint on an executable that is not there, by how its package is built."""
+    package, name = executable.split("/")
+    here = [project for project in submission.projects if package in ("*", project.name)]
+    by_cmake = bool(here) and all(project.by_cmake for project in here)
+    if by_cmake or name.endswith(".py"):
+        file = name if name.endswith(".py") else f"{name}.py"
+        rename = "" if file == name else f" RENAME {name}"
+        return f"add install(PROGRAMS scripts/{file} DESTINATION lib/${{PROJECT_NAME}}{rename}) to CMakeLists.txt"
+    named = package.replace("*", "my_package")
+    return f'add it to console_scripts in setup.py, such as "{name} = {named}.{name}:main"'
 
 
 def _outcome_of(finding: Finding) -> Outcome:

@@ -202,6 +202,7 @@ def _with_programs(project: Project, answer: Mapping[str, Any], folder: Path) ->
         foreign=tuple(dict.fromkeys(foreign))[:MOST_SCRIPTS],
         imported=tuple(dict.fromkeys(path for path in imported if path != "."))[:MOST_SCRIPTS],
         unread=answer.get("unread", (folder / CMAKE_LISTS).is_file()) is True,
+        by_cmake=(folder / CMAKE_LISTS).is_file(),
     )
 
 

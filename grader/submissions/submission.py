@@ -108,7 +108,7 @@ def stage_collected(
         root=into,
         digest=digest,
         files=files,
-        notes=(*several, *collected.notes, *problems),
+        notes=(*several, *_unrunnable(files.values(), projects), *collected.notes, *problems),
         projects=projects,
     )
 
@@ -243,6 +243,15 @@ def _look_for_executable(  # noqa: PLR0913  what a submission consists of
     rest = [one.words for one in programs if one.words not in similar]
     rest = rest or sorted((path for path, _ in files if _may_be_node(path, all_wanted)), key=_nearest_the_top)
     return StudentFile(wanted, None, tuple(similar), candidates=tuple(rest[:MAX_CANDIDATES]), problem=problem)
+
+
+def _unrunnable(files: Iterable[StudentFile], projects: Sequence[Project]) -> Iterator[str]:
+    """Yield a note for each executable that `ros2 run` starts only if its source is executable and was linked."""
+    known = {f"{project.folder}/{file}".lstrip("/") for project in projects for _, file in project.unrunnable}
+    for file in files:
+        if "/" in file.wanted and file.found in known:
+            problem = f"{shown(file.found or '')} is not installed as a program, so that `ros2 run` may not find it"
+            yield f"{problem}; install it with install(PROGRAMS ...)"
 
 
 def _notes_on(file: StudentFile) -> Iterator[str]:

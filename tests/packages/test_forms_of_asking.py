@@ -345,6 +345,10 @@ def test_too_many_programs_are_refused_with_their_number(tmp_path: Path) -> None
             "CMakeLists.txt",
         ),
         ({"src/notes.txt": ""}, "name the files of the nodes to run"),
+        (
+            cmake("talk", f"install(FILES scripts/talker.py {SCRIPTS})", TALK),
+            "install scripts/talker.py with PROGRAMS, so that it can be run",
+        ),
     ],
 )
 def test_a_workspace_without_programs_is_told_how_to_have_some(tmp_path: Path, files: Files, hint: str) -> None:
@@ -353,6 +357,24 @@ def test_a_workspace_without_programs_is_told_how_to_have_some(tmp_path: Path, f
         find_targets((write(files, tmp_path),))
     assert raised.value.message.endswith("expected a package or workspace with executables, found none")
     assert raised.value.hint == hint
+
+
+@pytest.mark.parametrize(
+    ("lists", "hint"),
+    [
+        ("", "add install(PROGRAMS scripts/talker.py DESTINATION lib/${PROJECT_NAME}) to CMakeLists.txt"),
+        (f"install(FILES scripts/hear.py {SCRIPTS})", "add install(PROGRAMS scripts/talker.py DESTINATION"),
+        (f"install(PROGRAMS scripts/gone.py {SCRIPTS} RENAME talker.py)", "add install(PROGRAMS scripts/talker.py"),
+    ],
+)
+def test_a_program_that_cmake_does_not_install_is_missing(tmp_path: Path, lists: str, hint: str) -> None:
+    """The report says what to add to CMakeLists.txt, and nothing of setup.py."""
+    workspace = write(cmake("talk", lists, TALK), tmp_path / "ws")
+    (tmp_path / "own.yaml").write_text(RUBRIC.format(process="talk/talker.py"))
+    request = GradeRequest(str(workspace), rubrics=(tmp_path / "own.yaml",), clock="virtual")
+    (verdict,) = grade_until_decided(request).exercises[0].verdicts
+    assert verdict.outcome.value == "not_met"
+    assert verdict.hint.startswith(hint)
 
 
 def test_what_is_not_run_is_said(tmp_path: Path) -> None:

@@ -69,3 +69,18 @@ def test_entry_points_may_be_declared_elsewhere(tmp_path: Path, setup: str) -> N
 def test_nothing_outside_of_the_submission_is_an_executable(name: str) -> None:
     """Names come from launch files, which students write."""
     assert find_executable(WORKSPACE, read_projects(WORKSPACE)[0], "robot", name) is None
+
+
+def test_a_file_that_is_installed_without_permission_is_found_with_a_note(tmp_path: Path) -> None:
+    """After `colcon build --symlink-install` it runs, if its source is executable."""
+    package = tmp_path / "talk"
+    (package / "scripts").mkdir(parents=True)
+    (package / "scripts" / "talker.py").touch()
+    (package / "package.xml").write_text("<name>talk</name>")
+    (package / "CMakeLists.txt").write_text("install(FILES scripts/talker.py DESTINATION lib/talk)\n")
+    file, notes = found(tmp_path / "talk", "talk/talker.py", tmp_path / "staged")
+    assert file.found == "scripts/talker.py"
+    assert notes == (
+        "scripts/talker.py is not installed as a program, so that `ros2 run` may not find it; "
+        "install it with install(PROGRAMS ...)",
+    )
