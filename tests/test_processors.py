@@ -1,26 +1,22 @@
-"""Programs with threads get the same report on one processor and on all of this machine."""
+"""Programs with threads do the same on one processor and on all of this machine."""
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
-import shutil
 import subprocess
-import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
-from ruamel.yaml import YAML
+from verifying import GRADE, differences, verified, written
 
 pytestmark = [pytest.mark.ros, pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="there is one processor only")]
 
 ROOT = Path(__file__).parents[1]
 SUBMISSIONS = ROOT / "tests" / "submissions"
-GRADE = str(Path(sys.executable).with_name("grade"))
 WITH_THREADS = ("threading", "MultiThreadedExecutor", "ThreadPool")
 EXECUTORS = ["MultiThreadedExecutor()", "MultiThreadedExecutor(num_threads=2)", "SingleThreadedExecutor()"]
 #: What a node does, in its constructor. `say` logs, `group()` makes a reentrant callback group.
@@ -82,18 +78,6 @@ def folder() -> Iterator[Path]:
         yield Path(name)
 
 
-def told(*arguments: str | Path, one: bool) -> Any:
-    """Return the JSON that a command prints, on one processor or on all; without what belongs to the run."""
-    before = ["taskset", "-c", str(min(os.sched_getaffinity(0)))] if one else []
-    command = [*before, GRADE, *map(str, arguments), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=500)
-    assert done.stdout, done.stderr
-    found = json.loads(done.stdout)
-    for name in ("run", "environment", "duration_s"):
-        found.pop(name, None)
-    return found
-
-
 def with_threads() -> list[str]:
     """Return the test submissions that use threads, as `correct/NAME`."""
     found = []
@@ -104,31 +88,28 @@ def with_threads() -> list[str]:
     return found
 
 
-def sampled(cases: Iterable[tuple[str, ...]]) -> list[Any]:
-    """Return parameters of a test: one in five runs with `--long`, the others with `--everything`."""
-    marks = [pytest.mark.long, *[pytest.mark.nightly] * 4]
-    return [pytest.param(*case, marks=marks[n % 5], id="-".join(case)) for n, case in enumerate(cases)]
+def sampled(cases: Sequence[str]) -> list[Any]:
+    """Return parameters of a test, lists of cases: one in five runs with `--long`, the others with `--everything`."""
+    shares = [(cases[::5], pytest.mark.long), *((cases[n::5], pytest.mark.nightly) for n in range(1, 5))]
+    return [pytest.param(share, marks=mark, id=f"{n}/5") for n, (share, mark) in enumerate(shares, 1)]
 
 
-@pytest.mark.parametrize(("body", "executor"), sampled(itertools.product(BODIES, EXECUTORS)))
-def test_what_a_program_does(folder: Path, body: str, executor: str) -> None:
+@pytest.mark.parametrize("names", sampled([f"{body}, {executor}" for body in BODIES for executor in EXECUTORS]))
+def test_what_a_program_does(folder: Path, names: list[str]) -> None:
     """Each message and each log record at the same time."""
-    program = folder / "threads.py"
-    program.write_text(PROGRAM.format(body=BODIES[body], executor=executor), encoding="utf-8")
-    one, all_ = (told("observe", program, "--duration", "2", one=one) for one in (True, False))
-    assert one == all_
-    assert one["records"]
-    assert one["clock"] == "virtual"
+    programs = {}
+    for number, name in enumerate(names):
+        body, _, executor = name.partition(", ")
+        programs[str(number)] = PROGRAM.format(body=BODIES[body], executor=executor)
+    code, found = verified(written(folder, programs), "--condition", "processors")
+    assert (code, differences(found), found["not_comparable"]) == (0, {}, [])
 
 
-@pytest.mark.parametrize("name", sampled((name,) for name in with_threads()))
-def test_what_a_submission_gets(folder: Path, name: str) -> None:
-    """Outcomes, reasons, hints and charts."""
-    expected = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
-    shutil.copytree(SUBMISSIONS / name, folder / "s")
-    exercises = [word for exercise in expected[name]["graded"] for word in ("--exercise", exercise)]
-    one, all_ = (told(folder / "s", *exercises, "--seed", "7", one=one) for one in (True, False))
-    assert one == all_
+@pytest.mark.parametrize("names", sampled(with_threads()))
+def test_what_a_submission_does(names: list[str]) -> None:
+    """So that outcomes, reasons, hints and charts are the same as well."""
+    code, found = verified([str(SUBMISSIONS / name) for name in names], "--condition", "processors")
+    assert (code, differences(found)) == (0, {})
 
 
 def test_a_client_that_waits_in_a_callback(folder: Path) -> None:
@@ -140,6 +121,7 @@ def test_a_client_that_waits_in_a_callback(folder: Path) -> None:
         "self.create_timer(0.3, lambda: (c.call(Trigger.Request()), self.say('answered')), group())"
     )
     program.write_text(PROGRAM.format(body=body, executor=EXECUTORS[0]), encoding="utf-8")
-    one, all_ = (told("observe", program, "--duration", "1", one=one) for one in (True, False))
-    assert one == all_
-    assert [record["text"] for record in one["records"]] == ["answered"] * 3
+    one = ["taskset", "-c", str(min(os.sched_getaffinity(0)))]
+    command = [*one, GRADE, "observe", str(program), "--duration", "1", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=500)
+    assert [record["text"] for record in json.loads(done.stdout)["records"]] == ["answered"] * 3

@@ -9,7 +9,7 @@ import sys
 import tempfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import field, replace
 from pathlib import Path
 from typing import IO, Any
@@ -35,8 +35,10 @@ from grader.submissions.submission import collect_submission, stage_collected
 Key = tuple[str, str]
 #: The condition of recordings that were kept as evidence.
 KEPT = "kept"
-#: A loop that keeps a processor busy as long as the process lives that started it.
-_LOOP = "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    for _ in range(1_000_000): pass\n"
+#: The program that records under a condition.
+PROGRAM = (sys.executable, "-m", "grader.app.recorded_again")
+#: A loop that keeps a processor busy as long as the process lives that started it, whose pid is its argument.
+LOOP = "import os, sys\nwhile os.getppid() == int(sys.argv[1]):\n    for _ in range(1_000_000): pass\n"
 #: How much of what a failed program said is told, in characters.
 _MOST_CHARACTERS = 300
 
@@ -55,12 +57,17 @@ class VerifyRequest:
 class _Subject:
     """One submission while it is verified."""
 
-    name: str
+    name: str  # its path as the user typed it
     wanted: Wanted
     kept: Mapping[Key, Trace] = field(default_factory=dict)  # recordings that were kept as evidence
     sources: Mapping[str, str] = field(default_factory=dict)  # wanted file name -> its text
     first: dict[Key, _First] = field(default_factory=dict)
     problem: str = ""  # why it could not be recorded first
+
+    @property
+    def comparable(self) -> tuple[Key, ...]:
+        """The scenarios of which another recording should be the same."""
+        return tuple(key for key, each in self.first.items() if each.is_comparable)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +155,7 @@ def _subject(request: VerifyRequest, path: str, into: Path, evidence: Evidence |
     given = json.dumps(request_to_json(asked, exercises))
     wanted = Wanted(str(into), seed, given, tuple(str(rubric.absolute()) for rubric in how.rubrics))
     kept = run_of(evidence, exercises, verify=True).traces if evidence is not None else {}
-    return _Subject(submission.name, wanted, kept)
+    return _Subject(path, wanted, kept)
 
 
 def _record_first(folder: Path, subjects: Sequence[_Subject], isolation: str) -> str:
@@ -193,25 +200,23 @@ def _compared_with_evidence(subjects: Sequence[_Subject]) -> Tried:
 def _tried(folder: Path, subjects: Sequence[_Subject], condition: Condition, isolation: str) -> Tried:
     """Record under a condition and compare with the first recordings."""
     counted = _Counted(condition.name, condition.words)
-    known = [tuple(key for key, each in one.first.items() if each.is_comparable) for one in subjects]
-    if condition.not_tried or not any(known):
+    comparable = [one for one in subjects if one.comparable]
+    if condition.not_tried or not comparable:
         why = condition.not_tried or "there is nothing to compare"
         return Tried(condition.name, condition.words, State.NOT_TRIED, why)
-    again = [
-        replace(one, wanted=replace(one.wanted, scenarios=keys)) for one, keys in zip(subjects, known, strict=True)
-    ]
+    again = [replace(one, wanted=replace(one.wanted, scenarios=one.comparable)) for one in comparable]
     for line in _recorded(folder, again, condition, condition.isolation or isolation):
         if "problem" in line:
             counted.problem = counted.problem or str(line["problem"])
         elif "trace" in line:
-            one = subjects[line["number"]]
+            one = again[line["number"]]
             trace = trace_from_json(line["trace"])
             if trace.harness_problem and not trace.clock_reason:
                 counted.problem = counted.problem or trace.harness_problem
                 continue
             found = first_difference(one.first[_key(line)].trace, trace, one.sources)
             counted.add(Place(one.name, *_key(line)), found)
-    missed = sum(map(len, known)) - counted.compared
+    missed = sum(len(one.comparable) for one in comparable) - counted.compared
     if missed and not counted.problem:
         counted.problem = f"{missed} scenarios were not recorded"
     return counted.tried()
@@ -271,8 +276,8 @@ def _recorded(
         program = stack.enter_context(_started(condition, variables, said))
         assert program.stdin is not None
         assert program.stdout is not None
-        json.dump(to_json(recordings), program.stdin)
-        program.stdin.close()
+        with suppress(BrokenPipeError), program.stdin as told:  # if it has ended, its exit code says so
+            json.dump(to_json(recordings), told)
         for line in program.stdout:
             yield json.loads(line)
         if program.wait() != 0:
@@ -289,7 +294,7 @@ def _started(condition: Condition, variables: Mapping[str, str], said: IO[str]) 
     if condition.user is not None:
         as_user = {"user": condition.user, "group": condition.user, "extra_groups": []}
     program = subprocess.Popen(
-        [sys.executable, "-m", "grader.app.recorded_again"],
+        PROGRAM,
         env=dict(variables),
         cwd="/",  # the current folder may hold modules of a student
         stdin=subprocess.PIPE,
@@ -311,7 +316,7 @@ def _started(condition: Condition, variables: Mapping[str, str], said: IO[str]) 
 @contextmanager
 def _busy(loops: int) -> Iterator[None]:
     """Keep so many processes in busy loops during the block; they end with this process, however it ends."""
-    processes = [subprocess.Popen([sys.executable, "-I", "-S", "-c", _LOOP]) for _ in range(loops)]
+    processes = [subprocess.Popen([sys.executable, "-I", "-S", "-c", LOOP, str(os.getpid())]) for _ in range(loops)]
     try:
         yield
     finally:

@@ -67,7 +67,7 @@ class Difference:
 class Place:
     """One scenario of one submission."""
 
-    submission: str  # its name
+    submission: str  # its path as the user typed it
     exercise: str
     scenario: str
 
@@ -96,7 +96,7 @@ class LeftOut:
 class Verification:
     """What is known after recording submissions under several conditions."""
 
-    submissions: tuple[str, ...]  # their names
+    submissions: tuple[str, ...]  # their paths as the user typed them
     seeds: tuple[int, ...]  # the seed of each
     isolation: str  # the sandbox of the first recording
     scenarios: int  # how many scenarios the first recording has

@@ -12,6 +12,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,12 @@ class Taken:
     type: str
     cdr: bytes
     value: Mapping[str, Any]
+    sent_ns: int = 0  # when it was sent, by the system clock; 0 if that is not known
+
+
+def in_order(messages: Iterable[Taken]) -> list[Taken]:
+    """Sort messages of one instant by topic and type, because which topic's arrive first is up to the middleware."""
+    return sorted(messages, key=lambda taken: (taken.topic, taken.type))
 
 
 class Observer:
@@ -306,7 +313,8 @@ class Observer:
                 if found is None:
                     break
                 left_bytes -= len(found[0])
-                taken.append(self._decoded(topic, interface, reader.msg_type, found[0]))
+                sent_ns = int(found[1].get("source_timestamp", 0))
+                taken.append(replace(self._decoded(topic, interface, reader.msg_type, found[0]), sent_ns=sent_ns))
         return taken, left_bytes
 
     def take_rest(self) -> list[Taken]:
@@ -322,7 +330,7 @@ class Observer:
             quiet = 0 if taken else quiet + 1
             if len(found) > DEPTH:
                 break
-        return found
+        return in_order(found)
 
     def subscribe_to_logs(self) -> None:
         """Subscribe to /rosout; its publishers are latched, so earlier log records arrive as well."""

@@ -16,7 +16,7 @@ from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Observation, Of
 from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, passes, readers_of
 from grader.execution.ending import ending
 from grader.execution.exchanges import PlannedCalls
-from grader.execution.observer import Observer
+from grader.execution.observer import Observer, Taken, in_order
 from grader.execution.plan import Plan
 from grader.execution.runner import Runner
 from grader.execution.stimuli import APPEARANCES, AddServer, Ask, Event, RemoveServer
@@ -33,6 +33,8 @@ MOST_REPORTS, CLAIMS = 10_000, 1_000
 #: Nodes may take messages so often while none of them lets time pass. After HOPS, each time also takes as long as a
 #: message needs between two processes; after MOST_HOPS they answer each other without end, and the run is over.
 HOPS, HOP_NS, MOST_HOPS = 200, 250_000, 4_000
+#: More messages of one report are not held back until all of them have arrived.
+MOST_ARRIVED = 1_000
 #: Reasons for recording on the wall clock.
 THREADS = "the node's threads wait for each other without blocking"
 OUTSIDE = "the node waits for something that is neither ROS nor time"
@@ -57,6 +59,8 @@ class VirtualRunner(Runner):
         self._steps = 0
         self._hops = 0
         self._has_lost = False
+        #: When the publishers of each process, by their numbers there, have appeared.
+        self._appeared_ns: dict[tuple[str, int], int] = {}
         self._discovery = Discovery(students, observer, self._recorder, self._services, self._mark_dead)
         self._topics = VirtualTopicPeers(students, observer, self._recorder, self._discovery)
 
@@ -233,7 +237,8 @@ class VirtualRunner(Runner):
             self._recorder.note(f"{student.name}: {some} on {where} did not arrive in time")
             self._has_lost = True
         if sent := counts(report.get("sent")):
-            self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
+            early = _of_topics(counts(report.get("early")))
+            self._collect(_of_topics(sent), {t: n for t, n in early.items() if self._is_new(student, t)})
             self._collect_exchanges(student, sent)
             self._forward(student, sent)
         endpoints = report.get("endpoints")
@@ -242,6 +247,9 @@ class VirtualRunner(Runner):
                 self._recorder.stop(self._now_ns, f"more than {CLAIMS:,} endpoints and parameters of {student.name}")
             student.claims, student.renewed = [c for c in endpoints[:CLAIMS] if is_claim(c)], True
             student.sees_graph = report.get("sees_graph") is True
+            for claim in student.claims:
+                if claim["kind"] == "publisher":
+                    self._appeared_ns.setdefault((student.name, claim.get("number", 0)), self._now_ns)
             self._note_offers(student)
             self._discovery.match(self._now_ns)
             for due in self._services.ready(self._is_served):
@@ -256,19 +264,41 @@ class VirtualRunner(Runner):
                 student.offers.add(offer)
                 self._recorder.add(Offer(self._now_ns, student.name, *offer))
 
-    def _collect(self, sent: Mapping[str, int]) -> None:
-        """Wait until the observer has taken all published messages, and record them."""
+    def _is_new(self, student: NodeProcess, topic: str) -> bool:
+        """Return whether a process has a publisher on a topic that has appeared at this instant."""
+        publishers = (c for c in student.claims if c["kind"] == "publisher" and c["name"] == topic)
+        return any(self._appeared_ns.get((student.name, c.get("number", 0))) == self._now_ns for c in publishers)
+
+    def _collect(self, sent: Mapping[str, int], early: Mapping[str, int]) -> None:
+        """Wait until the observer has taken all published messages, and record them.
+
+        Args:
+            sent: How many messages a process has published on each topic.
+            early: How many of them, the first ones, it has sent before any subscription could have discovered it.
+        """
         expected = Counter({topic: n for topic, n in sent.items() if self._observer.reads(topic)})
         if not expected:
             return
+        arrived: list[Taken] = []
+        first = Counter(early)
 
         def complete() -> bool:
-            for message in self._observer.take():
-                self._record(self._now_ns, message)
-                expected[message.topic] -= 1
+            taken = self._observer.take()
+            arrived.extend(taken)
+            expected.subtract(message.topic for message in taken)
+            if len(arrived) > MOST_ARRIVED:
+                record_arrived()
             return bool(self._recorder.full) or all(count <= 0 for count in expected.values())
 
-        if not self._discovery.patience.wait(complete):
+        def record_arrived() -> None:
+            for message in in_order(arrived):
+                self._record(self._now_ns, message, early=first[message.topic] > 0)
+                first[message.topic] -= 1
+            arrived.clear()
+
+        in_time = self._discovery.patience.wait(complete)
+        record_arrived()
+        if not in_time:
             for topic in sorted(t for t, n in expected.items() if n > 0):
                 self._recorder.note(f"some messages on {topic[:NAME_CHARACTERS]} did not arrive")
 
@@ -365,6 +395,11 @@ class VirtualRunner(Runner):
         for server in self._services.done():
             if not any(f"response {server.service}" in s.arrivals for s in self._students if not s.ended):
                 self._do(RemoveServer(self._now_ns, server), self._now_ns)
+
+
+def _of_topics(counted: Mapping[str, int]) -> dict[str, int]:
+    """Return the counts of topics by their names, without those of services."""
+    return {channel[6:]: count for channel, count in counted.items() if channel.startswith("topic ")}
 
 
 def _senders(process: NodeProcess, channel: str) -> Sequence[Mapping[str, Any]]:

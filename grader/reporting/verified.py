@@ -82,7 +82,7 @@ def _head(verification: Verification) -> str:
     if more > 0:
         names += f" and {more} more"
     seed = f", seed {verification.seeds[0]}" if len(verification.seeds) == 1 else ""
-    recorded = f"{counted(verification.scenarios, 'scenario')}, {counted(verification.events, 'event')}"
+    recorded = f"{counted(verification.scenarios, 'scenario')}, {verification.events:,} events"
     return f"{names}: {recorded}, in the sandbox {verification.isolation}{seed}"
 
 
@@ -224,8 +224,8 @@ def verification_to_json(verification: Verification) -> str:
         "schema": SCHEMA,
         "result": _results(verification),
         "submissions": [
-            {"name": name, "seed": seed}
-            for name, seed in zip(verification.submissions, verification.seeds, strict=True)
+            {"path": path, "seed": seed}
+            for path, seed in zip(verification.submissions, verification.seeds, strict=True)
         ],
         "isolation": verification.isolation,
         "scenarios": verification.scenarios,

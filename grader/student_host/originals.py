@@ -3,18 +3,18 @@
 import _thread
 import contextlib
 import os
-import threading
 import time
 from collections.abc import Callable
 
 sleep = time.sleep
 perf_counter = time.perf_counter
+time_ns = time.time_ns
+thread_time = time.thread_time
 allocate_lock = _thread.allocate_lock
 get_ident = _thread.get_ident
 get_native_id = _thread.get_native_id
 start_new_thread = _thread.start_new_thread
 urandom = os.urandom
-excepthook = threading.excepthook
 exit_now = os._exit
 kill = os.kill
 

@@ -14,14 +14,15 @@ import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from . import entry, launch_files, machine, originals
-from .faults import Describer
+from .faults import Describer, report_threads
 from .link import Link, Log
 from .outside import install_alarms, install_processes
 from .quick_imports import import_without_needless
+from .shadows import Around
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
@@ -188,12 +189,7 @@ def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | Wal
 
     from .wall import WallTime
 
-    def excepthook(args: Any) -> None:
-        if args.exc_value is not None and not issubclass(args.exc_type, SystemExit):
-            report_fault(args.exc_value)
-        originals.excepthook(args)
-
-    threading.excepthook = excepthook
+    report_threads(report_fault)
     return WallTime(link)
 
 
@@ -206,7 +202,7 @@ def play(request: dict[str, Any], describer: Describer, link: Link, install_ros:
     """Run the file and the interpreter's exit handlers; return how it ended as `code`, and `fault` if there is one."""
     ending: dict[str, Any] = {"code": 0}
     try:
-        entry.run_file(request, lambda note: link.send({"kind": "note", **note}), install_ros)
+        at_depth(lambda: entry.run_file(request, lambda note: link.send({"kind": "note", **note}), install_ros))
     except SystemExit as leaving:
         ending["code"] = exit_code(leaving)
     except KeyboardInterrupt:
@@ -220,6 +216,21 @@ def play(request: dict[str, Any], describer: Describer, link: Link, install_ros:
         finish_threads()
         atexit._run_exitfuncs()
     return ending
+
+
+#: How many frames of Python are below `at_depth` in a fork, which has the most.
+DEPTH = 6
+
+
+def at_depth(run: Callable[[], None]) -> None:
+    """Call a function at the depth of a fork, so that a program can recurse as deep however it was started."""
+    depth, frame = 0, sys._getframe().f_back
+    while frame is not None:
+        depth, frame = depth + 1, frame.f_back
+    if depth < DEPTH:
+        at_depth(run)
+    else:
+        run()
 
 
 def of_program(frames: TracebackType | None) -> TracebackType | None:
@@ -292,9 +303,22 @@ def seed_randomness(seed: str) -> None:
     random.Random.seed = seed_from_source  # type: ignore[method-assign]
     random.seed = random._inst.seed
     random.seed(seed + "/random")
-    numpy = sys.modules.get("numpy")
-    if numpy is not None:
-        numpy.random.seed(int(seed[:8], 16))
+    by_seed = int(seed[:8], 16)
+
+    @contextlib.contextmanager
+    def apart() -> Iterator[None]:
+        """Let the import of numpy's randomness draw nothing from the source that the program draws from."""
+        state = source.getstate()
+        yield
+        module = sys.modules["numpy.random"]
+        if hasattr(module, "mtrand"):  # otherwise it is a module of the student's
+            source.setstate(state)
+            module.seed(by_seed)
+
+    if "numpy.random" in sys.modules:  # as in each fork
+        sys.modules["numpy.random"].seed(by_seed)
+    else:
+        sys.meta_path.insert(0, Around("numpy.random", apart))
 
 
 #: The common interface packages, and those whose interfaces they use.

@@ -11,7 +11,7 @@ import importlib
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import BuiltinImporter, FrozenImporter, ModuleSpec
 from types import ModuleType
@@ -92,9 +92,11 @@ class Shadows:
         while more := {name for name in _replaceable() - hidden if _goes_with(name, hidden)}:
             hidden |= more
         self._real = {name: sys.modules.pop(name) for name in hidden}
-        sys.meta_path.insert(0, _After("rclpy", lambda: self._install(install)))
+        sys.meta_path.insert(0, Around("rclpy", lambda: self._installing(install)))
 
-    def _install(self, install: Callable[[], None]) -> None:
+    @contextmanager
+    def _installing(self, install: Callable[[], None]) -> Iterator[None]:
+        yield
         try:
             for part in ROS_PARTS:
                 importlib.import_module(part)
@@ -160,31 +162,36 @@ def _goes_with(name: str, names: set[str]) -> bool:
     return any(name.startswith(f"{other}.") for other in names)
 
 
-class _After(MetaPathFinder):
-    """An importer that calls a function after a module was imported for the first time."""
+class Around(MetaPathFinder):
+    """An importer that does something before and after a module is run, when it is imported for the first time.
 
-    def __init__(self, name: str, do: Callable[[], None]) -> None:
+    Args:
+        name: The module.
+        around: Returns a context manager that the module is run in.
+    """
+
+    def __init__(self, name: str, around: Callable[[], AbstractContextManager[None]]) -> None:
         self._name = name
-        self._do = do
+        self._around = around
 
     def find_spec(self, fullname: str, path: Any, target: Any = None) -> ModuleSpec | None:
-        """Return the spec of the module, with a loader that calls the function; None for any other module."""
+        """Return the spec of the module, with a loader that enters the context; None for any other module."""
         if fullname != self._name:
             return None
         sys.meta_path.remove(self)
         others = [finder for finder in sys.meta_path if hasattr(finder, "find_spec")]
         spec = next((s for f in others if (s := f.find_spec(fullname, path, target)) is not None), None)
         if spec is not None and spec.loader is not None:
-            spec.loader = _Doing(spec.loader, self._do)
+            spec.loader = _Within(spec.loader, self._around)
         return spec
 
 
-class _Doing(Loader):
-    """Wraps a loader, and calls a function after it has run the module."""
+class _Within(Loader):
+    """Wraps a loader, and runs the module in a context."""
 
-    def __init__(self, loader: Any, do: Callable[[], None]) -> None:
+    def __init__(self, loader: Any, around: Callable[[], AbstractContextManager[None]]) -> None:
         self._loader = loader
-        self._do = do
+        self._around = around
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._loader, name)
@@ -195,6 +202,6 @@ class _Doing(Loader):
         return made
 
     def exec_module(self, module: ModuleType) -> None:
-        """Run the module, then call the function."""
-        self._loader.exec_module(module)
-        self._do()
+        """Run the module in the context."""
+        with self._around():
+            self._loader.exec_module(module)

@@ -16,6 +16,7 @@ from typing import Any
 
 from . import originals
 from .clock import VirtualClock
+from .faults import report_threads
 from .outside import any_outside
 from .scheduler import GreenThread, Scheduler
 
@@ -200,12 +201,7 @@ def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Cal
     threading.Thread._bootstrap_inner = bootstrap_inner  # type: ignore[attr-defined]
     threading.Thread.join = join  # type: ignore[method-assign]
 
-    def excepthook(args: Any) -> None:
-        if args.exc_value is not None and not issubclass(args.exc_type, SystemExit):
-            report_fault(args.exc_value)
-        originals.excepthook(args)
-
-    threading.excepthook = excepthook
+    report_threads(report_fault)
 
 
 def install_selectors(scheduler: Scheduler, clock: VirtualClock, give_up: Callable[[], None]) -> None:

@@ -31,7 +31,7 @@ from grader.core.limits import Limits
 from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer, OutputLine
 from grader.execution import discovery, machine, trace_recorder
 from grader.execution import virtual_runner as module
-from grader.execution.observer import Observer
+from grader.execution.observer import Observer, Taken
 from grader.execution.plan import PlannedRecording
 from grader.execution.student_process import NodeProcess
 from grader.execution.virtual_runner import VirtualRunner
@@ -202,6 +202,29 @@ def test_a_message_from_one_process_reaches_the_other_at_the_same_instant() -> N
         "400 from /fan_speed: 100",
         "400 a.py: got {'topic /fan_speed': 1}",
     ]
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_messages_of_one_instant_come_in_one_order(monkeypatch: pytest.MonkeyPatch, *, backwards: bool) -> None:
+    """The middleware decides which topic's arrive first; those of one topic keep their order."""
+    take = ScriptedObserver.take
+
+    def take_one(observer: ScriptedObserver, at_once: int = 1000) -> list[Taken]:
+        flying = sorted(take(observer), key=lambda taken: taken.topic, reverse=backwards)
+        observer._world.flying = flying[1:]
+        return flying[:1]
+
+    def program(me: ScriptedStudent, world: World) -> Program:
+        claims = [claim("publisher", topic) for topic in ("/b", "/a")]
+        yield from wait(50, endpoints=world.have(me.name, *claims))
+        for topic, value in (("/b", 1), ("/a", 2), ("/b", 3), ("/a", 4)):
+            world.publish(topic, value)
+        yield from wait(100, sent={"topic /a": 2, "topic /b": 2})
+        yield idle()
+
+    monkeypatch.setattr(discovery, "Patience", lambda *_: machine.Patience(5.0))
+    monkeypatch.setattr(ScriptedObserver, "take", take_one)
+    assert Run(program).seen() == ["50 from /a: 2", "50 from /a: 4", "50 from /b: 1", "50 from /b: 3"]
 
 
 def test_a_process_may_go_on_alone_until_somebody_else_wants_something() -> None:
