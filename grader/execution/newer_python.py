@@ -175,13 +175,21 @@ def came_with(name: str) -> Version | None:
     return next((version for version, names in NEW_NAMES.items() if last in names.get(of, "").split()), None)
 
 
+#: What a file holds that any newer version reads: an f- or t-string, a type statement, type parameters, exceptions
+#: without brackets, and before Python 3.11 a star. For others no process is started.
+_NEWER = re.compile(
+    rb"(?:[ftFT][rR]?|[rR][ftFT])['\"]|\btype\b|\b(?:def|class)\b[\s\\]+\w+[\s\\]*\[|\bexcept\b[^:\n]*[,\\]"
+    + (rb"|\*" if HERE < (3, 11) else rb"")
+)
+
+
 def _of_file(root: Path, file: str, distro: str, python: Version) -> Version | None:
     """Return the version of Python that compiles a file of a submission; None if none is known to."""
     try:
         text = text_of(root / file) if file else None
     except OSError:
         return None
-    if text is None:
+    if text is None or _NEWER.search(text) is None:
         return None
     return version_for(text, f"whether Python {'.'.join(map(str, python))} of ROS 2 {distro} reads {file}")
 

@@ -109,7 +109,7 @@ class RecordingSession:
         under_way()
 
         def tell(key: Key, trace: Trace) -> None:
-            traces[key] = with_newer(trace, jobs[key].plan.root, self.ros.distro)
+            traces[key] = with_newer(trace, jobs[key].plan.root, self.ros.distro) if trace.faults() else trace
             if finished is not None:
                 finished(key, traces[key])
 
