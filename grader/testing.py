@@ -97,9 +97,14 @@ class TraceBuilder:
         self._seen.extend(observations)
         return self
 
-    def message(self, t_s: float, topic: str, type_: str, value: Mapping[str, object]) -> TraceBuilder:
-        """Add one message of the student's node, with nested dicts for its fields."""
-        return self.add(Message(nanoseconds(t_s), topic, type_, value))
+    def message(
+        self, t_s: float, topic: str, type_: str, value: Mapping[str, object], *, before_discovery: bool = False
+    ) -> TraceBuilder:
+        """Add one message of the student's node, with nested dicts for its fields.
+
+        With `before_discovery` it was sent as soon as its publisher was created, so that nobody would have heard it.
+        """
+        return self.add(Message(nanoseconds(t_s), topic, type_, value, before_discovery=before_discovery))
 
     def messages(  # noqa: PLR0913  what, where and when
         self, topic: str, type_: str, value: Value, *, rate_hz: float, start_s: float = 0.1, stop_s: float | None = None

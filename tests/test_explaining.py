@@ -87,6 +87,7 @@ def test_a_check_shows_what_a_rubric_has_to_give() -> None:
         "tolerance": True,
         "window": False,
         "partly_tolerance": False,
+        "after_discovery": False,
     }
     assert isinstance(check, CheckExplanation)
     assert check.used_by == (

@@ -56,7 +56,7 @@ def test_a_parser_is_found_by_its_import_or_call(tmp_path: Path, code: str, kind
 
 
 def test_nothing_in_the_grader_reads_project_files_outside_of_the_contained_process() -> None:
-    """Only that process knows TOML, INI files and how to evaluate setup.py; nobody imports it."""
+    """Only that process knows TOML, INI files, and how to evaluate setup.py and CMakeLists.txt; nobody imports it."""
     found = all_parsers()
     assert {module for module, kinds in found.items() if "INI or templates" in kinds} == {
         "grader/submissions/project_reader.py",
@@ -64,5 +64,6 @@ def test_nothing_in_the_grader_reads_project_files_outside_of_the_contained_proc
     }
     for path in PACKAGE.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
-        own = path.name in ("project_reader.py", "setup_files.py")
-        assert own or not re.search(r"^\s*(from|import) .*\b(project_reader|setup_files)\b", text, re.MULTILINE), path
+        own = path.name in ("project_reader.py", "setup_files.py", "cmake_files.py")
+        known = r"^\s*(from|import) .*\b(project_reader|setup_files|cmake_files)\b"
+        assert own or not re.search(known, text, re.MULTILINE), path

@@ -25,6 +25,7 @@ class ProblemKind(Enum):
     SILENT = "silent"  # it is there, and sends nothing
     TOO_FEW = "too_few"  # fewer messages, requests or responses than expected
     TOO_MANY = "too_many"  # more of them
+    TOO_EARLY = "too_early"  # everything was sent before anybody could have discovered the publisher
     TOO_LATE = "too_late"  # what is expected comes, but late
     WRONG_RATE = "wrong_rate"  # the time between messages, requests or logs is wrong
     RATE_CHANGES = "rate_changes"  # the rate is right on average, but not to the end

@@ -90,6 +90,9 @@ class Message:
     type: str  # e.g. `geometry_msgs/msg/Twist`
     value: Mapping[str, Any]  # fields as plain JSON values, nested by name; NaN and infinities are floats
     cdr: bytes = b""  # the bytes as they came over the wire
+    # Whether it was sent as soon as its publisher existed, before any subscription could have discovered it, and not
+    # transient local: outside of the grader nobody would have heard it
+    before_discovery: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,6 +339,9 @@ class Trace:
     most_starved_ns: int = 0
     # What a launch file asks for and the grader cannot do, as sentences: what is not met may be due to it
     left_out: tuple[str, ...] = ()
+    # Programs beside the student's own that were not started, as sentences, each with the one topic, service or action
+    # that it would use, empty where that is not known: what is not met may be due to what they send or answer
+    unstarted: tuple[tuple[str, str], ...] = ()
     written: tuple[WrittenFile, ...] = ()  # of programs that ended in time
     newer: tuple[NewerPython, ...] = ()  # what programs ended of, and would not where the release's own Python runs
     # Whether a wait for the middleware timed out, so that something may be missing: a reason to record again

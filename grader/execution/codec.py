@@ -65,6 +65,7 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
         **({"starts": [_start_to_json(start) for start in trace.starts]} if trace.starts else {}),
         **({"most_starved_ns": trace.most_starved_ns} if trace.most_starved_ns else {}),
         **({"left_out": list(trace.left_out)} if trace.left_out else {}),
+        **({"unstarted": [list(one) for one in trace.unstarted]} if trace.unstarted else {}),
         **({"written": [plain(file) for file in trace.written]} if trace.written else {}),
         **({"newer": [plain(one) for one in trace.newer]} if trace.newer else {}),
         **({"author_mistake": asdict(trace.author_mistake)} if trace.author_mistake is not None else {}),
@@ -88,6 +89,8 @@ def observation_to_json(observation: Observation) -> list[Any]:
     row = [TAGS[type(observation)], *plain(observation)]
     if isinstance(observation, Fault):
         return [*row[:-_DETAILS], row[-_DETAILS:]]
+    if isinstance(observation, Message):
+        return without_last(row, False)  # noqa: FBT003 - the value
     if isinstance(observation, GraphSnapshot):
         row[_ENDPOINTS] = [without_last(end, 0) for end in row[_ENDPOINTS]]
         return without_last(row, [])

@@ -10,6 +10,7 @@ import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Fault, FaultKind, LogRecord, Mark, Observation, Offer, OutputLine, Trace
 from grader.execution.ending import START_CPU_S, graders_fault, reported_fault
 from grader.execution.executables import Executable, executables, find_executable, find_loose, has_package, why_unknown
-from grader.execution.notes import Places, left_out_words, quoted
+from grader.execution.notes import Places, left_out_sentence, quoted
 from grader.execution.plan import Plan, PlannedStart
 from grader.execution.student_process import NodeProcess
 from grader.execution.usage import families, usage
@@ -65,6 +66,10 @@ HARMLESS_OF_ROS = frozenset(
         *(("pkg", verb) for verb in ("list", "prefix", "executables", "xml")),
     }
 )
+#: Commands of `ros2` that use the one name before a type.
+ONE_NAME = frozenset({("topic", "pub"), ("service", "call"), ("action", "send_goal")})
+_TOPIC = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*")
+_TYPE = re.compile(r"[a-z][a-z0-9_]*/(?:(?:msg|srv|action)/)?[A-Z][A-Za-z0-9]*")
 #: Packages with programs that only show what happens; leaving them out changes nothing for the nodes.
 ONLY_LOOKING = frozenset({"rviz2", "rqt", "rqt_gui", "rqt_graph", "rqt_plot", "rqt_console", "plotjuggler"})
 
@@ -79,6 +84,7 @@ class Launched:
         labels: The name of each process in the trace.
         starts_ns: Name and start time of those that start late.
         left_out: Sentences about what the grader cannot do, which may matter.
+        unstarted: The same about other programs, each with the only name that it would use, if that is known.
         notes: Sentences about what it left out and does not matter.
         fault: Why nothing can be started; None if something can.
         harness_problem: Why that is not the launch file's fault; empty if it is.
@@ -89,6 +95,7 @@ class Launched:
     labels: tuple[tuple[str, str], ...] = ()
     starts_ns: tuple[tuple[str, int], ...] = ()
     left_out: tuple[str, ...] = ()
+    unstarted: tuple[tuple[str, str], ...] = ()
     notes: tuple[str, ...] = ()
     fault: Fault | None = None
     harness_problem: str = ""
@@ -135,9 +142,14 @@ def _description(student: NodeProcess) -> tuple[dict[str, Any] | None, str]:
 def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) -> Launched:
     root, known = Path(plan.root), dict(plan.start_of(name).known)
     left_out: list[str] = []
+    unstarted: list[tuple[str, str]] = []
     notes: list[str] = []
     for one in _dicts(report.get("left_out"), LEFT_OUT):
-        (notes if _is_harmless(one) else left_out).append(_left_out(name, one, places))
+        words, text = _command(one), _left_out(name, one, places)
+        if only := _only_name(words):
+            unstarted.append((text, only))
+        else:
+            (notes if _is_harmless(words) else left_out).append(text)
     made = Launched()
     for node in _dicts(report.get("nodes"), NODES):
         package, wanted = _text(node.get("package")), _text(node.get("executable"))
@@ -148,7 +160,7 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
         where = _place(name, node, places)
         if found is None or found.file is None:
             if found is None and (why := why_unknown(root, plan.projects, package, wanted)):
-                left_out.append(f"{where}: {_program(package, wanted)} was not started: {why}")
+                unstarted.append((f"{where}: {_program(package, wanted)} was not started: {why}", ""))
                 continue
             if known_package or near:
                 text = _not_found(package, wanted, found, executables(root, plan.projects), near)
@@ -156,19 +168,24 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
                 return Launched(
                     fault=Fault(0, name, FaultKind.EXCEPTION, text, file if line else "", int(line or 0)),
                     left_out=tuple(left_out),
+                    unstarted=tuple(unstarted),
                 )
             sentence = f"{where}: {_program(package, wanted)} was not started: {_lacking(package)}"
-            (notes if package in ONLY_LOOKING else left_out).append(sentence)
+            if package in ONLY_LOOKING:
+                notes.append(sentence)
+            else:
+                unstarted.append((sentence, ""))
             continue
         if not known_package:
             notes.append(f"{where}: {_lacking(package)}; {found.file} was started")
         made = _added(made, name, node, found, where, known)
         if problem := made.starts[-1].problem:
-            return Launched(fault=Fault(0, name, FaultKind.KILLED, problem), left_out=tuple(left_out))
-    if not made.processes and not left_out:
+            fault = Fault(0, name, FaultKind.KILLED, problem)
+            return Launched(fault=fault, left_out=tuple(left_out), unstarted=tuple(unstarted))
+    if not made.processes and not left_out and not unstarted:
         text = "describes no node"
         return Launched(fault=Fault(0, name, FaultKind.EXITED, text), notes=tuple(notes))
-    return replace(made, left_out=tuple(left_out), notes=tuple(notes))
+    return replace(made, left_out=tuple(left_out), unstarted=tuple(unstarted), notes=tuple(notes))
 
 
 def _added(  # noqa: PLR0913  what one node consists of
@@ -221,20 +238,28 @@ def _not_found(package: str, wanted: str, found: Executable | None, known: Seque
     return f"{text}; its executables are {names}" if names else f"{text}; it has no executables"
 
 
-def _is_harmless(one: Mapping[str, Any]) -> bool:
-    """Return whether what was left out changes nothing for the nodes: a command that takes no part in the ROS graph."""
-    if one.get("code") != "command":
-        return False
-    text = _text(one.get("text"))
-    words = text.split()
-    if not words or re.search(r"[;&|`$<>\n]", text):  # a shell may run more
-        return False
-    command = words[0].rpartition("/")[2]
+def _command(one: Mapping[str, Any]) -> list[str]:
+    """Return the words of a command that was left out; none for anything else, and where a shell may run more."""
+    text = _text(one.get("text")) if one.get("code") == "command" else ""
+    return [] if re.search(r"[;&|`$<>\n]", text) else text.split()
+
+
+def _is_harmless(words: Sequence[str]) -> bool:
+    """Return whether a command takes no part in the ROS graph, so that leaving it out changes nothing for the nodes."""
+    command = words[0].rpartition("/")[2] if words else ""
     return command in HARMLESS or (command == "ros2" and tuple(words[1:3]) in HARMLESS_OF_ROS)
 
 
+def _only_name(words: Sequence[str]) -> str:
+    """Return the topic, service or action of a command of `ros2` that uses no other; empty for another command."""
+    if list(words[:1]) != ["ros2"] or tuple(words[1:3]) not in ONE_NAME:
+        return ""
+    named = (name for name, kind in pairwise(words[3:]) if _TYPE.fullmatch(kind) and _TOPIC.fullmatch(name))
+    return next((name if name.startswith("/") else f"/{name}" for name in named), "")
+
+
 def _left_out(name: str, one: Mapping[str, Any], places: Places) -> str:
-    return f"{_place(name, one, places)}: {left_out_words(one)} is not supported and was left out"
+    return f"{_place(name, one, places)}: {left_out_sentence(one)}"
 
 
 def _place(name: str, one: Mapping[str, Any], places: Places) -> str:
@@ -297,13 +322,15 @@ def renamed(trace: Trace, launched: Mapping[str, Launched]) -> Trace:
     """Return a trace in which processes go by the names that a rubric uses, and which tells what was left out."""
     labels = {process: label for made in launched.values() for process, label in made.labels}
     left_out = tuple(one for made in launched.values() for one in made.left_out)
+    unstarted = tuple(one for made in launched.values() for one in made.unstarted)
     notes = tuple(one for made in launched.values() for one in made.notes)
     return replace(
         trace,
         observations=tuple(_renamed(one, labels) for one in trace.observations),
         starts=tuple(replace(start, process=labels.get(start.process, start.process)) for start in trace.starts),
-        notes=(*left_out, *notes, *trace.notes),
+        notes=(*left_out, *(text for text, _ in unstarted), *notes, *trace.notes),
         left_out=left_out,
+        unstarted=unstarted,
     )
 
 

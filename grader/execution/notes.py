@@ -70,14 +70,22 @@ def _without_waiting(path: str, flags: int) -> int:
 _LEFT_OUT: Mapping[str, tuple[str, re.Pattern[str] | None]] = {
     "action": ("the action {name}", re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,59}")),
     "command": ("the command {text}", None),
-    "launch_file": ("the launch file {name}, which is not in Python,", re.compile(r"[A-Za-z0-9_.-]{1,80}")),
-    "module": ("what needs the package {name}, which is not here,", re.compile(r"[a-z0-9_]{1,80}")),
+    "launch_file": ("the launch file {name}", re.compile(r"[A-Za-z0-9_.-]{1,80}")),
+    "module": ("what needs the package {name}", re.compile(r"[a-z0-9_]{1,80}")),
     "node_argument": ("{name}= of a node", re.compile(r"[a-z_]{1,40}")),
     "nodes": ("a node beyond the first 16", None),
-    "package": ("the package {name}, which is not in the submission,", re.compile(r"[A-Za-z0-9_-]{1,80}")),
-    "parameter_file": ("the parameter file {name}, which is not there,", re.compile(r"[A-Za-z0-9_.-]{1,80}")),
+    "package": ("what needs the package {name}", re.compile(r"[A-Za-z0-9_-]{1,80}")),
+    "parameter_file": ("the parameter file {name}", re.compile(r"[A-Za-z0-9_.-]{1,80}")),
     "substitution": ("the substitution {name}({text})", re.compile(r"[A-Z][A-Za-z]{0,39}")),
     "variable": ("the environment variable {name}", re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,79}")),
+}
+#: Why something is left out that would be understood otherwise, by its code.
+_WHY = {
+    "launch_file": "it is not in Python",
+    "module": "this package is not here",
+    "nodes": "no more are started",
+    "package": "the submission has no such package",
+    "parameter_file": "it is not there",
 }
 _QUOTED_CHARACTERS = 80
 
@@ -100,6 +108,13 @@ def left_out_words(data: Mapping[str, Any]) -> str:
     if known is not None and not known.fullmatch(name):
         name = quoted(name)
     return words.format(name=name, text=quoted(text))
+
+
+def left_out_sentence(data: Mapping[str, Any]) -> str:
+    """Return what `left_out_words` says as a sentence, with the reason."""
+    why = _WHY.get(str(data.get("code")))
+    words = left_out_words(data)
+    return f"{words} was left out: {why}" if why else f"{words} is not supported and was left out"
 
 
 _WAYS = {way.value: way for way in StartWay}

@@ -12,6 +12,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,7 @@ class Taken:
     type: str
     cdr: bytes
     value: Mapping[str, Any]
+    sent_ns: int = 0  # when it was sent, by the system clock; 0 if that is not known
 
 
 def in_order(messages: Iterable[Taken]) -> list[Taken]:
@@ -311,7 +313,8 @@ class Observer:
                 if found is None:
                     break
                 left_bytes -= len(found[0])
-                taken.append(self._decoded(topic, interface, reader.msg_type, found[0]))
+                sent_ns = int(found[1].get("source_timestamp", 0))
+                taken.append(replace(self._decoded(topic, interface, reader.msg_type, found[0]), sent_ns=sent_ns))
         return taken, left_bytes
 
     def take_rest(self) -> list[Taken]:

@@ -161,11 +161,11 @@ class Runner(ABC):
     def _finished(self) -> bool:
         return all(s.ended for s in self._students) and not any(isinstance(d, (TopicEvent, Step)) for d in self._due)
 
-    def _record(self, now_ns: int, taken: Taken) -> None:
+    def _record(self, now_ns: int, taken: Taken, *, early: bool = False) -> None:
         first = taken.topic == self._plan.first_message_on and not self._recorder.seen(taken.topic)
         if first and not self._stop_ns:
             self._end_ns = now_ns + self._plan.duration_ns
-        self._recorder.message(now_ns, taken)
+        self._recorder.message(now_ns, taken, early=early)
         if self._plan.simulations and not (self._recorder.full or self._stop_ns):
             for event in self._simulations.hear(taken, self._moment(now_ns)):
                 self._later(event)

@@ -62,8 +62,8 @@ class TraceRecorder:
             if self._counts[kind] <= {Fault: FAULTS, Offer: OFFERS}.get(kind, len(self.observations) + 1):
                 self.observations.append(observation)
 
-    def message(self, t_ns: int, taken: Taken) -> None:
-        """Record a message, or end the recording if it exceeds a limit."""
+    def message(self, t_ns: int, taken: Taken, *, early: bool = False) -> None:
+        """Record a message, or end the recording if it exceeds a limit; early is one that was sent before discovery."""
         limits = self._limits
         self._messages[taken.topic] += 1
         self._traffic_bytes += len(taken.cdr)
@@ -72,7 +72,7 @@ class TraceRecorder:
         elif self._traffic_bytes > limits.traffic_bytes:
             self.stop(t_ns, f"more than {size(limits.traffic_bytes)} of messages")
         elif not self.full:
-            self.observations.append(Message(t_ns, taken.topic, taken.type, taken.value, taken.cdr))
+            self.observations.append(Message(t_ns, taken.topic, taken.type, taken.value, taken.cdr, early))
 
     def exchange(self, observation: Request | Response, size_bytes: int) -> None:
         """Record a request or response, or end the recording if it exceeds a limit.

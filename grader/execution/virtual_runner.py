@@ -59,6 +59,8 @@ class VirtualRunner(Runner):
         self._steps = 0
         self._hops = 0
         self._has_lost = False
+        #: When the publishers of each process, by their numbers there, have appeared.
+        self._appeared_ns: dict[tuple[str, int], int] = {}
         self._discovery = Discovery(students, observer, self._recorder, self._services, self._mark_dead)
         self._topics = VirtualTopicPeers(students, observer, self._recorder, self._discovery)
 
@@ -235,7 +237,8 @@ class VirtualRunner(Runner):
             self._recorder.note(f"{student.name}: {some} on {where} did not arrive in time")
             self._has_lost = True
         if sent := counts(report.get("sent")):
-            self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
+            early = _of_topics(counts(report.get("early")))
+            self._collect(_of_topics(sent), {t: n for t, n in early.items() if self._is_new(student, t)})
             self._collect_exchanges(student, sent)
             self._forward(student, sent)
         endpoints = report.get("endpoints")
@@ -244,6 +247,9 @@ class VirtualRunner(Runner):
                 self._recorder.stop(self._now_ns, f"more than {CLAIMS:,} endpoints and parameters of {student.name}")
             student.claims, student.renewed = [c for c in endpoints[:CLAIMS] if is_claim(c)], True
             student.sees_graph = report.get("sees_graph") is True
+            for claim in student.claims:
+                if claim["kind"] == "publisher":
+                    self._appeared_ns.setdefault((student.name, claim.get("number", 0)), self._now_ns)
             self._note_offers(student)
             self._discovery.match(self._now_ns)
             for due in self._services.ready(self._is_served):
@@ -258,12 +264,23 @@ class VirtualRunner(Runner):
                 student.offers.add(offer)
                 self._recorder.add(Offer(self._now_ns, student.name, *offer))
 
-    def _collect(self, sent: Mapping[str, int]) -> None:
-        """Wait until the observer has taken all published messages, and record them."""
+    def _is_new(self, student: NodeProcess, topic: str) -> bool:
+        """Return whether a process has a publisher on a topic that has appeared at this instant."""
+        publishers = (c for c in student.claims if c["kind"] == "publisher" and c["name"] == topic)
+        return any(self._appeared_ns.get((student.name, c.get("number", 0))) == self._now_ns for c in publishers)
+
+    def _collect(self, sent: Mapping[str, int], early: Mapping[str, int]) -> None:
+        """Wait until the observer has taken all published messages, and record them.
+
+        Args:
+            sent: How many messages a process has published on each topic.
+            early: How many of them, the first ones, it has sent before any subscription could have discovered it.
+        """
         expected = Counter({topic: n for topic, n in sent.items() if self._observer.reads(topic)})
         if not expected:
             return
         arrived: list[Taken] = []
+        first = Counter(early)
 
         def complete() -> bool:
             taken = self._observer.take()
@@ -275,7 +292,8 @@ class VirtualRunner(Runner):
 
         def record_arrived() -> None:
             for message in in_order(arrived):
-                self._record(self._now_ns, message)
+                self._record(self._now_ns, message, early=first[message.topic] > 0)
+                first[message.topic] -= 1
             arrived.clear()
 
         in_time = self._discovery.patience.wait(complete)
@@ -377,6 +395,11 @@ class VirtualRunner(Runner):
         for server in self._services.done():
             if not any(f"response {server.service}" in s.arrivals for s in self._students if not s.ended):
                 self._do(RemoveServer(self._now_ns, server), self._now_ns)
+
+
+def _of_topics(counted: Mapping[str, int]) -> dict[str, int]:
+    """Return the counts of topics by their names, without those of services."""
+    return {channel[6:]: count for channel, count in counted.items() if channel.startswith("topic ")}
 
 
 def _senders(process: NodeProcess, channel: str) -> Sequence[Mapping[str, Any]]:

@@ -8,11 +8,12 @@ the run is not judged.
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from grader.core.quantities import NS_PER_MS
-from grader.core.trace import ClockKind, Mark
+from grader.core.trace import ClockKind, Mark, Message, Observation
 from grader.execution.ending import ending
 from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer
@@ -29,6 +30,8 @@ MESSAGES_A_LOOK, READS_A_LOOK = 100, 2
 PAUSE_S = 0.0002
 LONGEST_PAUSE_NS = 10 * NS_PER_MS
 HELD_UP_NS = 150 * NS_PER_MS
+#: The most early messages that are told apart.
+MOST_EARLY = 10_000
 #: How long before its first message a publisher is created, so that subscriptions can discover it.
 LEAD_NS = 300 * NS_PER_MS
 GRAPH_EVERY_NS = 50 * NS_PER_MS
@@ -53,6 +56,12 @@ class WallRunner(Runner):
         self._next_graph_ns = 0
         self._graph_every_ns = GRAPH_EVERY_NS
         self._started = 0
+        #: When messages were sent before anybody could have discovered their publisher: topic -> beginnings and ends,
+        #: by the system clock, as the processes report them.
+        self._early: dict[str, list[tuple[int, int]]] = {}
+        self._early_told = 0
+        #: When messages were sent, by the system clock, by their index in the recording.
+        self._sent_ns: dict[int, int] = {}
         self.held_up_ns = 0
 
     def _time_ns(self) -> int:
@@ -118,11 +127,25 @@ class WallRunner(Runner):
             self._hear(student, now_ns)
         for taken in self._observer.take(MESSAGES_A_LOOK):
             self._record(now_ns, taken)
+            self._sent_ns[len(self._recorder.observations) - 1] = taken.sent_ns
             self._end_if_full(now_ns)
         if now_ns >= self._next_graph_ns:
             changed = self._look_at_graph(now_ns)
             self._graph_every_ns = GRAPH_EVERY_NS if changed else min(2 * self._graph_every_ns, self.rarest_graph_ns)
             self._next_graph_ns = now_ns + self._graph_every_ns
+
+    def _observations(self) -> tuple[Observation, ...]:
+        found = super()._observations()
+        if not self._early:
+            return found
+        return tuple(self._marked(one, self._sent_ns.get(place, 0)) for place, one in enumerate(found))
+
+    def _marked(self, one: Observation, sent_ns: int) -> Observation:
+        """Mark a message as sent before discovery if that was reported; the report may arrive after the message."""
+        told = self._early.get(one.topic, ()) if isinstance(one, Message) else ()
+        if isinstance(one, Message) and any(began_ns <= sent_ns <= ended_ns for began_ns, ended_ns in told):
+            return replace(one, before_discovery=True)
+        return one
 
     def _hear(self, student: NodeProcess, now_ns: int) -> None:
         reports = [] if student.ended else student.reports()
@@ -133,6 +156,8 @@ class WallRunner(Runner):
                 student.ended = True
             elif report.get("kind") == "note":
                 student.note(report)
+            elif report.get("kind") == "early":
+                self._note_early(report)
             elif report.get("kind") == "fault":
                 self._report_fault(student, report, now_ns)
             elif report.get("kind") == "exited":
@@ -141,6 +166,12 @@ class WallRunner(Runner):
                 self._recorder.add(ending(student.name, now_ns, report, self._plan, places, stopped=stopped))
                 student.ended = True
         self._recorder.add(*student.output(now_ns))
+
+    def _note_early(self, report: Mapping[str, Any]) -> None:
+        topic, began_ns, ended_ns = (report.get(name) for name in ("topic", "began_ns", "ended_ns"))
+        if self._early_told < MOST_EARLY and isinstance(began_ns, int) and isinstance(ended_ns, int):
+            self._early_told += 1
+            self._early.setdefault(str(topic), []).append((began_ns, ended_ns))
 
     def _look_at_graph(self, now_ns: int) -> bool:
         """Record the graph, subscribe to what is new, and return whether it has changed."""

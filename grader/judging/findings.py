@@ -11,7 +11,7 @@ from grader.core.exercise import Finding, Location, Problem, ProblemKind, exact_
 from grader.core.quantities import NS_PER_S, counted, seconds
 from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace
 from grader.judging.values import HIDDEN_TOPICS, student_endpoints
-from grader.judging.wording import listed, nearest, quote, span
+from grader.judging.wording import listed, moment, nearest, quote, span
 
 #: Evidence key for the fault that a finding rests on; judging an exercise counts each fault once.
 FAULT_KEY = "fault"
@@ -25,6 +25,8 @@ _URGENCY = {
 }
 _SPIN_HINT = "a node lives as long as it spins: call rclpy.spin(node) at the end of main()"
 _RUN_ON_HINT = "keep the node running: it must not end before it is stopped"
+#: What helps against a message that is sent before discovery.
+SEND_LATER = "publish from a timer, or wait until get_subscription_count() of the publisher is not 0"
 #: A node that exits within this time never waited for anything.
 AT_ONCE_NS = NS_PER_S
 
@@ -278,15 +280,28 @@ def _most_alike(name: str, same_type: Sequence[str], others: Sequence[str]) -> s
 
 
 def explain_no_message(trace: Trace, topic: str, type_: str | None = None) -> Finding:
-    """Return no credit with the reason why there is no message on `topic`, of `type_` if given."""
+    """Return no credit with the reason why there is no message that counts on `topic`, of `type_` if given."""
     messages = [m for m in trace.messages() if m.t_ns < trace.stop_ns and m.topic not in HIDDEN_TOPICS]
     return (
-        _other_type(messages, topic, type_)
+        _too_early(messages, topic, type_)
+        or _other_type(messages, topic, type_)
         or _other_topic(messages, topic, type_)
         or explain_fault(trace, f"no message on {topic}")
         or _silent_publisher(trace, topic, type_)
         or _nothing(trace, topic, "publisher")
     )
+
+
+def _too_early(messages: list[Message], topic: str, type_: str | None) -> Finding | None:
+    """Return the reason why messages do not count that were sent before discovery; None if there are none."""
+    early = [m for m in messages if m.topic == topic and m.before_discovery and type_ in (None, m.type)]
+    if not early:
+        return None
+    some = "the only message was" if len(early) == 1 else f"all {len(early)} messages were"
+    reason = f"{moment(early[0].t_ns)}, {topic}: {some} sent as soon as the publisher was created"
+    evidence = {"topic": topic, "type": early[0].type, "messages": 0, "before_discovery": len(early)}
+    reason += ": nobody can have discovered it by then"
+    return not_met(reason, evidence, hint=SEND_LATER, problem=ProblemKind.TOO_EARLY)
 
 
 def _other_type(messages: list[Message], topic: str, type_: str | None) -> Finding | None:

@@ -38,6 +38,19 @@ ROS_PACKAGES = frozenset(
 
 #: Those that no ROS package holds, but that such an installation needs, with the extra of the grader that brings them.
 EXTRAS = {"cv2": "opencv", "matplotlib": "plots"}
+#: What packages have that the grader lends where ROS brings none of its own, and the lent ones have not.
+NOT_LENT: Mapping[str, tuple[str, ...]] = {
+    "cv_bridge": ("boost", "cv_bridge_boost"),
+    "message_filters": ("InputAligner",),
+    "sensor_msgs_py": ("numpy_compat",),
+    "tf2_geometry_msgs": ("transform_to_kdl",),
+    "tf2_ros": ("BufferClient", "buffer_client", "StaticTransformListener", "static_transform_listener"),
+    "tf_transformations": words(
+        "Arcball arcball_constrain_to_axis arcball_map_to_sphere arcball_nearest_axis clip_matrix "
+        "orthogonalization_matrix projection_from_matrix projection_matrix reflection_from_matrix scale_from_matrix "
+        "shear_from_matrix shear_matrix superimposition_matrix"
+    ),
+}
 #: Endings of the names of packages that hold nothing but interfaces.
 INTERFACES = ("_msgs", "_interfaces")
 
@@ -51,15 +64,34 @@ class LackingPackage:
 
 
 def lacking_package(trace: Trace, processes: Sequence[str], sources: Mapping[str, str]) -> LackingPackage | None:
-    """Return the package without which a program of a scenario ended, if its text imports it."""
+    """Return the package, or part of one, without which a program of a scenario ended, if its text imports it."""
+    launched = any(map(is_launch_file, processes))  # a launch file's nodes have names of their own
     for fault in faults_before_stop(trace):
-        found = fault.said(r"^ModuleNotFoundError: No module named '(\w+)") if fault.process in processes else None
-        if found is None or fault.kind is not FaultKind.EXCEPTION or found[1] not in ROS_PACKAGES:
+        if fault.kind is not FaultKind.EXCEPTION or not (launched or fault.process in processes):
             continue
+        name = _lacking(fault)
+        package = name.partition(".")[0]
         # the import stands in another file of the submission if the fault does
-        if fault.file.rpartition("/")[2] != fault.process or _imports(sources.get(fault.process, ""), found[1]):
-            return LackingPackage(found[1], fault)
+        if name and (
+            fault.file.rpartition("/")[2] != fault.process or _imports(sources.get(fault.process, ""), package)
+        ):
+            return LackingPackage(name, fault)
     return None
+
+
+def _lacking(fault: Fault) -> str:
+    """Return the package, or the part of a lent one, that an exception says is not there; empty for any other."""
+    module = fault.said(r"^ModuleNotFoundError: No module named '([\w.]+)'")
+    if module is not None:
+        package, _, part = module[1].partition(".")
+        return package if package in ROS_PACKAGES and (not part or package not in NOT_LENT) else _part(package, part)
+    found = fault.said(r"^ImportError: cannot import name '(?P<name>\w+)' from '(?P<of>[\w.]+)'")
+    found = found or fault.said(r"^AttributeError: module '(?P<of>[\w.]+)' has no attribute '(?P<name>\w+)'")
+    return "" if found is None else _part(found["of"].partition(".")[0], found["name"])
+
+
+def _part(package: str, name: str) -> str:
+    return f"{package}.{name}" if name in NOT_LENT.get(package, ()) else ""
 
 
 def lacking_python(trace: Trace, processes: Sequence[str], place: Location | None) -> NewerPython | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, field, replace
 from fractions import Fraction
@@ -22,9 +23,9 @@ from grader.core.submission import EXPORT_NOTEBOOK, Run, Submission, is_notebook
 from grader.core.trace import ClockKind, Fault, GraphSnapshot, StartWay, Trace, same_node_name
 from grader.judging.diagnosis import diagnose, placed
 from grader.judging.figures import excerpts_for, illustrated
-from grader.judging.findings import FAULT_KEY, fault_evidence
+from grader.judging.findings import FAULT_KEY, SEND_LATER, fault_evidence
 from grader.judging.run_check import Answer, check_name, run_check
-from grader.judging.values import on_student_topic
+from grader.judging.values import HIDDEN_TOPICS, on_student_topic
 from grader.judging.wording import listed, quote
 
 
@@ -100,9 +101,24 @@ def judge_exercise(
 def _notes(
     recorded: list[tuple[str, Trace]], submission: Submission, sources: Mapping[str, str] | None
 ) -> tuple[str, ...]:
-    found = (note for _, t in recorded for note in (*started(t), *same_names(t), *t.notes))
+    found = (note for _, t in recorded for note in (*started(t), *same_names(t), *unheard(t), *t.notes))
     notes = tuple(dict.fromkeys(found))
     return notes if sources is None else placed(notes, submission, sources)
+
+
+def unheard(trace: Trace) -> tuple[str, ...]:
+    """Return notes on the topics whose first messages nobody would have heard outside, because they came too early."""
+    early = Counter(m.topic for m in trace.messages() if m.before_discovery and m.topic not in HIDDEN_TOPICS)
+    return tuple(_unheard(quote(topic), count, len(trace.messages(topic))) for topic, count in early.items())
+
+
+def _unheard(topic: str, early: int, messages: int) -> str:
+    which = ("all" if early > 1 else "the only") if early == messages else "the first"
+    what, it = ("messages were", "them") if early > 1 else ("message was", "it")
+    return (
+        f"{topic}: {which} {what} published as soon as the publisher was created; on a real system nobody would have "
+        f"heard {it}, because discovery takes a moment: {SEND_LATER}"
+    )
 
 
 def started(trace: Trace) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from grader.judging.authored import breach, is_authored, mistake_in, mistake_of
 from grader.judging.checks import CHECKS
 from grader.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
 from grader.judging.installation import EXTRAS, INTERFACES, lacking_package, lacking_python
+from grader.judging.launched import excuses
 from grader.judging.values import student_endpoints
 from grader.judging.wording import quote, span
 
@@ -88,7 +89,7 @@ def run_check(
             )
     answer = _for_older_python(answer, scenario, trace)
     if not reads_sources(criterion.check):
-        return _for_what_is_lacking(answer, scenario, trace, sources or {})
+        return _for_what_is_lacking(answer, criterion, scenario, trace, sources or {})
     return answer if answer.finding is None else replace(answer, finding=_placed(answer.finding, submission))
 
 
@@ -122,19 +123,23 @@ def _for_older_python(answer: Answer, scenario: Scenario, trace: Trace) -> Answe
     return Answer(problem=lack.sentence, hint=hint, fault=fault)
 
 
-def _for_what_is_lacking(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
+def _for_what_is_lacking(
+    answer: Answer, criterion: Criterion, scenario: Scenario, trace: Trace, sources: Mapping[str, str]
+) -> Answer:
     """Return the answer; no answer if points are lost where this installation lacks a package of ROS.
 
     Nor is there one where a launch file asks for something that the grader cannot do.
     """
     lost = answer.finding is not None and answer.finding.credit < 1
-    if lost and trace.left_out:
-        problem = f"{trace.left_out[0]}, which can be why this is not met"
+    excuse = next(excuses(criterion.check, trace), "") if lost else ""
+    if excuse:
+        problem = f"{excuse}, which can be why this is not met"
         return Answer(problem=problem, hint=_LEFT_OUT_HINT, suspected=True)
     lack = lacking_package(trace, scenario.processes, sources) if lost else None
     if lack is None:
         return answer
-    text = f"{fault_place(lack.fault)}: {lack.name} is a package of ROS 2 that is not installed where this was graded"
+    kind = "part" if "." in lack.name else "package"
+    text = f"{fault_place(lack.fault)}: {lack.name} is a {kind} of ROS 2 that is not installed where this was graded"
     hint = f"grade again where {lack.name} is installed, or leave the import out if the program does not need it"
     if lack.name in EXTRAS:
         text = f"{fault_place(lack.fault)}: {lack.name} comes with ROS 2 and is not installed where this was graded"

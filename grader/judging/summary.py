@@ -14,8 +14,8 @@ from grader.core.quantities import NS_PER_S, seconds
 from grader.core.report import Pace, Summary, TopicSummary
 from grader.core.trace import Fault, Message, Offer, Trace
 from grader.judging.diagnosis import hint_for, placed_in
-from grader.judging.installation import INTERFACES, lacking_package
-from grader.judging.judge_run import same_names, started
+from grader.judging.installation import EXTRAS, INTERFACES, lacking_package
+from grader.judging.judge_run import same_names, started, unheard
 from grader.judging.values import as_number
 
 #: The different values of a text field that a summary names, and the elements of an array that it looks at: enough for
@@ -35,7 +35,7 @@ def summarise(
         sources: The text of files by path, for hints: those that the programs are, and those that faults name.
     """
     graphs = trace.graphs()
-    notes = (*started(trace), *same_names(trace), *trace.notes, *(one.sentence for one in trace.newer))
+    notes = (*started(trace), *same_names(trace), *unheard(trace), *trace.notes, *(one.sentence for one in trace.newer))
     names = {e.topic for g in graphs for e in g.endpoints}
     return Summary(
         processes=tuple(processes),
@@ -66,9 +66,12 @@ def _hint(fault: Fault, trace: Trace, sources: Mapping[str, str]) -> str:
     lack = lacking_package(replace(trace, observations=(fault,)), [fault.process], {fault.process: text})
     if lack is None:
         return hint_for(fault, trace, text)
+    if lack.name in EXTRAS:
+        return f"{lack.name} is not installed here: pip install 'rclpy-grader[{EXTRAS[lack.name]}]' brings it"
     if lack.name.endswith(INTERFACES):
         return f"{lack.name} is not installed here: give the folder with its definitions as --interfaces"
-    return f"{lack.name} is a package of ROS 2 that is not installed here: the program may be right where it is"
+    kind = "part" if "." in lack.name else "package"
+    return f"{lack.name} is a {kind} of ROS 2 that is not installed here: the program may be right where it is"
 
 
 def _topic(trace: Trace, name: str) -> TopicSummary:

@@ -97,9 +97,16 @@ def carries_number(type_: str) -> bool:
 
 
 @per_trace
-def published(trace: Trace, topic: str) -> tuple[Message, ...]:
-    """Return the messages of the student's nodes on a topic during the observation."""
-    return tuple(m for m in trace.messages(topic) if m.t_ns < trace.stop_ns)
+def published(trace: Trace, topic: str, after_discovery: bool = False) -> tuple[Message, ...]:  # noqa: FBT001, FBT002
+    """Return the messages of the student's nodes on a topic during the observation.
+
+    Args:
+        trace: The trace.
+        topic: The topic.
+        after_discovery: Whether those do not count that were sent before anybody could have discovered the publisher.
+    """
+    found = (m for m in trace.messages(topic) if m.t_ns < trace.stop_ns)
+    return tuple(m for m in found if not (after_discovery and m.before_discovery))
 
 
 @per_trace

@@ -38,6 +38,7 @@ _SAID: Mapping[ProblemKind, str] = {
     ProblemKind.SILENT: "it is there, but nothing is sent",
     ProblemKind.TOO_FEW: "fewer were seen than are asked for",
     ProblemKind.TOO_MANY: "more were seen than are asked for",
+    ProblemKind.TOO_EARLY: "it is sent before anybody can have discovered the publisher",
     ProblemKind.TOO_LATE: "what is asked for comes too late",
     ProblemKind.WRONG_RATE: "the rate is not the one asked for",
     ProblemKind.RATE_CHANGES: "the rate is right on average, but it changes",

@@ -8,6 +8,8 @@ from collections.abc import Callable
 
 sleep = time.sleep
 perf_counter = time.perf_counter
+time_ns = time.time_ns
+thread_time = time.thread_time
 allocate_lock = _thread.allocate_lock
 get_ident = _thread.get_ident
 get_native_id = _thread.get_native_id

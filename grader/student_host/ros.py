@@ -14,7 +14,7 @@ import os
 import signal
 import sys
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import CodeType, SimpleNamespace
 from typing import Any
 
@@ -30,7 +30,8 @@ import rclpy.subscription
 import rclpy.task
 import rclpy.time_source
 import rclpy.utilities
-from rclpy.clock import Clock, ClockType, ROSClock
+from rclpy.clock import Clock, ClockChange, ClockType, JumpHandle, JumpThreshold, ROSClock, TimeJump
+from rclpy.duration import Duration
 from rclpy.event_handler import QoSPublisherEventType, QoSSubscriptionEventType
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -85,6 +86,9 @@ class RosClocks:
         self._made: weakref.WeakSet[Clock] = weakref.WeakSet()
         self._simulated: weakref.WeakSet[Clock] = weakref.WeakSet()
         self._told: weakref.WeakKeyDictionary[Clock, Time] = weakref.WeakKeyDictionary()
+        #: The clock that a message on /clock, or the program, sets right now: it may jump.
+        self._jumping: Clock | None = None
+        self._on_change: weakref.WeakKeyDictionary[Clock, weakref.WeakSet[JumpHandle]] = weakref.WeakKeyDictionary()
 
     def new(self, cls: type[Clock] = Clock, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> Clock:
         """Replace `Clock.__new__`."""
@@ -123,24 +127,61 @@ class RosClocks:
     def simulate(self, clock: ROSClock, active: bool) -> None:
         """Replace `ROSClock._set_ros_time_is_active`; a clock that no message has set yet is at 0."""
         if active and clock in self._made:
-            self._made.discard(clock)
-            self._simulated.add(clock)
-            _set(clock, self._told.get(clock) or Time(clock_type=ClockType.ROS_TIME))
+            with self._changing(clock, ClockChange.ROS_TIME_ACTIVATED):
+                self._made.discard(clock)
+                self._simulated.add(clock)
+                _set(clock, self._told.get(clock) or Time(clock_type=ClockType.ROS_TIME))
         elif not active and clock in self._simulated:
-            self._simulated.discard(clock)
-            self._made.add(clock)
-            _set(clock, self._time())
+            with self._changing(clock, ClockChange.ROS_TIME_DEACTIVATED):
+                self._simulated.discard(clock)
+                self._made.add(clock)
+                _set(clock, self._time())
 
     def tell(self, clock: ROSClock, time: Time) -> None:
         """Replace `ROSClock.set_ros_time_override`, which counts only while the clock is simulated."""
         self._told[clock] = time
         if clock in self._simulated:
-            _set(clock, time)
+            self._jumping = clock
+            try:
+                _set(clock, time)
+            finally:
+                self._jumping = None
+
+    def watch_jumps(
+        self, clock: Clock, threshold: JumpThreshold, *, pre_callback: Any = None, post_callback: Any = None
+    ) -> JumpHandle:
+        """Replace `Clock.create_jump_callback`: that virtual time goes on is no jump."""
+
+        def told(callback: Any) -> Any:
+            def call(*jump: Any) -> None:
+                if self._jumping is clock:
+                    callback(*jump)
+
+            return call if callable(callback) else callback
+
+        handle = _WATCH_JUMPS(clock, threshold, pre_callback=told(pre_callback), post_callback=told(post_callback))
+        if threshold.on_clock_change:
+            handle.grader_callbacks = (pre_callback, post_callback)
+            self._on_change.setdefault(clock, weakref.WeakSet()).add(handle)
+        return handle
+
+    @contextlib.contextmanager
+    def _changing(self, clock: Clock, change: ClockChange) -> Iterator[None]:
+        """Tell those who watch a clock that /clock begins or ends to set it."""
+        callbacks = [h.grader_callbacks for h in self._on_change.get(clock, ()) if h._clock is not None]
+        for before, _ in callbacks:
+            if before is not None:
+                before()
+        yield
+        for _, after in callbacks:
+            if after is not None:
+                after(TimeJump(change, Duration()))
 
     def _time(self) -> Time:
         return Time(nanoseconds=self._clock.now_ns, clock_type=ClockType.ROS_TIME)
 
 
+_WATCH_JUMPS = Clock.create_jump_callback
 #: Checks whether a task has ended, without counting as a look, which would let time pass.
 _DONE = rclpy.task.Future.done
 _RclTime = type(Time()._time_handle)
@@ -154,6 +195,10 @@ def system_ns() -> int:
 
 def _of_clock(clock: ROSClock, method: Callable[[ROSClock, Any], None], value: Any) -> None:
     method(clock, value)
+
+
+def _watch_jumps(clock: Clock, clocks: RosClocks, threshold: JumpThreshold, **callbacks: Any) -> JumpHandle:
+    return clocks.watch_jumps(clock, threshold, **callbacks)
 
 
 def _set(clock: Clock, time: Time) -> None:
@@ -187,6 +232,8 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
     ROSClock.__new__ = staticmethod(lambda cls: clocks.new(cls, clock_type=ClockType.ROS_TIME))
     ROSClock._set_ros_time_is_active = functools.partialmethod(_of_clock, clocks.simulate)
     ROSClock.set_ros_time_override = functools.partialmethod(_of_clock, clocks.tell)
+    ROSClock.ros_time_is_active = property(clocks.simulates)
+    Clock.create_jump_callback = functools.partialmethod(_watch_jumps, clocks)
     rclpy.impl.rcutils_logger.Throttle.params["throttle_time_source_type"] = Clock()
 
     timer = rclpy.executors.Timer
@@ -446,12 +493,13 @@ def replace_log(wrap: Callable[[Callable[..., Any]], Callable[..., Any]]) -> Non
     _rclpy.rclpy_logging_rcutils_log = wrap(_rclpy.rclpy_logging_rcutils_log)
 
 
-def install_traffic(
+def install_traffic(  # noqa: PLR0913 - all that the traffic depends on
     ledger: Ledger,
     clock: VirtualClock,
     settle: Callable[[], None],
     leave: Callable[[], None],
     give_up: Callable[[], None],
+    work_ns: Callable[[], int],
 ) -> None:
     """Count what is published and taken, and let the grader match every endpoint before it is used.
 
@@ -461,6 +509,7 @@ def install_traffic(
         settle: Yields to the grader at the same instant.
         leave: The same, but returns only after all sent messages have arrived; called before a sender is destroyed.
         give_up: Called for an endpoint whose events the middleware times on the real clock.
+        work_ns: Returns how much processor time the program has used.
     """
     ledger.events.install(BACKGROUND)
     _install_endpoints(ledger, settle, leave, give_up)
@@ -477,11 +526,13 @@ def install_traffic(
         if ledger.is_elsewhere(handle):
             return send()
         clock.busy_sending()
-        ledger.note_sent(name, handle)
+        early = ledger.early[name]
+        ledger.note_sent(name, handle, work_ns())
         try:
             return send()
         except BaseException:
             ledger.sent[name] -= 1  # nothing was sent, e.g. because the context was shut down
+            ledger.early[name] = early
             raise
 
     publish = rclpy.publisher.Publisher.publish
@@ -503,6 +554,14 @@ def install_traffic(
     def counted_respond(self: Any, response: Any, header: Any) -> Any:
         return counted(f"response {service_name(self)}", self.handle, lambda: respond(self, response, header))
 
+    make = rclpy.publisher.Publisher.__init__
+
+    @functools.wraps(make)
+    def made(self: Any, *args: Any, **kwargs: Any) -> None:
+        make(self, *args, **kwargs)
+        ledger.note_created(self, work_ns())
+
+    rclpy.publisher.Publisher.__init__ = made
     rclpy.publisher.Publisher.publish = counted_publish
     rclpy.client.Client.call_async = counted_call
     rclpy.service.Service.send_response = counted_respond
@@ -517,11 +576,12 @@ def _install_transitions(ledger: Ledger, counted: Counted) -> None:
     machines = _rclpy.LifecycleStateMachine
     make = machines.__init__
 
-    def made(self: Any, node: Any, telling: bool) -> None:
-        make(self, node, telling)
-        if telling:
-            ledger.transitions[self] = f"{self.service_change_state.name.rpartition('/')[0]}/transition_event"
-            ledger.changed = True
+    def made(self: Any, node: Any, *services: bool) -> None:
+        make(self, node, *services)
+        # also without services, transitions are published
+        topic = _rclpy.rclpy_resolve_name(node, "~/transition_event", False, False)  # noqa: FBT003 - C++
+        ledger.transitions[self] = topic
+        ledger.changed = True
 
     machines.__init__ = made
     for name in ("trigger_transition_by_id", "trigger_transition_by_label"):
@@ -690,6 +750,21 @@ def see_whole_graph(ledger: Ledger, settle: Callable[[], None]) -> None:
         ledger.sees_graph = ledger.changed = True
     if ledger.changed:
         settle()
+    ledger.note_waited()
+
+
+def _note_found(ledger: Ledger, cls: Any, name: str) -> None:
+    """Note that a program has found a server: on a real clock, this takes the time in which it is discovered itself."""
+    look = getattr(cls, name)
+
+    @functools.wraps(look)
+    def looked(self: Any, *args: Any, **kwargs: Any) -> Any:
+        found = look(self, *args, **kwargs)
+        if found:
+            ledger.note_waited()
+        return found
+
+    setattr(cls, name, looked)
 
 
 def install_departures(leave: Callable[[], None], remove: Callable[[], None] = lambda: None) -> None:
@@ -804,8 +879,10 @@ def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None
     looking(rclpy.context.Context, "ok", lambda: None)
     looking(rclpy.task.Future, "done", lambda: None)
     looking(rclpy.client.Client, "service_is_ready", at_the_graph)
+    _note_found(ledger, rclpy.client.Client, "service_is_ready")
     _install_counts(clock, at_the_graph)
     looking(_rclpy.ActionClient, "is_action_server_available", at_the_graph)
+    _note_found(ledger, _rclpy.ActionClient, "is_action_server_available")
     for name in GRAPH_LOOKS:
         looking(rclpy.node.Node, name, lambda: at_the_graph(whole=True))
 

@@ -84,6 +84,7 @@ class VirtualTime:
         self._free_until_ns = self._moved = self._domain = 0
         self.unreported = False
         self.resumed_ns = originals.processor_ns()
+        self._worked_ns = 0  # until then, without what the host does while it waits for the grader
         self.running = True
         self.has_blocked = False
         self._work: Work | None = None
@@ -109,7 +110,12 @@ class VirtualTime:
         ros.install_clocks(self._clocks, self.scheduler, self.clock)
         ros.install_wait_sets(self.scheduler, self.clock, self._ledger)
         ros.install_traffic(
-            self._ledger, self.clock, self._settle, self.leave, lambda: self.give_up_outside("timed_event")
+            self._ledger,
+            self.clock,
+            self._settle,
+            self.leave,
+            lambda: self.give_up_outside("timed_event"),
+            lambda: self._worked_ns + originals.processor_ns() - self.resumed_ns,
         )
         ros.install_events_executor(lambda: self.give_up_outside("events_executor"))
         ros.note_other_domains(lambda: self._domain, lambda note: self._link.send({"kind": "note", **note}))
@@ -177,6 +183,9 @@ class VirtualTime:
             if self._ledger.sent:
                 report["sent"] = dict(self._ledger.sent)
                 self._ledger.sent.clear()
+            if early := +self._ledger.early:
+                report["early"] = dict(early)
+            self._ledger.early.clear()
             if self._ledger.lost:
                 report["lost"] = dict(self._ledger.lost)
                 self._ledger.lost.clear()
@@ -187,6 +196,8 @@ class VirtualTime:
 
     def _ask_for_time(self, wake_ns: int | None) -> None:
         self.has_blocked = True
+        if self._ledger is not None and (wake_ns is None or wake_ns > self.clock.now_ns):
+            self._ledger.note_waited()
         if self._stopping:
             self._run_on(wake_ns)
         else:
@@ -256,6 +267,7 @@ class VirtualTime:
         report = {"kind": "idle", "wake_ns": wake_ns, **self.summary(), **({"leaving": True} if leaving else {})}
         before_ns, done_ns = self.clock.now_ns, 0 if self._work is None else self._work.done_ns()
         self.running = False
+        self._worked_ns += originals.processor_ns() - self.resumed_ns
         answer = self._answered(report)
         self.resumed_ns = originals.processor_ns()
         self.running = True

@@ -13,12 +13,38 @@ from typing import Any
 from . import originals
 from .link import Link
 
-#: How long, in real time, a new publisher waits for its first subscription before its first message.
-MATCH_S = 2.0
+#: How long, in real time, a new publisher waits for the grader's subscription before its first message, and how the
+#: name of the grader's node begins.
+MATCH_S, OBSERVER = 2.0, "_ros2cli_daemon_"
 #: How long, in real time, to wait until what was sent has arrived before its sender is destroyed.
 ACKNOWLEDGED_S = 0.5
+#: Nobody would have heard a first message before which its thread has waited for less than this since its publisher was
+#: created, without the time for which it waited for a processor: discovery takes some ten milliseconds.
+EARLY_S = 0.03
+#: The same for work, as in virtual time (`DISCOVERED_NS` in `ledger`).
+WORKED_S = 0.2
+#: The most such messages that are reported.
+MOST_EARLY = 500
 #: How long the other side may take to pass on a request or a response that it has read: nothing tells when it has.
 TAKEN_S = 0.03
+
+
+class _Existed:
+    """Measures what a thread has done since a publisher was created."""
+
+    def __init__(self) -> None:
+        self.thread = originals.get_native_id()
+        self._began_s, self._worked_s = originals.perf_counter(), originals.thread_time()
+        self._starved_ns = originals.starved_ns(self.thread)
+
+    def is_undiscovered(self) -> bool:
+        """Return whether the thread, if it is the same, has neither waited nor worked for long."""
+        passed_s = originals.perf_counter() - self._began_s
+        if self.thread != originals.get_native_id():
+            return passed_s < EARLY_S
+        worked_s = originals.thread_time() - self._worked_s
+        starved_s = (originals.starved_ns(self.thread) - self._starved_ns) / 1e9
+        return worked_s < WORKED_S and passed_s - worked_s - starved_s < EARLY_S
 
 
 class WallTime:
@@ -33,30 +59,48 @@ class WallTime:
         self._publishing: weakref.WeakSet[Any] = weakref.WeakSet()
         self._patience: Any = None
         self._exchanged = False
+        self._early_reports = 0
         self.domain = 0
 
     def install_ros(self) -> None:
-        """Make every publisher wait for a subscription before its first message, as if it joined a running system."""
+        """Make every publisher wait for the grader's subscription before its first message, so that it is recorded."""
         import rclpy.client
         import rclpy.publisher
         import rclpy.service
         from rclpy.duration import Duration
 
         from . import ros
-        from .ledger import BACKGROUND, is_in
+        from .ledger import BACKGROUND, is_in, is_latched
 
-        publish = rclpy.publisher.Publisher.publish
+        publish, make = rclpy.publisher.Publisher.publish, rclpy.publisher.Publisher.__init__
         matched, time = self._publishing, self
+        existed_s: weakref.WeakKeyDictionary[Any, _Existed] = weakref.WeakKeyDictionary()
         self._patience = Duration(seconds=ACKNOWLEDGED_S)
+
+        @functools.wraps(make)
+        def made(self: Any, *args: Any, **kwargs: Any) -> None:
+            make(self, *args, **kwargs)
+            if not is_latched(self):
+                existed_s[self] = _Existed()
 
         @functools.wraps(publish)
         def publish_when_matched(self: Any, msg: Any) -> Any:
             if self not in matched and self.topic_name not in BACKGROUND:
+                existed = existed_s.pop(self, None)
+                early = existed is not None and existed.is_undiscovered()
                 # In another domain there are no subscriptions: waiting would only delay the program.
                 owner = _owner_of(self, ros.MADE_NODES)
-                if owner is None or is_in(time.domain, owner):
-                    originals.wait_until(self.get_subscription_count, MATCH_S, pause_s=0.001)
+                if owner is None:
+                    originals.wait_until(self.handle.get_subscription_count, MATCH_S, pause_s=0.001)
+                elif is_in(time.domain, owner):
+                    originals.wait_until(functools.partial(_is_watched, owner, self), MATCH_S, pause_s=0.002)
                 matched.add(self)
+                if early:
+                    began_ns = originals.time_ns()
+                    try:
+                        return publish(self, msg)
+                    finally:
+                        time.report_early(self.topic_name, began_ns)
             return publish(self, msg)
 
         def when_heard(destroy: Callable[..., None]) -> Callable[..., None]:
@@ -75,6 +119,8 @@ class WallTime:
 
             return noted
 
+        self._install_waits(existed_s)
+        rclpy.publisher.Publisher.__init__ = made
         rclpy.publisher.Publisher.publish = publish_when_matched
         for sender in (rclpy.publisher.Publisher, rclpy.client.Client, rclpy.service.Service):
             sender.destroy = when_heard(sender.destroy)
@@ -83,6 +129,51 @@ class WallTime:
         ros.note_nodes()
         ros.note_other_domains(lambda: self.domain, lambda note: self._link.send({"kind": "note", **note}))
         ros.install_departures(self._leave)
+
+    def _install_waits(self, existed: weakref.WeakKeyDictionary[Any, _Existed]) -> None:
+        """Forget the new publishers of a thread that spins, or that has found a subscription or a server."""
+        import rclpy.client
+        import rclpy.executors
+        import rclpy.publisher
+
+        count, ready = rclpy.publisher.Publisher.get_subscription_count, rclpy.client.Client.service_is_ready
+        look = rclpy.executors.Executor._wait_for_ready_callbacks
+
+        def waited() -> None:
+            thread = originals.get_native_id()
+            for publisher in [one for one, since in list(existed.items()) if since.thread == thread]:
+                existed.pop(publisher, None)
+
+        def finding(found: Callable[..., Any]) -> Callable[..., Any]:
+            @functools.wraps(found)
+            def looked(self: Any) -> Any:
+                answer = found(self)
+                if answer:
+                    waited()
+                return answer
+
+            return looked
+
+        @functools.wraps(look)
+        def looking(executor: Any, timeout_sec: Any = None, *args: Any, **kwargs: Any) -> Any:
+            if timeout_sec is None or timeout_sec > 0:
+                waited()
+            return look(executor, timeout_sec, *args, **kwargs)
+
+        rclpy.publisher.Publisher.get_subscription_count = finding(count)
+        rclpy.client.Client.service_is_ready = finding(ready)
+        rclpy.executors.Executor._wait_for_ready_callbacks = looking
+
+    def report_early(self, topic: str, began_ns: int) -> None:
+        """Report that what was sent on a topic was sent before anybody could have discovered its publisher.
+
+        Args:
+            topic: The topic.
+            began_ns: When sending began, by the system clock.
+        """
+        if self._early_reports < MOST_EARLY:
+            self._early_reports += 1
+            self._link.send({"kind": "early", "topic": topic, "began_ns": began_ns, "ended_ns": originals.time_ns()})
 
     def _leave(self) -> None:
         """Wait until published messages have arrived, since they are lost when their publisher is destroyed."""
@@ -116,6 +207,17 @@ class WallTime:
     def summary(self) -> dict[str, Any]:
         """Return the additional fields of the last report: none."""
         return {}
+
+
+def _is_watched(node: Any, publisher: Any) -> bool:
+    """Return whether a publisher of a node is matched, and the grader's subscription is in the graph."""
+    from rclpy.node import Node
+
+    with publisher.handle:
+        if not publisher.handle.get_subscription_count():  # unlike the program's own question, this is no wait
+            return False
+    known = Node.get_subscriptions_info_by_topic(node, publisher.topic_name)
+    return any(one.node_name.startswith(OBSERVER) for one in known)
 
 
 def _owner_of(publisher: Any, made: list[weakref.ref[Any]]) -> Any:

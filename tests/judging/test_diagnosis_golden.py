@@ -184,6 +184,30 @@ _BLOCKS = [
 _THREAD = ("    rclpy.spin(Mission())", "    Thread(target=rclpy.spin, args=(Mission(),)).start()")
 #: A program, what it was seen to do, and a rule for a mistake that it only seems to make.
 NEAR_MISSES: list[tuple[str, list[tuple[str, str]], str, dict[str, Any], str]] = [
+    # the deadline is that of another endpoint
+    (
+        "odom_subscriber.py",
+        [
+            (
+                "        self.sub = self",
+                "        qos = QoSProfile(depth=10)\n"
+                "        other = QoSProfile(depth=1, deadline=Duration(seconds=1))\n"
+                "        self.out = self.create_publisher(String, '/x', other)\n        self.sub = self",
+            ),
+            ("self.callback, 10", "self.callback, qos"),
+        ],
+        "hearing",
+        {},
+        "stopped_listening",
+    ),
+    # something wakes the node as often as it is to publish
+    (
+        "velocity_publisher.py",
+        [("rclpy.spin(node)", "while rclpy.ok():\n        rclpy.spin_once(node)")],
+        "paced",
+        {"rate": 10},
+        "waits_to_spin",
+    ),
     ("battery_service_client.py", [*_BLOCKS, _THREAD], "asking_once", {}, "future_never_done"),
     ("battery_service_client.py", [*_BLOCKS, _THREAD], "asking_once", {}, "result_too_early"),
     (

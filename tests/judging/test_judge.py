@@ -17,6 +17,7 @@ from grader.core.scenario import Scenario, Span
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import ClockKind, FaultKind, Trace
 from grader.judging.checks import CHECKS
+from grader.judging.installation import lacking_package
 from grader.judging.judge_run import judge_exercise
 
 FILE = "velocity_publisher.py"
@@ -329,6 +330,30 @@ def test_what_a_desktop_of_ros_has_costs_nothing_where_it_is_not_installed(modul
     assert {v.outcome for v in verdicts} == {Outcome.UNDECIDED}
     assert module in verdicts[0].reason
     assert hint in verdicts[0].hint
+
+
+@pytest.mark.parametrize(
+    ("text", "lack"),
+    [
+        ("ImportError: cannot import name 'BufferClient' from 'tf2_ros' (tf2_ros/__init__.py)", "tf2_ros.BufferClient"),
+        ("ModuleNotFoundError: No module named 'tf2_ros.buffer_client'", "tf2_ros.buffer_client"),
+        ("AttributeError: module 'tf_transformations' has no attribute 'Arcball'", "tf_transformations.Arcball"),
+        ("ModuleNotFoundError: No module named 'nav2_msgs.msg'", "nav2_msgs"),
+        ("ImportError: cannot import name 'BufferServant' from 'tf2_ros' (tf2_ros/__init__.py)", ""),
+        ("ModuleNotFoundError: No module named 'tf2_ros.bufer'", ""),
+        ("AttributeError: module 'tf_transformations' has no attribute 'euler_to_quaternion'", ""),
+    ],
+)
+def test_what_a_lent_package_lacks_is_told_from_a_slip(text: str, lack: str) -> None:
+    """In a file of its own, and in a node of a launch file."""
+    sources = {FILE: "import tf2_ros, tf_transformations, nav2_msgs\n"}
+    rec = Recording(0.0, process=FILE)
+    rec.fault(0.0, FaultKind.EXCEPTION, text, 1)
+    trace = rec.trace()
+    for processes in ((FILE,), ("robot.launch.py",)):
+        found = lacking_package(trace, processes, sources)
+        assert (found.name if found is not None else "") == lack
+    assert lacking_package(trace, ("another.py",), sources) is None
 
 
 def test_what_was_earned_before_a_crash_stays() -> None:

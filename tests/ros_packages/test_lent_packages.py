@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import math
 import sys
 from collections.abc import Callable, Iterator
@@ -26,6 +28,7 @@ from std_msgs.msg import Header
 from grader.app.observe import ObserveRequest, observe
 from grader.app.ros_packages import LENDABLE, LENT, lent_to
 from grader.core.quantities import NS_PER_S
+from grader.judging.installation import NOT_LENT
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -47,6 +50,14 @@ def test_only_what_a_program_names_is_lent_with_what_that_needs() -> None:
     assert b"tf2_msgs" in lent_to(["tf2_ros"], lambda name: False).text
     assert lent_to(["tf2_geometry_msgs"], lambda name: name == "tf2_py").names == ("tf2_geometry_msgs", "tf2_ros")
     assert lent_to(["cv_bridge"], lambda name: True).names == ()
+
+
+def test_what_is_said_to_be_missing_is_missing() -> None:
+    """It makes a criterion undecided, so a name that is there must not be listed."""
+    for package, names in NOT_LENT.items():
+        module = importlib.import_module(package)
+        assert [name for name in names if hasattr(module, name)] == []
+        assert [name for name in names if importlib.util.find_spec(f"{package}.{name}") is not None] == []
 
 
 # --- tf2_py ---

@@ -11,7 +11,7 @@ from unittest.mock import patch
 
 import pytest
 
-from grader.execution.notes import left_out_words
+from grader.execution.notes import left_out_sentence, left_out_words
 from grader.student_host.faults import Describer
 from grader.student_host.launch_files import describe
 
@@ -103,7 +103,7 @@ def test_parameter_files_and_values_keep_their_order(described: Callable[..., De
         ['{"rate": 3.0}', '"/n/a": {ros__parameters: {"rate": 3.0}}\n'],
     ]
     assert nodes[1]["parameter_files"] == []
-    assert [left_out_words(one) for one in left_out] == ["the parameter file no.yaml, which is not there,"]
+    assert [left_out_words(one) for one in left_out] == ["the parameter file no.yaml"]
 
 
 def test_groups_have_a_scope(described: Callable[..., Described]) -> None:
@@ -154,8 +154,8 @@ LEFT_OUT = {
     "Node(**TALKER, parameters=[{'urdf': Command(['xacro ', 'a.urdf'])}])": 'the substitution Command("xacro a.urdf")',
     "SetEnvironmentVariable('PATH', '/x')": "the environment variable PATH",
     "Node(**TALKER, prefix='gdb')": "prefix= of a node",
-    "IncludeLaunchDescription('more.launch.xml')": "the launch file more.launch.xml, which is not in Python,",
-    "LogInfo(msg=FindPackageShare('gazebo_ros'))": "the package gazebo_ros, which is not in the submission,",
+    "IncludeLaunchDescription('more.launch.xml')": "the launch file more.launch.xml",
+    "LogInfo(msg=FindPackageShare('gazebo_ros'))": "what needs the package gazebo_ros",
 }
 
 
@@ -233,7 +233,7 @@ def test_what_a_package_that_is_not_here_makes_is_left_out_where_it_is_used(
     )
     assert [node["executable"] for node in nodes] == ["talker"]
     assert [left_out_words(one) for one in left_out] == [
-        f"what needs the package {package.split('.', maxsplit=1)[0]}, which is not here,"
+        f"what needs the package {package.split('.', maxsplit=1)[0]}"
     ] * 2
 
 
@@ -373,3 +373,20 @@ def test_a_node_with_an_argument_that_is_left_out_is_left_out(
     nodes, left_out = described(f"Node(**TALKER, {argument}={made})", before="import xacro\n")
     assert nodes == []
     assert len(left_out) == 1
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        (
+            {"code": "package", "name": "turtlesim"},
+            "what needs the package turtlesim was left out: the submission has no ",
+        ),
+        ({"code": "parameter_file", "name": "a.yaml"}, "the parameter file a.yaml was left out: it is not there"),
+        ({"code": "action", "name": "EmitEvent"}, "the action EmitEvent is not supported and was left out"),
+        ({"code": "of the student's"}, "something is not supported and was left out"),
+    ],
+)
+def test_what_is_left_out_has_its_reason(told: dict[str, str], said: str) -> None:
+    """As a sentence for notes."""
+    assert left_out_sentence(told).startswith(said)

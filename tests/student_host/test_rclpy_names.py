@@ -46,6 +46,7 @@ PYTHON = {
 }
 #: Attributes that exist only in instances -> the class whose source assigns them.
 ASSIGNED = {
+    "_clock": "rclpy.clock:JumpHandle",
     "_clock_type": "rclpy.clock:Clock",
     "__clock": "rclpy.clock:Clock",
     "_time_handle": "rclpy.time:Time",

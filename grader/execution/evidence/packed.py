@@ -84,6 +84,8 @@ def fields_of(text: msgspec.Raw) -> Mapping[str, Any]:
 _FaultDetails: TypeAlias = tuple[int | None, str, tuple[int, int] | None]
 # Early recordings of version 1 do not have them.
 _NO_DETAILS: _FaultDetails = (None, "", None)
+#: The last field of a message, which is left out if it is false.
+_EARLY = ("before_discovery", bool, False)
 _SPECIAL = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 #: Placeholder for bytes that are a message of the recording.
 THERE = "*"
@@ -146,6 +148,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("may_drift", bool, False),
         ("most_starved_ns", int, 0),
         ("left_out", tuple[str, ...], ()),
+        ("unstarted", tuple[tuple[str, str], ...], ()),
         ("written", tuple[_WRITTEN, ...], ()),  # type: ignore[valid-type]
         ("newer", tuple[_NEWER, ...], ()),  # type: ignore[valid-type]
         ("author_mistake", AuthorMistake | None, None),
@@ -169,6 +172,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         may_drift=row.may_drift,
         most_starved_ns=row.most_starved_ns,
         left_out=row.left_out,
+        unstarted=row.unstarted,
         written=tuple(_same(WrittenFile, file) for file in row.written),
         newer=tuple(_same(NewerPython, one) for one in row.newer),
         author_mistake=row.author_mistake,
@@ -189,9 +193,10 @@ def _same(kind: Callable[..., Any], row: Any) -> Any:
     return kind(*msgspec.structs.astuple(row))
 
 
-def _carrying(kind: Callable[..., Any], row: Any) -> Any:
-    *values, value, cdr = msgspec.structs.astuple(row)
-    return kind(*values, _lively(value), base64.b64decode(cdr, validate=True))
+def _carrying(kind: Any, row: Any) -> Any:
+    values = {name: getattr(row, name) for name in kind.__slots__}
+    values["value"], values["cdr"] = _lively(row.value), base64.b64decode(row.cdr, validate=True)
+    return kind(**values)
 
 
 def _graph(row: Any) -> GraphSnapshot:
@@ -207,7 +212,7 @@ def _fault(row: Any) -> Fault:
 def _without_bytes(kind: type[Message] | type[Delivery]) -> Callable[[Any], Observation]:
     blank = kind.__new__
     # the __init__ of a frozen dataclass takes twice as long, and there may be thousands of messages
-    t_ns, topic, type_, value, cdr = (getattr(kind, name).__set__ for name in kind.__slots__)
+    t_ns, topic, type_, value, cdr, *early = (getattr(kind, name).__set__ for name in kind.__slots__)
 
     def make(row: Any) -> Observation:
         made = blank(kind)
@@ -216,6 +221,8 @@ def _without_bytes(kind: type[Message] | type[Delivery]) -> Callable[[Any], Obse
         type_(made, row.type)
         value(made, fields_of(row.value))
         cdr(made, b"")
+        for before_discovery in early:  # of messages of students' nodes
+            before_discovery(made, row.before_discovery)
         return made
 
     return make
@@ -227,7 +234,8 @@ def _exchange(kind: type[Request] | type[Response]) -> Callable[[Any], Observati
 
 #: For each kind of observation, the struct that validates it and the function that builds it.
 _EXACT_ROWS: Mapping[type, Any] = {
-    **{kind: _row_of(kind, value=dict[str, Any], cdr=str) for kind in (Message, Delivery, Request, Response)},
+    Message: _row_of(Message, _EARLY[0], last=_EARLY, value=dict[str, Any], cdr=str),
+    **{kind: _row_of(kind, value=dict[str, Any], cdr=str) for kind in (Delivery, Request, Response)},
     **{kind: _row_of(kind) for kind in (LogRecord, OutputLine, Offer, Mark)},
     GraphSnapshot: _row_of(
         GraphSnapshot,
@@ -247,7 +255,8 @@ _TRACE = _trace_row(_EXACT_ROWS.values())
 #: The fast variant keeps the fields of messages as JSON text.
 _ROWS: Mapping[type, Any] = {
     **_EXACT_ROWS,
-    **{kind: _row_of(kind, value=msgspec.Raw, cdr=str) for kind in (Message, Delivery)},
+    Message: _row_of(Message, _EARLY[0], last=_EARLY, value=msgspec.Raw, cdr=str),
+    Delivery: _row_of(Delivery, value=msgspec.Raw, cdr=str),
 }
 _MAKERS: Mapping[type, Callable[[Any], Observation]] = {
     **_EXACT_MAKERS,

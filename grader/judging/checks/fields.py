@@ -45,19 +45,22 @@ class FieldEqual(FewSuffice):
         fields: What is expected by field path: a value, or `{equals, items, tolerance, low, high, pattern, example}`.
         tolerance: Largest difference of a number without a tolerance of its own.
         at_least: Number of messages needed for a judgement.
+        after_discovery: Whether messages do not count that are sent as soon as the publisher is created, before anybody
+            can have discovered it.
     """
 
     topic: str
     fields: Annotated[Mapping[str, RuleOrValue], FieldOf("topic")]
     tolerance: float = 1e-6
     at_least: int = 1
+    after_discovery: bool = False
 
     @property
     def expected(self) -> str:
         return f"{rules_text(self.fields)} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        messages = published(trace, self.topic)
+        messages = published(trace, self.topic, self.after_discovery)
         if len(messages) < max(1, self.at_least):
             return too_few_messages(trace, self.topic, len(messages), self.at_least)
         wrong = [m for m in messages if broken_rules(m.value, self.fields, self.tolerance)]
@@ -86,6 +89,8 @@ class FieldInRange(FewSuffice):
         high: Largest value allowed; none if left out.
         field: Path of the number.
         at_least: Number of messages needed for a judgement.
+        after_discovery: Whether messages do not count that are sent as soon as the publisher is created, before anybody
+            can have discovered it.
     """
 
     topic: str
@@ -93,13 +98,14 @@ class FieldInRange(FewSuffice):
     high: FieldNumber | None = None
     field: Annotated[str, FieldOf("topic")] = "data"
     at_least: int = 1
+    after_discovery: bool = False
 
     @property
     def expected(self) -> str:
         return f"{self.field} {FieldRule(low=self.low, high=self.high).wanted} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        messages = published(trace, self.topic)
+        messages = published(trace, self.topic, self.after_discovery)
         if len(messages) < max(1, self.at_least):
             return too_few_messages(trace, self.topic, len(messages), self.at_least)
         values = _numbers(messages, self.field)
@@ -132,6 +138,8 @@ class FieldMonotone(FewSuffice):
         field: Path of the number.
         strictly: Whether equal neighbours are a mistake; a constant series always is.
         at_least: Number of messages needed for a judgement.
+        after_discovery: Whether messages do not count that are sent as soon as the publisher is created, before anybody
+            can have discovered it.
     """
 
     topic: str
@@ -139,13 +147,14 @@ class FieldMonotone(FewSuffice):
     field: Annotated[str, FieldOf("topic")] = "data"
     strictly: bool = False
     at_least: int = 3
+    after_discovery: bool = False
 
     @property
     def expected(self) -> str:
         return f"{self.field} on {self.topic} only {self.direction}{', never equal' if self.strictly else ''}"
 
     def judge(self, trace: Trace) -> Finding:
-        messages = published(trace, self.topic)
+        messages = published(trace, self.topic, self.after_discovery)
         if len(messages) < max(2, self.at_least):
             return too_few_messages(trace, self.topic, len(messages), max(2, self.at_least))
         values = _numbers(messages, self.field)
@@ -341,11 +350,14 @@ class RandomInRange:
         topic: Topic name as on the wire; its messages hold one number, as `data` or `temperature`.
         low: Smallest value allowed, the edge inside.
         high: Largest value allowed, the edge inside.
+        after_discovery: Whether messages do not count that are sent as soon as the publisher is created, before anybody
+            can have discovered it.
     """
 
     topic: str
     low: float
     high: float
+    after_discovery: bool = False
 
     @property
     def expected(self) -> str:
@@ -353,7 +365,7 @@ class RandomInRange:
         return f"every value on {self.topic} within {span_}, and drawn at random"
 
     def judge(self, trace: Trace) -> Finding:
-        messages = published(trace, self.topic)
+        messages = published(trace, self.topic, self.after_discovery)
         if not messages:
             silent = explain_no_message(trace, self.topic)
             return not_met(silent.reason, silent.evidence, blocked_by="topic_rate", problem=silent.problem)

@@ -65,6 +65,8 @@ class TopicRate:
         tolerance: Largest difference for full credit; the edge is inside.
         window: Duration that is measured, from the first message on; to the end of the observation if left out.
         partly_tolerance: Largest difference for half credit; none if left out.
+        after_discovery: Whether messages do not count that are sent as soon as the publisher is created, before anybody
+            can have discovered it.
     """
 
     topic: str
@@ -72,6 +74,7 @@ class TopicRate:
     tolerance: Hertz
     window: DurationNs | None = None
     partly_tolerance: Hertz | None = None
+    after_discovery: bool = False
 
     @property
     def expected(self) -> str:
@@ -82,7 +85,7 @@ class TopicRate:
         return text
 
     def judge(self, trace: Trace) -> Finding:
-        times = [m.t_ns for m in published(trace, self.topic)]
+        times = [m.t_ns for m in published(trace, self.topic, self.after_discovery)]
         if not times:
             return explain_no_message(trace, self.topic)
         stop_ns = trace.stop_ns if self.window is None else min(trace.stop_ns, times[0] + self.window)
@@ -200,7 +203,7 @@ class TopicRate:
 
     def chart(self, trace: Trace) -> Chart | None:
         """Return the chart of a rate, or None with fewer than two messages."""
-        times = sorted(m.t_ns for m in published(trace, self.topic))
+        times = sorted(m.t_ns for m in published(trace, self.topic, self.after_discovery))
         if len(times) < 2 or times[0] == times[-1]:
             return None
         inside = [t for t in times if self.window is None or t < times[0] + self.window]

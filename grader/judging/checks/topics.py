@@ -25,17 +25,20 @@ class Publishes:
     Attributes:
         topic: Topic name as on the wire, e.g. `/cmd_vel`.
         type: Message type, e.g. `geometry_msgs/msg/Twist`.
+        after_discovery: Whether messages do not count that are sent as soon as the publisher is created, before anybody
+            can have discovered it.
     """
 
     topic: str
     type: str
+    after_discovery: bool = False
 
     @property
     def expected(self) -> str:
         return f"at least one {self.type} message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        messages = [m for m in published(trace, self.topic) if m.type == self.type]
+        messages = [m for m in published(trace, self.topic, self.after_discovery) if m.type == self.type]
         if not messages:
             return explain_no_message(trace, self.topic, self.type)
         reason = f"{self.topic}: {counted(len(messages), 'message')} of type {self.type}"
@@ -105,11 +108,14 @@ class FieldValues:
         topic: Topic name as on the wire.
         values: Number expected by field path, e.g. `linear.x: 0.5`; fields not named are free.
         tolerance: Largest difference, unit of the field.
+        after_discovery: Whether messages do not count that are sent as soon as the publisher is created, before anybody
+            can have discovered it.
     """
 
     topic: str
     values: Annotated[Mapping[str, FieldNumber], FieldOf("topic")]
     tolerance: float = 1e-6
+    after_discovery: bool = False
 
     @property
     def expected(self) -> str:
@@ -117,7 +123,7 @@ class FieldValues:
         return f"{wanted} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        messages = published(trace, self.topic)
+        messages = published(trace, self.topic, self.after_discovery)
         if not messages:
             return explain_no_message(trace, self.topic)
         wrong = self._differing(messages)
@@ -247,6 +253,8 @@ class Transform:
         tolerance: Largest difference of each number.
         rate: Expected rate; free if left out.
         rate_tolerance: Largest difference of the rate.
+        after_discovery: Whether transforms do not count that are sent as soon as the publisher is created, before
+            anybody can have discovered it.
     """
 
     parent: str
@@ -257,6 +265,7 @@ class Transform:
     tolerance: float = 1e-3
     rate: Hertz | None = None
     rate_tolerance: Hertz = 1.0
+    after_discovery: bool = False
 
     @property
     def expected(self) -> str:
@@ -268,7 +277,8 @@ class Transform:
         return {True: ("/tf_static",), False: ("/tf",), None: ("/tf", "/tf_static")}[self.static]
 
     def judge(self, trace: Trace) -> Finding:
-        found = [_Found(m.t_ns, t) for topic in self._topics for m in published(trace, topic) for t in _transforms(m)]
+        sent = [m for topic in self._topics for m in published(trace, topic, self.after_discovery)]
+        found = [_Found(m.t_ns, t) for m in sent for t in _transforms(m)]
         wanted = (self.parent.lstrip("/"), self.child.lstrip("/"))
         mine = sorted((f for f in found if f.frames == wanted), key=lambda f: f.t_ns)
         if not mine:

@@ -24,7 +24,9 @@ from grader.judging.diagnosis.wiring import (
     reached,
     roots,
     runs,
+    spin_timeout,
     timer_code,
+    waits_for_ever,
 )
 from grader.judging.source import Loop, Source, argument, chain, first_line, last_name
 from grader.judging.wording import number
@@ -170,14 +172,9 @@ def _pause(source: Source, loop: ast.AST) -> list[Constant]:
     """Return the sleeps in a loop, and the timeouts of spin_once, each with the call as origin."""
     inside = list(reached(source, [loop]))
     spun = [n for n in inside if isinstance(n, ast.Call) and last_name(n.func) == "spin_once"]
-    waits = [(c, constant(source, _timeout(c))) for c in spun]
+    waits = [(c, constant(source, spin_timeout(c))) for c in spun]
     timeouts = [Constant(worth.value, call) for call, worth in waits if worth is not None and worth.value > 0]
     return sorted([*_sleeps(source, inside), *timeouts], key=lambda s: first_line(s.origin))
-
-
-def _timeout(call: ast.Call) -> ast.expr | None:
-    """Return the timeout of spin_once: a function of rclpy that takes the node first, or a method of an executor."""
-    return argument(call, 2 if chain(call.func) in ("rclpy.spin_once", "spin_once") else 0, "timeout_sec")
 
 
 @rule(TopicRate, problem=ProblemKind.BURSTS, given=_paced)
@@ -231,6 +228,24 @@ def _too_slow(paced: _Paced) -> Clue | None:
     start = roots(paced.source, timers[0].callback)
     hint = f"{timer_code(paced.source, timers[0])} has the right period, but a callback takes longer than that"
     return Clue(f"{hint}: do less in it", paced.source.place(start[0] if start else timers[0].call))
+
+
+@rule(TopicRate, given=_paced)
+def _waits_to_spin(paced: _Paced) -> Clue | None:
+    """A loop that publishes spins once without a timeout, which waits until something wakes the node."""
+    rare = math.isnan(paced.found_hz) or paced.found_hz < (1 - _SAME) * paced.wanted_hz
+    if paced.timers() or not rare:
+        return None
+    source = paced.source
+    for loop in source.loops():
+        inside = list(reached(source, [loop]))
+        call = next((n for n in inside if isinstance(n, ast.Call) and waits_for_ever(source, n)), None)
+        if call is not None and set(paced.calls) & set(inside):
+            hint = f"{source.code(call)} without timeout_sec waits until a message or a timer wakes the node"
+            return Clue(
+                f"{hint}: let create_timer({number(paced.period_s)}, ...) publish, and call spin", source.place(call)
+            )
+    return None
 
 
 @rule(TopicRate, given=_paced)

@@ -39,7 +39,9 @@ from grader.judging.diagnosis.wiring import (
     target_of,
     timer_code,
     used,
+    value_of,
     variable_of,
+    waits_for_ever,
 )
 from grader.judging.output import student_records
 from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, subtree, text_of
@@ -423,9 +425,9 @@ def _stopped_listening(case: Case) -> Clue | None:
         return None
     source = case.source
     for item in made(source, "subscription"):
-        name = source.code(item.qos) if isinstance(item.qos, (ast.Name, ast.Attribute)) else ""
-        policies = [k for k in source.all(ast.keyword) if k.arg in ("deadline", "liveliness_lease_duration")]
-        near = [k for k in policies if covers(item.call, k.lineno) or name]
+        profile = value_of(source, item.qos)
+        given = [n for n in ast.walk(profile) if isinstance(n, ast.keyword)] if profile is not None else []
+        near = [k for k in given if k.arg in ("deadline", "liveliness_lease_duration")]
         if len(near) == 1:
             hint = f"with {source.code(near[0], 50)} it hears only publishers that promise the same: leave it out"
             return Clue(hint, source.place(near[0]))
@@ -453,6 +455,20 @@ def _unwoken_rate(unseen: _Unseen) -> Clue | None:
         return None
     hint = f"{source.code(sleeps[0])} waits for ever: a rate is woken only by another thread that spins the node"
     return Clue(f"{hint}: use create_timer instead", source.place(sleeps[0]), key="unwoken_rate")
+
+
+@rule(given=_unseen)
+def _spins_first(unseen: _Unseen) -> Clue | None:
+    """A loop spins once without a timeout before it publishes or logs, and nothing wakes the node."""
+    source = unseen.source
+    for loop in source.loops():
+        inside = list(reached(source, [loop]))
+        call = next((n for n in inside if isinstance(n, ast.Call) and waits_for_ever(source, n)), None)
+        if call is not None and set(unseen.calls) & set(inside) and not made(source, "timer"):
+            hint = f"{source.code(call)} without timeout_sec waits until a message or a timer wakes the node"
+            does = "publishes" if silent_topic(unseen.case) else "logs"
+            return Clue(f"{hint}: call spin, and let a timer call what {does}", source.place(call))
+    return None
 
 
 @rule(given=_unseen)

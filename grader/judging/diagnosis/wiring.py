@@ -481,3 +481,23 @@ def returns_nothing(source: Source, call: ast.Call) -> bool:
         returns = [r for r in source.all(ast.Return) if r.value is not None and source.function_of(r) in functions]
         return not returns and not any(isinstance(f, ast.AsyncFunctionDef) for f in functions)
     return last_name(call.func) in (*_NOTHING, *LOG_METHODS) and isinstance(call.func, ast.Attribute)
+
+
+def spin_timeout(call: ast.Call) -> ast.expr | None:
+    """Return the timeout of spin_once: a function of rclpy that takes the node first, or a method of an executor."""
+    return argument(call, 2 if chain(call.func) in ("rclpy.spin_once", "spin_once") else 0, "timeout_sec")
+
+
+def waits_for_ever(source: Source, call: ast.Call) -> bool:
+    """Return whether a call is a spin_once that returns only when something has woken the node."""
+    if last_name(call.func) != "spin_once" or any(keyword.arg is None for keyword in call.keywords):
+        return False
+    given = value_of(source, spin_timeout(call))
+    return given is None or (isinstance(given, ast.Constant) and given.value is None)
+
+
+def value_of(source: Source, node: ast.AST | None) -> ast.AST | None:
+    """Return the expression that a name stands for if it is assigned exactly once; otherwise the node itself."""
+    if isinstance(node, (ast.Name, ast.Attribute)):
+        return _only_assignment(source, node) or node
+    return node

@@ -39,6 +39,7 @@ __all__ = [
     "do_transform_wrench",
     "from_msg_msg",
     "to_msg_msg",
+    "transform_covariance",
 ]
 
 
@@ -100,16 +101,20 @@ def do_transform_pose_stamped(pose: PoseStamped, transform: TransformStamped) ->
     return PoseStamped(header=transform.header, pose=do_transform_pose(pose.pose, transform))
 
 
+def transform_covariance(cov_in: Any, transform: TransformStamped) -> NDArray[Any]:
+    """Return a covariance of 36 numbers, turned as a pose is."""
+    matrix = np.zeros((6, 6))
+    matrix[:3, :3] = matrix[3:, 3:] = transforms3d.quaternions.quat2mat(_rotation(transform))
+    return (matrix @ np.asarray(cov_in, dtype=float).reshape(6, 6) @ matrix.T).ravel()
+
+
 def do_transform_pose_with_covariance_stamped(
     pose: PoseWithCovarianceStamped, transform: TransformStamped
 ) -> PoseWithCovarianceStamped:
     """Return a pose and its covariance, which is turned with it, in another frame."""
     found = PoseWithCovarianceStamped(header=transform.header)
     found.pose.pose = do_transform_pose(pose.pose.pose, transform)
-    matrix = np.zeros((6, 6))
-    matrix[:3, :3] = matrix[3:, 3:] = transforms3d.quaternions.quat2mat(_rotation(transform))
-    covariance = np.asarray(pose.pose.covariance, dtype=float).reshape(6, 6)
-    found.pose.covariance = (matrix @ covariance @ matrix.T).ravel()
+    found.pose.covariance = transform_covariance(pose.pose.covariance, transform)
     return found
 
 

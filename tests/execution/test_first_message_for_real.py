@@ -1,0 +1,173 @@
+"""What a program publishes before anybody can have discovered the publisher is recorded, and marked, on both clocks."""
+
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from grader.core.trace import Trace
+from grader.execution.recording_session import RecordingSession
+
+pytest.importorskip("rclpy")
+
+from hostile import record
+
+from grader.core.quantities import NS_PER_S
+from grader.judging.judge_run import unheard
+
+pytestmark = pytest.mark.ros
+
+CLOCKS = pytest.mark.parametrize("clock", ["virtual", "wall"])
+BEFORE = """
+import threading, time
+import rclpy
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+
+rclpy.init()
+node = Node("talking")
+
+def send(number=1):
+    publisher.publish(Int32(data=number))
+"""
+MAKE = "publisher = node.create_publisher(Int32, '/count', 10)\n"
+#: Programs whose first message nobody would hear.
+EARLY = {
+    "at once": MAKE + "send()\nrclpy.spin(node)",
+    "best effort": MAKE.replace("10", "qos_profile_sensor_data") + "send()\nrclpy.spin(node)",
+    "after other work": MAKE + "sum(range(1000))\nnode.get_logger().info('sends')\nsend()\nrclpy.spin(node)",
+    "after a poll": MAKE + "rclpy.spin_once(node, timeout_sec=0.0)\nsend()\nrclpy.spin(node)",
+    "beside a spinning thread": MAKE
+    + "threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()\nsend()\ntime.sleep(9)",
+    "with another publisher": "other = node.create_publisher(Int32, '/other', 10)\n"
+    + MAKE
+    + "other.publish(Int32())\nsend()\nrclpy.spin(node)",
+    "later": "time.sleep(0.5)\n" + MAKE + "send()\nrclpy.spin(node)",
+    "without looking at the count": MAKE + "publisher.get_subscription_count()\nsend()\nrclpy.spin(node)",
+    "and with a timer": MAKE + "send()\nnode.create_timer(0.3, lambda: send(2))\nrclpy.spin(node)",
+}
+#: Programs that do it right, or whose messages are kept for those who come later.
+HEARD = {
+    "from a timer": MAKE + "node.create_timer(0.3, send)\nrclpy.spin(node)",
+    "after a pause": MAKE + "time.sleep(0.1)\nsend()\nrclpy.spin(node)",
+    "after a spin": MAKE + "rclpy.spin_once(node, timeout_sec=0.2)\nsend()\nrclpy.spin(node)",
+    "once there is a subscription": MAKE
+    + "while not publisher.get_subscription_count():\n    time.sleep(0.05)\nsend()\nrclpy.spin(node)",
+    "at a match": """
+        events = PublisherEventCallbacks(matched=lambda e: send())
+        publisher = node.create_publisher(Int32, "/count", 10, event_callbacks=events)
+        rclpy.spin(node)
+        """,
+    "latched": MAKE.replace("10", "QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)")
+    + "send()\nrclpy.spin(node)",
+    "in an answer": MAKE
+    + """
+node.create_service(Trigger, "/own", lambda _, response: (send(), response)[1])
+client = node.create_client(Trigger, "/own")
+time.sleep(0.2)
+client.call_async(Trigger.Request())
+rclpy.spin(node)
+""",
+}
+
+
+@pytest.fixture
+def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+    tmp_path.chmod(0o755)
+
+    def run_all(*programs: str, clock: str, **fields: Any) -> Trace:
+        whole = [BEFORE + textwrap.dedent(program) for program in programs]
+        trace = record(studio, tmp_path / "s", *whole, clock=clock, **{"duration_ns": 2 * NS_PER_S, **fields})
+        assert trace.harness_problem == ""
+        return trace
+
+    return run_all
+
+
+def early(trace: Trace) -> list[bool]:
+    """Return of each message on the topic whether it was sent before discovery."""
+    return [message.before_discovery for message in trace.messages("/count")]
+
+
+@CLOCKS
+@pytest.mark.parametrize("program", EARLY.values(), ids=EARLY)
+def test_a_message_without_a_wait_is_early(run: Callable[..., Trace], clock: str, program: str) -> None:
+    """Only the first: those that come after a wait are heard."""
+    found = early(run(program, clock=clock))
+    assert found[0]
+    assert not any(found[1:])
+
+
+@CLOCKS
+@pytest.mark.parametrize("program", HEARD.values(), ids=HEARD)
+def test_a_message_after_a_wait_is_not(run: Callable[..., Trace], clock: str, program: str) -> None:
+    """Whatever the program has waited for; and nothing is said of it."""
+    trace = run(program, clock=clock)
+    assert early(trace)
+    assert not any(early(trace))
+    assert unheard(trace) == ()
+
+
+def test_what_a_message_of_the_same_instant_causes_is_not_early(run: Callable[..., Trace]) -> None:
+    """An answer in the instant in which everything begins: whoever gets a message has been discovered."""
+    answering = """
+    publisher = node.create_publisher(Int32, "/count", 10)
+    node.create_subscription(Int32, "/asked", lambda m: send(m.data), 10)
+    rclpy.spin(node)
+    """
+    asking = """
+    publisher = node.create_publisher(Int32, "/asked", 10)
+    send()
+    rclpy.spin(node)
+    """
+    trace = run(answering, asking, clock="virtual")
+    assert [(m.t_ns, m.before_discovery) for m in trace.messages("/count")] == [(0, False)]
+    assert [(m.t_ns, m.before_discovery) for m in trace.messages("/asked")] == [(0, True)]
+
+
+def test_a_found_server_is_a_wait(run: Callable[..., Trace]) -> None:
+    """On a real clock the program itself is discovered meanwhile; in virtual time the server is there at once."""
+    serving = """
+    node.create_service(Trigger, "/own", lambda _, response: response)
+    rclpy.spin(node)
+    """
+    asking = """
+    publisher = node.create_publisher(Int32, "/count", 10)
+    client = node.create_client(Trigger, "/own")
+    client.wait_for_service()
+    send()
+    rclpy.spin(node)
+    """
+    assert early(run(serving, asking, clock="virtual")) == [False]
+
+
+def test_long_work_is_a_wait(run: Callable[..., Trace]) -> None:
+    """Virtual time stands still meanwhile, discovery would not."""
+    working = """
+    publisher = node.create_publisher(Int32, "/count", 10)
+    began = time.process_time()
+    while time.process_time() < began + 0.6:
+        pass
+    send()
+    rclpy.spin(node)
+    """
+    assert early(run(working, clock="virtual")) == [False]
+
+
+@CLOCKS
+def test_all_of_a_burst_is_early(run: Callable[..., Trace], clock: str) -> None:
+    """More than are sent between two reports."""
+    program = MAKE + "for number in range(30):\n    send(number)\nrclpy.spin(node)"
+    trace = run(program, clock=clock)
+    assert len(early(trace)) == 30
+    assert early(trace)[0]
+    if clock == "virtual":
+        assert all(early(trace))
+    assert unheard(trace)[0].startswith(
+        "/count: all messages were" if all(early(trace)) else "/count: the first message"
+    )
