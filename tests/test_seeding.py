@@ -152,3 +152,36 @@ def test_a_run_without_a_key_says_that_its_values_can_be_known() -> None:
     words: list[Path | str] = [ROOT / "reference_solutions", "--exercise", "velocity_publisher", "--json"]
     assert PRACTICE_NOTE in grade(*words, GRADER_SEED_KEY="").stdout
     assert PRACTICE_NOTE not in grade(*words, "--seed", 7).stdout
+
+
+#: Prints the plan and the digest of each scenario of some rubrics, with the submission that is beside the rubric.
+PLANNING = """
+import sys
+from pathlib import Path
+from grader.app.grade import builtin_recording
+from grader.core.submission import StudentFile, Submission
+from grader.execution.evidence.manifest import scenario_digest
+from grader.execution.plan import plan_scenario
+from grader.rubrics.loader import read_rubric
+for path in map(Path, sys.argv[1:]):
+    exercise = read_rubric(path)
+    files = {name: StudentFile(name, name) for name in exercise.files}
+    submission = Submission("x", "x", path.parent / "reference", "sha256:0", files)
+    for scenario in exercise.scenarios:
+        plan = plan_scenario(exercise.id, scenario, submission, seed=7, odometry=builtin_recording(), clock="virtual")
+        print(scenario_digest(scenario), plan)
+"""
+
+
+def test_what_is_drawn_does_not_depend_on_the_hashes_of_the_grader() -> None:
+    """Python draws them anew for each process, and a set of names has another order then."""
+    examples = [path for path in ROOT.glob("examples/*/*.yaml") if path.stem == path.parent.name]
+    rubrics = sorted([*ROOT.glob("rubrics/*_[0-9].yaml"), *examples])
+    assert len(rubrics) == 14
+    command = [sys.executable, "-c", PLANNING, *map(str, rubrics)]
+    told = [
+        subprocess.run(command, env={**os.environ, "PYTHONHASHSEED": seed}, capture_output=True, text=True, check=True)
+        for seed in ("1", "2", "3")
+    ]
+    assert told[0].stdout == told[1].stdout == told[2].stdout
+    assert "PlannedSimulation" in told[0].stdout

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from sandboxes import USER, unreachable, user_start
 from verifying import GRADE, differences, program, verified, written
 
 from grader.app import conditions as module
@@ -22,6 +23,7 @@ from grader.cli.main import app
 from grader.core.conditions import CONDITIONS, SANDBOXES, USUAL
 from grader.core.errors import EnvironmentFault
 from grader.core.verification import State
+from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.tiers import isolation_from_name
 
 #: What differs from run to run, and the cause that is found; none where the text tells nothing.
@@ -218,6 +220,25 @@ def test_changed_evidence_differs(folder: Path) -> None:
     done = subprocess.run([GRADE, "verify", path, "--evidence", str(kept)], capture_output=True, text=True, check=False)
     assert done.returncode == 2  # the recording says with which seed it was made
     assert "one that shows something else" in done.stderr
+
+
+@pytest.mark.ros
+@pytest.mark.long
+def test_an_ordinary_user(folder: Path, ros: RosInstallation) -> None:
+    """Who cannot become another one, and has another sandbox than root."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can become an ordinary user")
+    before = user_start(ros)
+    if why := unreachable(before, ros):
+        pytest.skip(why)
+    paths = written(folder, {"ada": REPEATING["plain"]})
+    home = folder / "home"
+    home.mkdir()
+    os.chown(home, USER, USER)
+    own = {"HOME": str(home), "XDG_CACHE_HOME": str(home), "TMPDIR": str(home)}
+    options = ("--condition", "order", "--condition", "user", "--condition", "bubblewrap-root")
+    code, found = verified(paths, *options, before=before, **own)
+    assert (code, [one["state"] for one in found["conditions"]]) == (0, ["same", "not_tried", "not_tried"])
 
 
 # --- the conditions ---------------------------------------------------------------------------------------------------

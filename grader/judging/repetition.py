@@ -68,13 +68,14 @@ def first_difference(first: Trace, other: Trace, sources: Mapping[str, str]) -> 
     return _first_snapshot(first.graphs(), other.graphs())
 
 
-#: What belongs to a recording besides its events. Notes tell what the grader met with, and suspicions only what it saw.
+#: What belongs to a recording besides its events. Notes tell what the grader met with, and suspicions only what it saw;
+#: files that a program wrote are lost if it does not report them in time when it is told to stop.
 _FACTS: tuple[tuple[Kind, str, Callable[[Trace], object]], ...] = (
     (Kind.TIME, "end", lambda trace: trace.stop_ns),
     (Kind.CONTENT, "starts", lambda trace: trace.starts),
-    (Kind.CONTENT, "written files", lambda trace: trace.written),
     (Kind.CONTENT, "left out", lambda trace: trace.left_out),
     (Kind.CONTENT, "newer Python", lambda trace: trace.newer),
+    (Kind.GRADER, "written files", lambda trace: trace.written),
     (Kind.GRADER, "notes", lambda trace: trace.notes),
     (Kind.GRADER, "suspicious actions", lambda trace: trace.reached),
 )

@@ -150,7 +150,8 @@ class _SimulationParameters(Shape):
 
     def built(self) -> Simulated:
         """Return the stimulus, with the parameters that are given."""
-        given = {name: build(getattr(self, name)) for name in self.model_fields_set}
+        # Values are drawn in this order; that of the set of names is another one in each process.
+        given = {name: build(getattr(self, name)) for name in type(self).model_fields if name in self.model_fields_set}
         parameters = {key.removeprefix(_PREFIX): value for key, value in given.items()}
         return Simulated(self.name, parameters, self.path, self.content)
 

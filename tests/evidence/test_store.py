@@ -13,7 +13,7 @@ import pytest
 from kept_runs import kept_run, velocity_exercise, velocity_run, velocity_trace
 
 from grader.core.errors import EvidenceError
-from grader.core.scenario import MessageStream, Scenario, Span
+from grader.core.scenario import MessageStream, Scenario, Simulated, Span
 from grader.core.trace import Delivery, Message, Request, Response, Trace
 from grader.execution.evidence.manifest import scenario_digest
 from grader.execution.evidence.store import check_place, first_report, found_under, open_evidence, run_of
@@ -213,6 +213,16 @@ def test_the_digest_of_a_scenario_is_of_what_differs_from_defaults() -> None:
     scenario = velocity_exercise().scenarios[0]
     assert scenario_digest(scenario) == scenario_digest(dataclasses.replace(scenario, stimuli=()))
     assert scenario_digest(scenario) != scenario_digest(dataclasses.replace(scenario, processes=("x.py",)))
+
+
+def test_the_digest_of_a_scenario_knows_the_text_of_a_simulation() -> None:
+    """An author's simulation is part of what was recorded."""
+    scenario = velocity_exercise().scenarios[0]
+    texts = (b"class A: pass", b"class A: pass", b"class B: pass")
+    digests = [
+        scenario_digest(dataclasses.replace(scenario, stimuli=(Simulated("a", {}, "a.py", text),))) for text in texts
+    ]
+    assert digests[0] == digests[1] != digests[2]
 
 
 def test_the_first_report_may_be_gone(tmp_path: Path) -> None:

@@ -242,4 +242,6 @@ def _plainly(value: Any) -> Any:
         return {str(key): _plainly(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plainly(item) for item in value]
+    if isinstance(value, bytes):  # the text of an author's simulation
+        return sha256(value)
     return value.value if isinstance(value, Enum) else value
