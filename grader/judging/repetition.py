@@ -74,6 +74,7 @@ _FACTS: tuple[tuple[Kind, str, Callable[[Trace], object]], ...] = (
     (Kind.CONTENT, "starts", lambda trace: trace.starts),
     (Kind.CONTENT, "written files", lambda trace: trace.written),
     (Kind.CONTENT, "left out", lambda trace: trace.left_out),
+    (Kind.CONTENT, "not started", lambda trace: trace.unstarted),
     (Kind.CONTENT, "newer Python", lambda trace: trace.newer),
     (Kind.GRADER, "notes", lambda trace: trace.notes),
     (Kind.GRADER, "suspicious actions", lambda trace: trace.reached),
