@@ -74,6 +74,7 @@ _FACTS: tuple[tuple[Kind, str, Callable[[Trace], object]], ...] = (
     (Kind.TIME, "end", lambda trace: trace.stop_ns),
     (Kind.CONTENT, "starts", lambda trace: trace.starts),
     (Kind.CONTENT, "left out", lambda trace: trace.left_out),
+    (Kind.CONTENT, "not started", lambda trace: trace.unstarted),
     (Kind.CONTENT, "newer Python", lambda trace: trace.newer),
     (Kind.GRADER, "written files", lambda trace: trace.written),
     (Kind.GRADER, "notes", lambda trace: trace.notes),
