@@ -319,7 +319,7 @@ def test_nobody_is_waited_for_in_another_domain(studio: RecordingSession, tmp_pa
     program = hostile(harm=elsewhere, later=later)
     trace = record(studio, tmp_path / "s", program, clock=clock, duration_ns=5 * NS_PER_S, first_message_on="/cmd_vel")
     assert len(trace.messages("/cmd_vel")) > 10, "three waits take longer than the recording"
-    assert trace.notes == ()
+    assert [note.partition(" is in the ROS domain ")[2][:1] for note in trace.notes] == ["1", "2", "3"]
     assert not trace.incomplete
 
 

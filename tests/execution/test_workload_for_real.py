@@ -88,7 +88,7 @@ def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
 def test_waiting_outside_of_virtual_time_is_for_the_wall_clock(
     run: Callable[..., Trace], once: str, later: str
 ) -> None:
-    assert run(once, later).clock_reason == OUTSIDE
+    assert run(once, later).clock_reason.startswith(OUTSIDE)  # and then what the program did, at which line
 
 
 @pytest.mark.parametrize(("once", "later"), WORK.values(), ids=WORK)
@@ -128,7 +128,7 @@ AN_ENDPOINT = "self.made = self.create_publisher(Twist, f'/x{self.count % 2}', 1
 )
 def test_what_a_process_says_hides_no_work(run: Callable[..., Trace], once: str, later: str) -> None:
     """That messages arrived, or that it waits for matches: neither takes as long as this."""
-    assert run(once, later).clock_reason == OUTSIDE
+    assert run(once, later).clock_reason.startswith(OUTSIDE)  # and then what the program did, at which line
 
 
 LOOP = """
