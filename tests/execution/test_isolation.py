@@ -253,6 +253,7 @@ def test_the_environment_of_a_student_is_exact(sandbox: Sandbox) -> None:
         "OMP_NUM_THREADS": "1",
         "MKL_NUM_THREADS": "1",
         "MALLOC_ARENA_MAX": "2",
+        "MPLBACKEND": "module://matplotlib.backends.backend_tkagg",
         "COLOUR": "blue",
         "LD_LIBRARY_PATH": ":".join(map(str, sandbox.ros.runtime.library_paths)),
         **({"PYTHONPATH": ":".join(map(str, paths))} if (paths := sandbox.ros.runtime.python_paths) else {}),

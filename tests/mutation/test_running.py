@@ -79,7 +79,7 @@ def test_without_libcst_the_command_says_what_to_install(monkeypatch: pytest.Mon
     code, said = graded("any.yaml")
     assert code == 2
     assert "expected the package libcst of the extra 'authors', found none" in said
-    assert f"{sys.executable} -m pip install 'libcst<2,>=1.5'" in said
+    assert f"{sys.executable} -m pip install 'libcst<2,>=1.8.4'" in said
 
 
 def test_notes_are_no_rubrics() -> None:
