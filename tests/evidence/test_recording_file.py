@@ -64,7 +64,7 @@ def test_judging_is_given_all_but_the_bytes(trace: Trace) -> None:
     exact = json.loads(as_text(trace))
     for row in exact["observations"]:
         if row[0] in ("message", "delivery", "request", "response"):
-            row[-1] = ""
+            row[5 if row[0] == "message" else -1] = ""  # a message may have more after its bytes
     assert quick == exact
 
 
