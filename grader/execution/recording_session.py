@@ -166,12 +166,15 @@ class RecordingSession:
         def record(share: float) -> Trace:
             return self._charged({"": job}, budget, progress, share)[""]
 
+        def surely_slow() -> bool:
+            trace = record(SURE_SHARE)
+            return not (trace.harness_problem or keeps_pace(plain, trace))
+
         for number in range(COUNTED_TIMES):
             trace = charged if charged is not None and number == 0 else record(1.0)
             if trace.clock_reason or trace.harness_problem:
                 return held_up
-            slow = not keeps_pace(plain, trace)
-            if not slow or (number == 0 and not keeps_pace(plain, record(SURE_SHARE))):
+            if keeps_pace(plain, trace) or (number == 0 and surely_slow()):
                 return replace(trace, notes=(*trace.notes, CHARGED_NOTE))
         return replace(held_up, harness_problem=held_up.harness_problem or UNCLEAR)
 

@@ -1,6 +1,7 @@
 """The studio: which traces are final when, and what is recorded again on the wall clock."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -192,6 +193,19 @@ def test_a_busy_machine_makes_no_node_slow() -> None:
 
 def test_a_pace_that_a_busy_machine_leaves_unclear_is_not_judged() -> None:
     trace = decided(PacedRecorder(charged_ms=[56, 54, 55], wall_ms=150, busy="starved"))
+    assert (trace.harness_problem, trace.notes) == (UNCLEAR, ())
+
+
+def test_a_failure_of_the_machine_makes_no_node_surely_slow() -> None:
+    """What was not recorded with less work says nothing about the pace."""
+
+    class Failing(PacedRecorder):
+        def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
+            for job, trace in zip(jobs, super().each(jobs, progress), strict=True):
+                failed = 0 < job.plan.charged < 1
+                yield replace(trace, observations=(), harness_problem="no worker") if failed else trace
+
+    trace = decided(Failing(charged_ms=[60, 60, 60], sure_ms=56, wall_ms=150, busy="starved"))
     assert (trace.harness_problem, trace.notes) == (UNCLEAR, ())
 
 
