@@ -18,6 +18,7 @@ from grader.core.errors import RubricError
 from grader.core.exercise import Check, Criterion, Exercise, Variant
 from grader.core.limits import Limits
 from grader.core.quantities import duration
+from grader.core.rubric_files import rubric_file
 from grader.core.scenario import (
     NumberStream,
     RunOptions,
@@ -246,7 +247,7 @@ def read_rubric(
     """Read a rubric file; its own checks, if any, are run.
 
     Args:
-        path: The file; messages show it as given.
+        path: The file, or another name for it (`rubric_file`); messages show it as given.
         checks: Checks that the rubric may use, besides its own.
         submissions: Folders that students write to: checks are never loaded from there.
         draw: Chooses the values of variants; without it, a rubric with variants is rejected.
@@ -255,6 +256,7 @@ def read_rubric(
     Raises:
         RubricError: The file cannot be read, or has mistakes; one line each, in the order of the file.
     """
+    path = rubric_file(path)
     content = _content(path)
     tree = _tree(path, content)
     files = own_files(path, _own_names(path, tree, "checks"), submissions)
@@ -354,6 +356,7 @@ def _exercise(
 
 def side_files(path: Path) -> tuple[OwnFile, ...]:
     """Return every file that a rubric names beside it, without running any; raises RubricError like `read_rubric`."""
+    path = rubric_file(path)
     tree = _tree(path, _content(path))
     files = (name for key in ("checks", "simulations", "provided") for name in _own_names(path, tree, key))
     return (*own_files(path, tuple(files)), *definition_files(path, _own_names(path, tree, "interfaces")))
@@ -361,6 +364,7 @@ def side_files(path: Path) -> tuple[OwnFile, ...]:
 
 def own_checks(path: Path) -> Mapping[str, type]:
     """Return a rubric's own checks by name, used or not; raises RubricError like `read_rubric`."""
+    path = rubric_file(path)
     return load(own_files(path, _own_names(path, _tree(path, _content(path)), "checks")), CHECKS)
 
 

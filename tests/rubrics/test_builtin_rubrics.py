@@ -15,9 +15,10 @@ from ruamel.yaml import YAML
 
 from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S
+from grader.core.rubric_files import rubrics_in
 from grader.core.scenario import OdometryStream, longest_course_ns, shortest
 from grader.judging.checks import CHECKS
-from grader.rubrics.builtin import NOTES, builtin_headers, builtin_rubrics
+from grader.rubrics.builtin import builtin_headers, builtin_rubrics
 from grader.rubrics.loader import read_rubric
 from grader.rubrics.schema import rubric_schema, schema_text
 
@@ -124,9 +125,7 @@ def test_the_shipped_schema_is_up_to_date() -> None:
     assert (RUBRICS / "rubric.schema.json").read_text(encoding="utf-8") == schema_text()
 
 
-@pytest.mark.parametrize(
-    "path", [p for p in sorted(RUBRICS.glob("*.yaml")) if not p.name.endswith(NOTES)], ids=lambda path: path.name
-)
+@pytest.mark.parametrize("path", rubrics_in(RUBRICS), ids=lambda path: path.parent.name)
 def test_each_rubric_names_the_schema_and_fits_it(path: Path, schema: Mapping[str, Any]) -> None:
     """An editor that knows JSON Schema finds nothing wrong."""
     text = path.read_text(encoding="utf-8")
@@ -157,7 +156,7 @@ def test_the_schema_knows_every_check_and_parameter(schema: Mapping[str, Any]) -
 )
 def test_the_schema_refuses_what_the_reader_refuses(old: str, new: str, schema: Mapping[str, Any]) -> None:
     """An editor marks a missing unit, points of 0, an unknown check and an unknown key."""
-    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8").replace(old, new, 1)
+    text = (RUBRICS / "exercise_1" / "rubric.yaml").read_text(encoding="utf-8").replace(old, new, 1)
     data = YAML(typ="safe", pure=True).load(text)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.Draft202012Validator(schema).validate(data)
@@ -191,12 +190,13 @@ def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path: Path, monk
     """Beside the package's code, exercise 2 before exercise 10."""
     rubrics = tmp_path / "grader" / "shipped" / "rubrics"
     rubrics.mkdir(parents=True)
-    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
+    text = (RUBRICS / "exercise_1" / "rubric.yaml").read_text(encoding="utf-8")
     for number, name in (("10", "a"), ("2", "c"), ("P1", "b")):
         changed = text.replace('number: "1"', f'number: "{number}"').replace("id: velocity_publisher", f"id: {name}")
-        (rubrics / f"{name}.yaml").write_text(changed, encoding="utf-8")
+        (rubrics / name).mkdir()
+        (rubrics / name / "rubric.yaml").write_text(changed, encoding="utf-8")
     monkeypatch.setattr("grader.core.shipped.PACKAGE", tmp_path / "grader")
-    assert builtin_rubrics() == {"c": rubrics / "c.yaml", "a": rubrics / "a.yaml", "b": rubrics / "b.yaml"}
+    assert builtin_rubrics() == {name: rubrics / name / "rubric.yaml" for name in "cab"}
     assert list(builtin_rubrics()) == ["c", "a", "b"]
 
 

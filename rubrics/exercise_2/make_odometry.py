@@ -1,6 +1,6 @@
-"""Makes `rubrics/odometry/`: a minute of wheel odometry from a simulated differential-drive robot.
+"""Makes `rubrics/exercise_2/odometry/`: a minute of wheel odometry from a simulated differential-drive robot.
 
-    python rubrics/make_odometry.py --out /tmp/odometry
+    python rubrics/exercise_2/make_odometry.py --out /tmp/odometry
 
 The robot is the ideal unicycle. Left and right wheel speeds v_l, v_r (m/s) and the distance b between the wheels give
 
