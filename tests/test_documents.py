@@ -14,6 +14,7 @@ from pathlib import Path
 import click
 import generated
 import pytest
+from sample_folders import GOLDEN, collections
 
 from grader.cli.main import app
 from grader.core.rubric_files import rubric_file
@@ -147,8 +148,8 @@ def _said() -> str:
                 texts.append(node.value)
             elif isinstance(node, ast.JoinedStr):
                 texts.append("".join(str(p.value) if isinstance(p, ast.Constant) else "..." for p in node.values))
-    golden = (ROOT / "tests" / "submissions" / "golden.yaml").read_text(encoding="utf-8")
-    return "\n".join([*texts, golden])
+    golden = [(collection / GOLDEN).read_text(encoding="utf-8") for collection in collections()]
+    return "\n".join([*texts, *golden])
 
 
 def _messages() -> list[str]:

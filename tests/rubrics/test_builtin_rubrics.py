@@ -129,7 +129,7 @@ def test_the_shipped_schema_is_up_to_date() -> None:
 def test_each_rubric_names_the_schema_and_fits_it(path: Path, schema: Mapping[str, Any]) -> None:
     """An editor that knows JSON Schema finds nothing wrong."""
     text = path.read_text(encoding="utf-8")
-    assert text.startswith("# yaml-language-server: $schema=rubric.schema.json\n")
+    assert text.startswith("# yaml-language-server: $schema=../rubric.schema.json\n")
     jsonschema.Draft202012Validator(schema).validate(YAML(typ="safe", pure=True).load(text))
 
 
