@@ -28,6 +28,7 @@ DOCUMENTS = [
     "ROADMAP.md",
     "SECURITY.md",
     *sorted(p.relative_to(ROOT).as_posix() for p in (ROOT / "docs").rglob("*.md")),
+    *sorted(p.relative_to(ROOT).as_posix() for p in (ROOT / "rubrics").glob("*/README.md")),
 ]
 
 _LINK = re.compile(r"\]\(([^)\s]+)\)")

@@ -207,3 +207,32 @@ def test_every_criterion_says_which_part_of_the_chapter_asks_for_it() -> None:
         task = rf"Exercise {exercise.number}, (acceptance criterion|task) \d"
         begin = rf"Part 2, {exercise.number}, \w" if exercise.id in PROJECTS else task
         assert [c.id for c in exercise.criteria if not re.match(begin, c.chapter)] == []
+
+
+_ROW = re.compile(r"^\| `(\w+)` \| ([0-9.]+) \|", re.MULTILINE)
+
+
+@pytest.mark.parametrize("path", rubrics_in(RUBRICS), ids=lambda path: path.parent.name)
+def test_each_exercise_is_described(path: Path) -> None:
+    """Its README has its number, its files, and the criteria with their points, in order."""
+    text, described = path.with_name("README.md").read_text(encoding="utf-8"), read_rubric(path)
+    assert [(id_, float(points)) for id_, points in _ROW.findall(text)] == [
+        (c.id, float(c.points)) for c in described.criteria
+    ]
+    assert f"{sum(c.points for c in described.criteria)} points" in text
+    assert all(f"`{file}`" in text for file in described.files)
+
+
+def test_what_students_read_is_described_in_other_words() -> None:
+    """No six words in a row of a README are those of the chapter."""
+    chapter = RUBRICS.parents[1] / "shared" / "chapter_1_2.txt"
+    if not chapter.exists():
+        pytest.skip("the text of the chapter is not here")
+    theirs = _runs(chapter.read_text(encoding="utf-8"))
+    ours = {path.parent.name: _runs(path.read_text(encoding="utf-8")) & theirs for path in RUBRICS.glob("*/README.md")}
+    assert {name: shared for name, shared in ours.items() if shared} == {}
+
+
+def _runs(text: str) -> set[tuple[str, ...]]:
+    words = re.findall(r"\w+", text.casefold())
+    return {tuple(words[n : n + 6]) for n in range(len(words) - 5)}
