@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from archive import builtin_exercises
 from sample_folders import GROUPS, SHAPES, collection_of, collections, expected, expected_in, folder_of
 
 from grader.core.exercise import Outcome
+from grader.rubrics.builtin import builtin_rubrics
 
 NOT_PYTHON = {
     "broken/syntax_error",
@@ -21,54 +23,10 @@ MISSPELT = {"broken/misspelt_file", "broken/controller_missing", "broken/noteboo
 #: Right programs that import a ROS package which the wheels lack.
 LACKING = {"broken/ros_package_missing"}
 
-FILES = {
-    "velocity_publisher": {"velocity_publisher.py"},
-    "odom_subscriber": {"odom_subscriber.py"},
-    "two_node_communication": {"temperature_sensor.py", "fan_controller.py"},
-    "joint_publisher": {"simple_publisher.py"},
-    "joint_subscriber": {"simple_subscriber.py"},
-    "battery_service": {"battery_service_server.py", "battery_service_client.py"},
-}
-CRITERIA = {
-    "velocity_publisher": {"publishes_twist", "rate", "linear_velocity", "angular_velocity", "logging"},
-    "odom_subscriber": {"subscribes_odom", "logs_position", "log_period", "waits_gracefully"},
-    "two_node_communication": {
-        "temperature_rate",
-        "temperature_range",
-        "logs_fan_speed",
-        "fan_on_above_25",
-        "fan_off_at_or_below_25",
-        "runs_together",
-        "bidirectional_graph",
-    },
-    "joint_publisher": {"publishes_float64", "rate", "angle", "log_every_10th"},
-    "joint_subscriber": {"subscribes_joint_commands", "logs_radians", "logs_degrees", "waits_gracefully"},
-    "battery_service": {
-        "offers_service",
-        "answers_many_clients",
-        "response_text",
-        "drains_half_percent",
-        "starts_again_at_100",
-        "waits_for_service",
-        "asks_five_times",
-        "goes_on_above_20",
-        "aborts_at_or_below_20",
-        "no_go_when_refused",
-        "no_go_when_puzzled",
-        "no_go_when_deserted",
-        "runs_together",
-    },
-}
-
-#: The folder of each exercise.
-HOMES = {
-    "velocity_publisher": "exercise_1",
-    "odom_subscriber": "exercise_2",
-    "two_node_communication": "exercise_3",
-    "joint_publisher": "project_1",
-    "joint_subscriber": "project_2",
-    "battery_service": "project_3",
-}
+#: By exercise: the files that students write, the ids of the criteria, and the name of its folder.
+FILES = {id_: set(exercise.files) for id_, exercise in builtin_exercises().items()}
+CRITERIA = {id_: {criterion.id for criterion in exercise.criteria} for id_, exercise in builtin_exercises().items()}
+HOMES = {id_: path.parent.name for id_, path in builtin_rubrics().items()}
 
 
 def test_every_folder_is_listed() -> None:

@@ -116,10 +116,10 @@ def outdated(recorded: Recorded) -> list[str]:
     ]
 
 
-def judged(recorded: Recorded) -> Report:
-    """Judge a recording as `grade rejudge` does, by the built-in rubrics."""
+def judged(recorded: Recorded, known: Mapping[str, Exercise] | None = None) -> Report:
+    """Judge a recording as `grade rejudge` does, by the built-in exercises or by others, by id."""
     manifest = kept.parse(recorded.manifest)
-    exercises = [builtin_exercises()[exercise.id] for exercise in manifest.exercises]
+    exercises = [(known or builtin_exercises())[exercise.id] for exercise in manifest.exercises]
     traces = {
         (exercise.id, recording.scenario): unpack(recorded.traces[f"{exercise.id}.{recording.scenario}"])
         for exercise in manifest.exercises
