@@ -186,7 +186,7 @@ class _Reporter:
         own = {name: sources[name] for name in scenario.processes if name in sources}
         siblings = tuple(c.check for c in self.exercise.criteria if c is not criterion)
         facts, lost = self.facts.get(criterion.id), dict(self.lost)
-        return Case(criterion, verdict, trace, own, _fault_of(verdict, trace), siblings, facts, lost)
+        return Case(criterion, verdict, trace, own, fault_of(verdict, trace), siblings, facts, lost)
 
 
 def _same_as(criterion: str, verdict: Verdict) -> Verdict:
@@ -194,7 +194,7 @@ def _same_as(criterion: str, verdict: Verdict) -> Verdict:
     return replace(verdict, hint=hint, same_cause_as=criterion)
 
 
-def _fault_of(verdict: Verdict, trace: Trace) -> Fault | None:
+def fault_of(verdict: Verdict, trace: Trace) -> Fault | None:
     """Return the fault of the trace that a verdict rests on."""
     known = verdict.evidence.get(FAULT_KEY)
     if not isinstance(known, Mapping):

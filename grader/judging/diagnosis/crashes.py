@@ -7,7 +7,7 @@ import ast
 from grader.core.trace import FaultKind
 from grader.judging.checks.fields import RandomInRange
 from grader.judging.diagnosis.names import MESSAGE_FIELDS, SINGLE_NUMBERS, SPINS
-from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, rule
+from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
 from grader.judging.diagnosis.wiring import (
     bare_statements,
     head_of,
@@ -210,7 +210,7 @@ def _own_raise(crash: Crash) -> Clue | None:
     return Clue(f"{source.code(raised)} ends the node: log a warning instead, and go on")
 
 
-@rule(fault=None, priority=5100)
+@hint_rule(fault=None, priority=5100)
 def _events_executor(case: Case) -> Clue | None:
     used = next(case.source.calls("EventsExecutor"), None)
     stuck = made(case.source, "timer") if case.fault is None else case.fault.kind is FaultKind.HUNG

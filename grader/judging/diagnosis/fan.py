@@ -12,7 +12,7 @@ from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import RandomInRange
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.together import AnswersTogether
-from grader.judging.diagnosis.rules import Case, Clue, rule, silent_topic
+from grader.judging.diagnosis.rules import Case, Clue, hint_rule, silent_topic
 from grader.judging.diagnosis.wiring import (
     Constant,
     conditions,
@@ -124,7 +124,7 @@ def _wrong_inputs(case: Case) -> list[float]:
     return [r.input for r in _rows(case) if r.answer is None or not within(r.answer, r.expected, EXACT)]
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_late, priority=13010)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_late, priority=13010)
 def _stored_late(late: _Subscriber) -> Clue | None:
     """An attribute is compared before it gets the new value."""
     source = late.source
@@ -139,7 +139,7 @@ def _stored_late(late: _Subscriber) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_late, priority=13020)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_late, priority=13020)
 def _oldest_compared(late: _Subscriber) -> Clue | None:
     """The oldest of several stored values is compared."""
     source = late.source
@@ -156,7 +156,7 @@ def _grows(source: Source, values: ast.expr) -> bool:
     return chain(values) != "" and any(chain(c.func) == f"{chain(values)}.append" for c in source.calls("append"))
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_late, priority=13030)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_late, priority=13030)
 def _put_off(late: _Subscriber) -> Clue | None:
     """The answer is left to a timer, or the callback sleeps before it answers."""
     source = late.source
@@ -170,7 +170,7 @@ def _put_off(late: _Subscriber) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, priority=13040)
+@hint_rule(ThresholdResponse, AnswersTogether, priority=13040)
 def _compared_as_text(case: Case) -> Clue | None:
     """`str(msg.data) > '25'` compares alphabetically."""
     for source, test in _compared(case):
@@ -185,7 +185,7 @@ def _compared_as_text(case: Case) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, priority=13050)
+@hint_rule(ThresholdResponse, AnswersTogether, priority=13050)
 def _compared_mean(case: Case) -> Clue | None:
     """A mean of the last values lags behind, and stays near the threshold."""
     for source, test in _compared(case):
@@ -202,7 +202,7 @@ def _sum_by_count(node: ast.BinOp) -> bool:
     return isinstance(node.left, ast.Call) and last_name(node.left.func) == "sum"
 
 
-@rule(ThresholdResponse, AnswersTogether, problem=ProblemKind.NO_NUMBER, given=_controller, priority=13060)
+@hint_rule(ThresholdResponse, AnswersTogether, problem=ProblemKind.NO_NUMBER, given=_controller, priority=13060)
 def _answer_without_number(controller: _Controller) -> Clue | None:
     """Answers have a type without a number."""
     source, check = controller.source, controller.check
@@ -213,7 +213,7 @@ def _answer_without_number(controller: _Controller) -> Clue | None:
     return Clue(hint, source.place(item.call), key=f"apart:{check.output}")
 
 
-@rule(ThresholdResponse, given=_controller, priority=13070)
+@hint_rule(ThresholdResponse, given=_controller, priority=13070)
 def _at_the_threshold(controller: _Controller) -> Clue | None:
     """Only inputs exactly at the threshold are answered wrongly."""
     source, check = controller.source, controller.check
@@ -231,7 +231,7 @@ def _at_the_threshold(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, given=_controller, priority=13080)
+@hint_rule(ThresholdResponse, given=_controller, priority=13080)
 def _inverted(controller: _Controller) -> Clue | None:
     """The answers are exchanged."""
     source, check = controller.source, controller.check
@@ -264,7 +264,7 @@ def _says_inverted(source: Source, switch: _Switch, check: ThresholdResponse | A
     return wrong in numbers and right not in numbers
 
 
-@rule(ThresholdResponse, given=_controller, priority=13090)
+@hint_rule(ThresholdResponse, given=_controller, priority=13090)
 def _rounded(controller: _Controller) -> Clue | None:
     """The input is truncated or rounded before the comparison."""
     source, check = controller.source, controller.check
@@ -280,7 +280,7 @@ def _rounded(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, given=_controller, priority=13100)
+@hint_rule(ThresholdResponse, given=_controller, priority=13100)
 def _other_threshold(controller: _Controller) -> Clue | None:
     source, check = controller.source, controller.check
     known = _switches(source)
@@ -299,7 +299,7 @@ def _other_threshold(controller: _Controller) -> Clue | None:
     return Clue(f"{hint}{number(check.threshold)}", source.place(others[0].limit.origin), key="other_threshold")
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13110)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13110)
 def _wrong_answer(controller: _Controller) -> Clue | None:
     """The controller sends a number that is not in the exercise."""
     source, check = controller.source, controller.check
@@ -337,7 +337,7 @@ def _is_worth(source: Source, node: ast.AST, value: float) -> bool:
     return worth is not None and within(worth.value, value, EXACT)
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13120)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13120)
 def _compared_not_set(controller: _Controller) -> Clue | None:
     """`fan.data == 100.0` compares and sets nothing."""
     source = controller.source
@@ -350,7 +350,7 @@ def _compared_not_set(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13130)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13130)
 def _sent_before_set(controller: _Controller) -> Clue | None:
     """The message is published before its number is set."""
     source, check = controller.source, controller.check
@@ -367,7 +367,7 @@ def _sent_before_set(controller: _Controller) -> Clue | None:
     return Clue(hint, source.place(calls[0]))
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13140)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13140)
 def _sends_what_came(controller: _Controller) -> Clue | None:
     """The message that came is published instead of the answer."""
     source, check = controller.source, controller.check
@@ -384,7 +384,7 @@ def _sends_what_came(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13150)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13150)
 def _one_branch(controller: _Controller) -> Clue | None:
     """An answer is sent only on one side of the threshold."""
     source, check = controller.source, controller.check
@@ -406,7 +406,7 @@ def _tests_threshold(source: Source, test: ast.expr, threshold: float) -> bool:
     return any(s.node in inside for s in _switches(source, threshold))
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13160)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13160)
 def _answered_once(controller: _Controller) -> Clue | None:
     """A flag lets one answer through."""
     source, check = controller.source, controller.check
@@ -423,7 +423,7 @@ def _answered_once(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13170)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13170)
 def _sent_in_one_branch(controller: _Controller) -> Clue | None:
     """`publish` stands inside `else`, or a return comes before it."""
     source, check = controller.source, controller.check
@@ -446,7 +446,7 @@ def _sent_in_one_branch(controller: _Controller) -> Clue | None:
     return Clue(hint, source.place(early[0]), key="one_branch")
 
 
-@rule(ThresholdResponse, given=_controller, priority=13180)
+@hint_rule(ThresholdResponse, given=_controller, priority=13180)
 def _no_other_side(controller: _Controller) -> Clue | None:
     """The message is kept, and its number is set on one side of the threshold only."""
     source, check = controller.source, controller.check
@@ -473,7 +473,7 @@ def _asks_none(test: ast.expr, name: str) -> bool:
     return isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not) and chain(test.operand) == name
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13190)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13190)
 def _latched(controller: _Controller) -> Clue | None:
     """A variable is set on one side of the threshold, and never reset."""
     source, check = controller.source, controller.check
@@ -495,7 +495,7 @@ def _latched(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13200)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13200)
 def _slow_timer(controller: _Controller) -> Clue | None:
     """A timer answers too rarely."""
     source, check = controller.source, controller.check
@@ -509,7 +509,7 @@ def _slow_timer(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, outcome=Outcome.NOT_MET, priority=13210)
+@hint_rule(ThresholdResponse, AnswersTogether, outcome=Outcome.NOT_MET, priority=13210)
 def _callback_sleeps(case: Case) -> Clue | None:
     """The callback sleeps, and what comes meanwhile is answered late."""
     for late in _subscribers(case):
@@ -521,7 +521,7 @@ def _callback_sleeps(case: Case) -> Clue | None:
     return None
 
 
-@rule(AnswersTogether, priority=13990)
+@hint_rule(AnswersTogether, priority=13990)
 def _follows(case: Case) -> Clue | None:
     """A criterion about one of the two nodes was lost already, and explains this one."""
     check: AnswersTogether = case.check

@@ -7,7 +7,7 @@ import ast
 from grader.core.exercise import Outcome
 from grader.judging.checks.odometry import LogsPosition
 from grader.judging.diagnosis.logs import position_log
-from grader.judging.diagnosis.rules import Case, Clue, Maker, rule
+from grader.judging.diagnosis.rules import Case, Clue, Maker, hint_rule
 from grader.judging.diagnosis.wiring import is_flag, made, message_classes, names_in, number_at, reached, roots, runs
 from grader.judging.facts import PositionFacts
 from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
@@ -29,7 +29,7 @@ def _position_rule(*causes: str, priority: int) -> Maker[Case]:
     def found(case: Case) -> Case | None:
         return case if _cause(case) in causes else None
 
-    return rule(LogsPosition, outcome=Outcome.NOT_MET, given=found, priority=priority)
+    return hint_rule(LogsPosition, outcome=Outcome.NOT_MET, given=found, priority=priority)
 
 
 def _cause(case: Case) -> str:

@@ -166,6 +166,7 @@ class Rule:
     priority: int = FIRST
     about: str = ""
     file: tuple[str, bytes] | None = None
+    function: Callable[..., object] | None = None  # what the decorator was above
 
     def explains(self, criterion: Criterion) -> bool:
         """Return whether it is about the check of a criterion."""
@@ -190,7 +191,7 @@ def _case(case: Case) -> Case:
     return case
 
 
-def rule(
+def hint_rule(
     *checks: type | str,
     problem: ProblemKind | None = None,
     outcome: Outcome | None = None,
@@ -207,7 +208,12 @@ def rule(
         fault: Whether the verdict must rest on a fault, or on none; None for either.
         priority: Its place among all rules; the lowest number is asked first.
         given: Computes the argument of the function from the case. If it returns None, the rule does not apply.
+
+    Raises:
+        TypeError: A check is neither a name nor a class.
     """
+    if not all(isinstance(check, (type, str)) for check in checks):
+        raise TypeError("expected the names of checks, found a function: write @hint_rule() above it")
 
     def make(find: Callable[[Given], Clue | None]) -> Rule:
         def found(case: Case) -> Clue | None:
@@ -216,7 +222,7 @@ def rule(
 
         about = (find.__doc__ or "").strip().split("\n")[0]
         id_ = find.__name__.removeprefix("_")
-        return Rule(id_, found, checks, problem, outcome, fault, priority=priority, about=about)
+        return Rule(id_, found, checks, problem, outcome, fault, priority=priority, about=about, function=find)
 
     return make
 
@@ -231,7 +237,7 @@ def crash_rule(text: str = "", *kinds: FaultKind, in_file: bool = True, priority
         priority: Its place among all rules; the lowest number is asked first.
     """
     given = partial(_crash, text, kinds or (FaultKind.EXCEPTION,), in_file)
-    make = rule(fault=True, priority=priority, given=given)
+    make = hint_rule(fault=True, priority=priority, given=given)
     return lambda find: replace(make(find), text=text)
 
 

@@ -11,7 +11,7 @@ from grader.core.trace import LogRecord
 from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
 from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse, ServiceSequence
 from grader.judging.diagnosis.names import SPINS
-from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, rule
+from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
 from grader.judging.diagnosis.wiring import (
     elsewhere_because,
     goes_to,
@@ -47,7 +47,7 @@ def _sides(case: Case) -> Iterator[tuple[Source, str]]:
     yield from ((source, kind) for source in case.sources.values())
 
 
-@rule(*_CLIENTS, *_SERVERS, priority=3010)
+@hint_rule(*_CLIENTS, *_SERVERS, priority=3010)
 def _other_service(case: Case) -> Clue | None:
     """A server or client has another name."""
     other = case.found(OtherEnd)
@@ -66,7 +66,7 @@ def _other_service(case: Case) -> Clue | None:
     return None
 
 
-@rule(*_CLIENTS, *_SERVERS, priority=3020)
+@hint_rule(*_CLIENTS, *_SERVERS, priority=3020)
 def _other_service_type(case: Case) -> Clue | None:
     """A server or client has another type."""
     offered = [c for c in (case.check, *case.siblings) if isinstance(c, ServiceAvailable)]
@@ -91,7 +91,7 @@ def _callbacks(source: Source) -> list[ast.AST]:
     return found + [n for callback in servers for n in reached(source, roots(source, callback))]
 
 
-@rule(*_CLIENTS, priority=3030)
+@hint_rule(*_CLIENTS, priority=3030)
 def _synchronous_call(case: Case) -> Clue | None:
     """`client.call()` waits for an answer that only a spinning node takes."""
     source = case.source
@@ -110,7 +110,7 @@ def _synchronous_call(case: Case) -> Clue | None:
     return None
 
 
-@rule(*_CLIENTS, priority=3040)
+@hint_rule(*_CLIENTS, priority=3040)
 def _spins_in_callback(case: Case) -> Clue | None:
     """A callback spins the node that is spinning already."""
     source = case.source
@@ -122,7 +122,7 @@ def _spins_in_callback(case: Case) -> Clue | None:
     return Clue(f"{hint} given to future.add_done_callback", source.place(call), key="waits_in_callback")
 
 
-@rule(*_CLIENTS, fault=None, priority=3050)
+@hint_rule(*_CLIENTS, fault=None, priority=3050)
 def _future_never_done(case: Case) -> Clue | None:
     """A loop asks whether a future is done, and nothing spins the node meanwhile."""
     source = case.source
@@ -137,7 +137,7 @@ def _future_never_done(case: Case) -> Clue | None:
     return None
 
 
-@rule(CallsOfClient, ReactsToResponses, priority=3060)
+@hint_rule(CallsOfClient, ReactsToResponses, priority=3060)
 def _shared_callback_group(case: Case) -> Clue | None:
     """A callback awaits the response of a client in the same callback group, whose callbacks run one at a time."""
     source = case.source
@@ -179,7 +179,7 @@ def _too_early(source: Source) -> Clue | None:
     return Clue(hint, source.place(found), key="result_too_early")
 
 
-@rule(*_CLIENTS, priority=3070)
+@hint_rule(*_CLIENTS, priority=3070)
 def _result_too_early(case: Case) -> Clue | None:
     """The result of a future is read at once."""
     return _too_early(case.source)
@@ -264,7 +264,7 @@ def _service_arguments(crash: Crash) -> Clue | None:
     return None
 
 
-@rule(ServiceResponse, ServiceSequence, priority=3130)
+@hint_rule(ServiceResponse, ServiceSequence, priority=3130)
 def _another_response(case: Case) -> Clue | None:
     """The callback fills in one response and returns another one."""
     source = case.source
@@ -282,7 +282,7 @@ def _another_response(case: Case) -> Clue | None:
     return None
 
 
-@rule(ReactsToResponses, outcome=Outcome.NOT_MET, priority=3140)
+@hint_rule(ReactsToResponses, outcome=Outcome.NOT_MET, priority=3140)
 def _wrong_level(case: Case) -> Clue | None:
     """One side logs at the level of the other, or at a level that is not shown."""
     check: ReactsToResponses = case.check
