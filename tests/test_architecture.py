@@ -248,3 +248,31 @@ def test_a_place_on_one_machine_is_recognised(place: str) -> None:
 def test_places_that_every_machine_has_are_none(place: str) -> None:
     """Neither are paths inside a sandbox."""
     assert not names_a_home(place)
+
+
+#: What asks checks for their roles and facts instead of knowing their classes.
+KNOWS_NO_CHECK = (
+    "judging/diagnosis/__init__.py",
+    "judging/diagnosis/rules.py",
+    "judging/plots.py",
+    "judging/figures.py",
+    "rubrics/check_parameters.py",
+)
+
+
+def test_the_engine_of_hint_rules_and_the_charts_know_no_check() -> None:
+    """A check declares what its parameters are, and hands typed facts to rules."""
+    for name in KNOWS_NO_CHECK:
+        assert [module for module in imports_of(PACKAGE / name) if module.startswith("grader.judging.checks")] == []
+
+
+def test_no_hint_rule_reads_the_evidence_of_reports() -> None:
+    """That is JSON for readers of reports; what rules need is in typed facts."""
+    rules = sorted((PACKAGE / "judging" / "diagnosis").glob("*.py"))
+    reads = [
+        f"{path.name}:{node.lineno}"
+        for path in rules
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.Attribute) and node.attr == "evidence" and path.name != "__init__.py"
+    ]
+    assert reads == []

@@ -16,6 +16,7 @@ import generated
 import pytest
 from sample_folders import GOLDEN, collections
 
+from grader import api
 from grader.cli.main import app
 from grader.core.rubric_files import rubric_file
 from grader.judging.checks import CHECKS
@@ -192,7 +193,7 @@ def test_an_old_part_is_noticed() -> None:
 
 def test_the_site_names_every_command_option_check_and_key() -> None:
     """The pages are made from the code; nothing of it is left out."""
-    commands, checks, grammar, gallery, examples = (make() for make in generated.NAMES.values())
+    commands, checks, grammar, gallery, examples, interface = (make() for make in generated.NAMES.values())
     for name, command in app.commands.items():
         described = [parameter for parameter in command.params if not getattr(parameter, "hidden", False)]
         options = [option for parameter in described for option in parameter.opts if option.startswith("--")]
@@ -202,6 +203,7 @@ def test_the_site_names_every_command_option_check_and_key() -> None:
     assert [
         word for word in ("just_above", "stimuli", "cancel_after", "some_of", "copies") if f"`{word}`" not in grammar
     ] == []
+    assert [name for name in api.__all__ if f"\n### `{name}`\n" not in interface] == []
     assert [name for name in generated.exercises() if f'<a id="{name}"></a>' not in gallery] == []
     assert [
         p.parent.name for p in ROOT.glob("examples/*/README.md") if f'<a id="{p.parent.name}"></a>' not in examples

@@ -233,7 +233,7 @@ def test_a_picture_that_fails_costs_only_itself(monkeypatch: pytest.MonkeyPatch)
     def broken(check: TopicRate, trace: Trace) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(CHECKS["topic_rate"], "chart", broken)
+    monkeypatch.setattr(CHECKS["topic_rate"], "drawing", broken)
     titles = [f.title for f in figures_of(ONE, {"alone": velocity().trace()})]
     assert not any(t.startswith("Rate of") for t in titles)
     assert len(titles) == 4
