@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from grader.cli.options import complain
+from grader.core.rubric_files import rubric_file
 
 if TYPE_CHECKING:
     from grader.classroom.last_run import LastRun
@@ -117,7 +118,8 @@ class RepeatingCommand(click.Command):
         """Raise ClassError if the last run used a file that is no longer there."""
         from grader.core.errors import ClassError
 
-        gone = [text for text in texts if self._is_path(name) and not os.path.lexists(text)]
+        places = {text: str(rubric_file(Path(text))) if name == "rubrics" else text for text in texts}
+        gone = [text for text, place in places.items() if self._is_path(name) and not os.path.lexists(place)]
         if gone:
             option = _name(self._kept[name])
             holds = f" ({_decisions(last.decisions)})" if name == "adjustments" else ""

@@ -10,6 +10,7 @@ from pathlib import Path
 import copies
 import pytest
 from copies import FILE, handed
+from sample_folders import TESTS, folder_of
 
 from grader.core.errors import ClassError
 from grader.similarity import library
@@ -17,7 +18,6 @@ from grader.similarity.finding import COMMON_LEAST, COMMON_MOST, MAX_BYTES, find
 from grader.similarity.library import Handed, Similar
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-CORRECT = ROOT / "tests" / "submissions" / "correct"
 #: Programs of people who do not know each other.
 STRANGERS = ("odom_chinese", "odom_csv", "odom_distance", "odom_globals_spin_once", "odom_json", "odom_namedtuple",
              "odom_history_path", "odom_loop_with_deadline", "odom_watchdog", "odom_yaml_lines")  # fmt: skip
@@ -25,12 +25,12 @@ STRANGERS = ("odom_chinese", "odom_csv", "odom_distance", "odom_globals_spin_onc
 
 def strangers() -> list[Handed]:
     """Return a class in which everybody worked alone."""
-    return [Handed(name, name, *read_programs(CORRECT / name)) for name in STRANGERS]
+    return [Handed(name, name, *read_programs(folder_of(f"correct/{name}"))) for name in STRANGERS]
 
 
 def text_of(name: str) -> str:
     """Return the program of a stranger."""
-    return (CORRECT / name / FILE).read_text(encoding="utf-8")
+    return (folder_of(f"correct/{name}") / FILE).read_text(encoding="utf-8")
 
 
 def pairs(similar: Similar) -> list[tuple[str, str]]:
@@ -65,13 +65,13 @@ def test_the_order_of_the_class_changes_nothing() -> None:
 def test_the_process_changes_nothing() -> None:
     """The library's digests differ from process to process; what is found does not."""
     program = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import sys; sys.path[:0] = sys.argv[1:]\n"
         "import test_similarity_finding as t, copies\n"
         "from grader.similarity.pages import render_table\n"
         "copied = t.handed('z', copies.logged(t.text_of('odom_csv'), 1))\n"
         "print(render_table(t.find_similar([*t.strangers(), copied], ())))"
     )
-    command = [sys.executable, "-c", program, str(Path(__file__).parent)]
+    command = [sys.executable, "-c", program, str(Path(__file__).parent), str(TESTS)]
     said = [
         subprocess.run(
             command, env={**os.environ, "PYTHONHASHSEED": seed}, check=True, capture_output=True, text=True
