@@ -12,7 +12,7 @@ from numbers import Rational, Real
 from typing import Any, Protocol, TypeGuard
 
 from grader.core.dataclass import dataclass
-from grader.core.scenario import OdometryStream, Scenario
+from grader.core.scenario import RecordedStream, Scenario
 from grader.core.trace import Trace
 
 
@@ -310,6 +310,6 @@ class Exercise:
     bonus: Fraction = Fraction(0)  # points above the maximum that an instructor may give
 
     @property
-    def plays_odometry(self) -> bool:
-        """Whether any scenario plays the /odom recording."""
-        return any(isinstance(stimulus, OdometryStream) for s in self.scenarios for stimulus in s.stimuli)
+    def recorded(self) -> tuple[RecordedStream, ...]:
+        """The recordings that its scenarios play."""
+        return tuple(stimulus for s in self.scenarios for stimulus in s.stimuli if isinstance(stimulus, RecordedStream))

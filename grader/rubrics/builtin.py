@@ -20,8 +20,8 @@ from grader.submissions.collected import shown
 NOTES = ".selftest.yaml"
 
 
-def builtin_odometry() -> Path:
-    """Return the project's own /odom recording."""
+def builtin_recording() -> Path:
+    """Return the recording that the stimulus `odometry` plays, which names none."""
     return shipped("rubrics") / "odometry"
 
 
@@ -38,7 +38,7 @@ class Header:
 @cache
 def builtin_exercises() -> tuple[Exercise, ...]:
     """Return the built-in exercises, ordered by number; raises RubricError without any."""
-    return compiled("rubrics", state_of(_paths()) + state_of_package(), _read_exercises)
+    return compiled("rubrics", state_of([*_paths(), *_recorded()]) + state_of_package(), _read_exercises)
 
 
 def _read_exercises() -> tuple[Exercise, ...]:
@@ -63,6 +63,11 @@ def builtin_headers() -> tuple[Header, ...]:
 
 def _paths() -> list[Path]:
     return [path for path in sorted(shipped("rubrics").glob("*.yaml")) if not path.name.endswith(NOTES)]
+
+
+def _recorded() -> list[Path]:
+    """Return the files of the recordings beside the rubrics, which the digests of exercises cover."""
+    return sorted(builtin_recording().iterdir())
 
 
 def _header(path: Path) -> Header:
