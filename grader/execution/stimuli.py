@@ -34,9 +34,10 @@ class TopicEvent(Event):
 
 @dataclass(frozen=True, slots=True)
 class Appear(TopicEvent):
-    """Create a publisher of the type that subscriptions ask for."""
+    """Create a publisher of the type that subscriptions ask for, or of this type alone if it is fixed."""
 
     type: str
+    fixed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +166,7 @@ def _number_events(stream: PlannedNumbers) -> Iterator[Event]:
 
 
 def _recording_events(recording: PlannedRecording) -> Iterator[Event]:
-    yield Appear(recording.start_ns, recording.topic, recording.type)
+    yield Appear(recording.start_ns, recording.topic, recording.type, fixed=True)
     for t_ns, cdr, value in recording.messages:
         yield PublishRecorded(t_ns, recording.topic, cdr, value)
     yield Disappear(recording.stop_ns, recording.topic)

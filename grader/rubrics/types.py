@@ -204,11 +204,10 @@ CHECK_FILE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*\.py"
 CheckFile = Annotated[
     str, MatchingText(CHECK_FILE, "a Python file in the rubric's folder such as my_checks.py", "my_checks.py")
 ]
-#: A folder of interface packages, under the same rules.
-INTERFACE_FOLDER = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*/?"
-InterfaceFolder = Annotated[
-    str, MatchingText(INTERFACE_FOLDER, "a folder beside the rubric such as interfaces", "interfaces")
-]
+#: A folder of interface packages, or a recording, under the same rules.
+BESIDE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*/?"
+InterfaceFolder = Annotated[str, MatchingText(BESIDE, "a folder beside the rubric such as interfaces", "interfaces")]
+RecordingPath = Annotated[str, MatchingText(BESIDE, "a recording beside the rubric such as bags/scan", "bags/scan")]
 Number = Annotated[Text, BeforeValidator(_as_text)]
 Real = Annotated[float, Strict(), AllowInfNan(allow_inf_nan=False)]
 #: Unlike other numbers, a field may be `.nan` or `.inf`: sensors send them.

@@ -42,7 +42,7 @@ def test_streams_are_merged_by_time_and_keep_their_order() -> None:
         Appear(0, "/b", FLOAT),
         PublishNumber(500 * MS, "/a", (1.0, 0)),
         PublishNumber(500 * MS, "/b", (2.0, 0)),
-        Appear(500 * MS, "/odom", "nav_msgs/msg/Odometry"),
+        Appear(500 * MS, "/odom", "nav_msgs/msg/Odometry", fixed=True),
         PublishRecorded(500 * MS, "/odom", b"", {}),
         Disappear(501 * MS, "/odom"),
     ]
