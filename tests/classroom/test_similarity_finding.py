@@ -14,7 +14,7 @@ from sample_folders import TESTS, folder_of
 
 from grader.core.errors import ClassError
 from grader.similarity import library
-from grader.similarity.finding import COMMON_LEAST, MAX_BYTES, find_similar, read_given, read_programs
+from grader.similarity.finding import COMMON_LEAST, COMMON_MOST, MAX_BYTES, find_similar, read_given, read_programs
 from grader.similarity.library import Handed, Similar
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -121,6 +121,12 @@ def test_what_many_write_does_not_count() -> None:
     found = find_similar([*strangers(), *few], ())
     assert found.pairs == ()
     assert [(same.file, len(same.holders), same.whole) for same in found.same] == [(FILE, COMMON_LEAST + 1, True)]
+
+
+@pytest.mark.parametrize(("size", "common_from"), [(10, COMMON_LEAST), (300, 30), (1_000, 100), (3_000, COMMON_MOST)])
+def test_what_counts_as_common_grows_with_the_class_up_to_a_limit(size: int, common_from: int) -> None:
+    """Without the limit, pairs would grow with the square of a class of thousands."""
+    assert find_similar([Handed(str(number), str(number), ()) for number in range(size)], ()).common_from == common_from
 
 
 def test_a_file_handed_in_as_it_was_handed_out_is_told_and_not_compared() -> None:
