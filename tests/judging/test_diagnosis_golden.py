@@ -28,7 +28,8 @@ from grader.core.report import ExerciseReport, Verdict
 from grader.core.trace import Start, StartWay, Trace
 from grader.judging import judge_run
 from grader.judging.diagnosis import CAUSE_KEY, RULES, diagnose
-from grader.judging.diagnosis.rules import FIRST, Case, Rule
+from grader.judging.diagnosis.rules import FIRST, Case, Rule, in_order
+from grader.rubrics.builtin import builtin_exercises
 from grader.submissions.sources import source_text
 
 HERE = Path(__file__).parent
@@ -153,8 +154,9 @@ def test_every_rule_is_shown_to_work() -> None:
 def test_the_rules_are_asked_in_the_order_that_is_written_down() -> None:
     """Wherever a rule is defined: its priority alone decides."""
     order = (HERE / "diagnosis" / "order.txt").read_text("utf-8").split()
-    assert [rule.id for rule in RULES] == [*order, "follows"]
-    priorities = [rule.priority for rule in RULES]
+    rules: list[Any] = [*RULES, *(rule for exercise in builtin_exercises() for rule in exercise.hints)]
+    assert [rule.id for rule in in_order(rules)] == [*order, "follows"]
+    priorities = [rule.priority for rule in rules]
     assert len(set(priorities)) == len(priorities)
     assert min(priorities) >= 1000 > FIRST
 

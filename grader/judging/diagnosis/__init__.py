@@ -106,22 +106,22 @@ def clue_for(
     for rule in RULES if rules is None else rules:
         try:
             clue = rule.clue(case)
-            if rule.file is not None and clue is not None and (wrong := unfit(clue, case)):
+            if rule.file and clue is not None and (wrong := unfit(clue, case)):
                 raise TypeError(wrong)
         except Exception as error:
-            if rule.file is None:
+            if not rule.file:
                 _LOG.exception("the rule %s failed on the criterion %s", rule.id, case.criterion.id)
             elif mistakes is not None:
-                mistakes.append(_mistake(rule, rule.file[0], error))
+                mistakes.append(_mistake(rule, error))
             continue
         if clue is not None:
             return rule.id, clue
     return None
 
 
-def _mistake(rule: Rule, path: str, error: Exception) -> AuthorMistake:
+def _mistake(rule: Rule, error: Exception) -> AuthorMistake:
     text = f"the rule {rule.id}: {type(error).__name__}: {quote(words_of(error))}"
-    return AuthorMistake(path.rsplit("/", 1)[-1], line_of(error, path, 0), text)
+    return AuthorMistake(rule.file.rsplit("/", 1)[-1], line_of(error, rule.file, 0), text)
 
 
 def hint_for(fault: Fault, trace: Trace, text: str) -> str:
