@@ -27,7 +27,7 @@ from grader.core.exercise import Outcome
 from grader.core.report import ExerciseReport, Verdict
 from grader.core.trace import Start, StartWay, Trace
 from grader.judging import judge_run
-from grader.judging.diagnosis import CAUSE_KEY, RULES, diagnose
+from grader.judging.diagnosis import CAUSE_KEY, RULES
 from grader.judging.diagnosis.rules import FIRST, Case, Rule, in_order
 from grader.rubrics.builtin import builtin_exercises
 from grader.submissions.sources import source_text
@@ -118,11 +118,13 @@ def test_no_cause_is_found_in_the_words_of_a_reason(row: Row, monkeypatch: pytes
     """Without any reason the hints and places are the same."""
     traces = crash_traces(row) if "fault" in row else behaviour_traces(row)
     known = [replace(v, reason="") for v in explained(row, traces).verdicts]
+    build = judge_run._verdicts
 
-    def without_reasons(verdicts: tuple[Verdict, ...], *others: Any) -> tuple[Verdict, ...]:
-        return diagnose(tuple(replace(v, reason="") for v in verdicts), *others)
+    def without_reasons(*given: Any) -> tuple[tuple[Verdict, ...], Mapping[str, object]]:
+        verdicts, facts = build(*given)
+        return tuple(replace(v, reason="") for v in verdicts), facts
 
-    monkeypatch.setattr(judge_run, "diagnose", without_reasons)
+    monkeypatch.setattr(judge_run, "_verdicts", without_reasons)
     assert list(explained(row, traces).verdicts) == known
 
 
