@@ -3,11 +3,7 @@
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
-from grader.core.trace import Trace
-from grader.judging.service_calls import calls_of
-from grader.testing import met, not_met
+from grader.api import Finding, HarnessError, Trace, calls_of, met, not_met
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from grader.cli.options import (
     EVIDENCE,
     ISOLATION,
     PATH,
+    RUBRIC,
     SANDBOXES,
     audience_options,
     complain,
@@ -138,7 +139,7 @@ class _Default(click.Command):
     shell_complete=complete_output,
     help=f"Write a report ({', '.join(FORMATS)}), `-` is standard output; or keep evidence=FOLDER; repeatable.",
 )
-@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 @interfaces_option
 @click.option(
     "--min-score",
@@ -419,7 +420,7 @@ def _doctor(*, as_json: bool) -> int:
 
 @click.command(name="explain")
 @click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_criterion)
-@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Look in this rubric; repeatable.")
+@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Look in this rubric; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 def _explain(*, name: str | None, rubrics: tuple[Path, ...], as_json: bool) -> int:
     """Explain the criterion or the check NAME; without a name, list all of them.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -16,6 +17,7 @@ import click
 from grader.core.checkup import TIERS
 from grader.core.errors import EnvironmentFault, GraderError
 from grader.core.limits import TIME_BUDGET_S
+from grader.core.rubric_files import rubric_file
 from grader.core.scenario import ODOMETRY
 from grader.reporting.formats import FORMATS
 
@@ -32,6 +34,17 @@ if TYPE_CHECKING:
 #: The format name in `-o evidence=FOLDER`, which keeps the recordings of a run.
 EVIDENCE = "evidence"
 PATH = click.Path(path_type=Path)
+
+
+class RubricPath(click.Path):
+    """The path of a rubric's file, which its exercise's folder stands for as well, and the name it once had."""
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> Path:  # type: ignore[override]
+        """Return the path of the file."""
+        return rubric_file(Path(os.fsdecode(super().convert(value, param, ctx))))
+
+
+RUBRIC = RubricPath(path_type=Path)
 _Command = TypeVar("_Command", bound=Callable[..., object])
 
 

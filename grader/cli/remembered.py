@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from grader.cli.options import complain
+from grader.core.rubric_files import rubric_file
 
 if TYPE_CHECKING:
     from grader.classroom.last_run import LastRun
@@ -121,7 +122,7 @@ class RepeatingCommand(click.Command):
         """Raise ClassError if the last run used a file that is no longer there."""
         from grader.core.errors import ClassError
 
-        gone = [path for text in texts if self._is_path(name) and not os.path.lexists(path := _split(name, text)[1])]
+        gone = [path for text in texts if self._is_path(name) and not os.path.lexists(path := _place(name, text))]
         if gone:
             option = _name(self._kept[name])
             holds = f" ({_decisions(last.decisions)})" if name == "adjustments" else ""
@@ -170,6 +171,12 @@ def _split(name: str, text: str) -> tuple[str, str]:
     """Split what was typed for an option in front of its path: a recording has a topic there, `/scan=bags/scan`."""
     topic, equals, path = text.partition("=") if name == _BAGS else ("", "", text)
     return topic + equals, path
+
+
+def _place(name: str, text: str) -> str:
+    """Return where what was typed for an option is: the path of a built-in rubric may be its old one."""
+    path = _split(name, text)[1]
+    return str(rubric_file(Path(path))) if name == "rubrics" else path
 
 
 def _with_path(name: str, text: str, changed: Callable[[str], str]) -> str:

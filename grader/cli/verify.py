@@ -10,6 +10,7 @@ import click
 from grader.cli.completion import complete_exercise, complete_file
 from grader.cli.options import (
     PATH,
+    RUBRIC,
     complain,
     drawn_by,
     drawn_with,
@@ -50,7 +51,7 @@ _EPILOG = (
     shell_complete=complete_exercise,
     help="Record only this exercise; repeatable. By default each of which there is a file.",
 )
-@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 @click.option(
     "--evidence", type=PATH, metavar="FOLDER", help="Compare with this evidence too, and keep the result in it."
 )

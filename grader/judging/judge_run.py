@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, field, replace
 from fractions import Fraction
 
+from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
 from grader.core.report import (
@@ -86,13 +87,18 @@ def judge_exercise(
     verdicts = VerdictBuilder(exercise, answers, submission).verdicts()
     recorded = [(s.id, traces[s.id]) for s in exercise.scenarios if s.id in traces]
     reasons = [t.clock_reason for _, t in recorded if t.clock is ClockKind.WALL]
+    mistakes: list[AuthorMistake] = []
+    if sources is not None:
+        facts = {id_: a.finding.facts for id_, a in answers.items() if a.finding is not None}
+        verdicts = diagnose(verdicts, exercise, traces, submission, sources, facts, mistakes)
+    notes = (f"the rubric has a mistake: {mistake}" for mistake in dict.fromkeys(mistakes))
     return replace(
         not_graded_yet(exercise),
         clock=ClockKind.WALL if reasons else ClockKind.VIRTUAL,
         clock_reason=next((r for r in reasons if r), ""),
-        verdicts=verdicts if sources is None else diagnose(verdicts, exercise, traces, submission, sources),
+        verdicts=verdicts,
         faults=_faults(recorded),
-        notes=(*variant_notes(exercise.variant), *_notes(recorded, submission, sources)),
+        notes=(*variant_notes(exercise.variant), *_notes(recorded, submission, sources), *notes),
         graph=_graph(exercise, traces),
         starts=tuple(dict.fromkeys(start for _, t in recorded for start in t.starts)),
     )

@@ -7,11 +7,12 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from itertools import islice
-from typing import Protocol
+from typing import Any, Protocol
 
 from grader.core.chart import Band, Case, Chart, Level, Look, Panel, Series, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
+from grader.core.exercise import NODE_GRAPH, has, named, roles_of
 from grader.core.quantities import NS_PER_MS, NS_PER_S, counted, seconds
 from grader.core.trace import Delivery, Message, Request, Response, Trace
 from grader.judging.charts import (
@@ -122,34 +123,44 @@ class Drawing:
 _Panels = list[tuple[Panel, str]]
 
 
-def chart_of(check: object, trace: Trace) -> Chart | None:
+def chart_of(check: Any, trace: Trace) -> Chart | None:
     """Return the chart of a check: by its method `drawing`, or of what its parameters name; None if nothing happened.
 
-    A check without `drawing` may name topics (`input`, `topic`, `output`), a `field` or `fields` of the last of them, a
-    `service`, an `action`, and the `process` whose output is shown below.
+    A check that shows the graph of nodes and topics has no chart.
+
+    Raises:
+        TypeError: The method returned something else.
     """
-    own = getattr(check, "drawing", None)
+    if shows_graph(check):
+        return None
     try:
-        drawing = own(trace) if callable(own) else _named(check)
+        found = check.drawing(trace) if has(check, "drawing") else _named(check)
     except HarnessError:  # what the check asks is not in the recording
         return None
-    return drawn(drawing, trace) if isinstance(drawing, Drawing) else None
+    if not isinstance(found, (Drawing, Chart, type(None))):
+        raise TypeError(f"drawing returned a {type(found).__name__}, expected a Drawing, a Chart or None")
+    return drawn(found, trace) if isinstance(found, Drawing) else found
+
+
+def shows_graph(check: object) -> bool:
+    """Return whether the picture of a check is the graph of nodes and topics."""
+    return getattr(check, "drawing", None) == NODE_GRAPH
 
 
 def _named(check: object) -> Drawing:
-    def names(*attributes: str) -> tuple[str, ...]:
-        found = (getattr(check, name, None) for name in attributes)
-        return tuple(dict.fromkeys(name for name in found if isinstance(name, str) and name))
-
-    topics, fields = names("input", "topic", "output"), names("field")
-    several = getattr(check, "fields", None)
-    if isinstance(several, Mapping):
-        fields = tuple(map(str, several))
-    plots = [Plot(topic) for topic in topics]
+    """Return a drawing of the topics, services, actions and output that the parameters of a check name."""
+    roles = roles_of(type(check))
+    plots = [Plot(topic) for topic in named(check, *roles.topics)]
+    fields = list(named(check, *roles.fields))
+    fields += [str(path) for name in roles.fields for path in _keys(getattr(check, name, None))]
     if plots and fields:
-        plots[-1] = replace(plots[-1], fields=fields)
-    action = "".join(names("action"))
-    return Drawing(tuple(plots), names("service"), action=action, processes=names("process"))
+        plots[-1] = replace(plots[-1], fields=tuple(fields))
+    services, action = named(check, *roles.services), "".join(named(check, *roles.actions)[:1])
+    return Drawing(tuple(plots), services, action=action, processes=named(check, roles.process))
+
+
+def _keys(value: object) -> Iterable[object]:
+    return value if isinstance(value, Mapping) else ()
 
 
 def drawn(drawing: Drawing, trace: Trace) -> Chart | None:

@@ -22,12 +22,13 @@ from grader.app.seeds import PRACTICE
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
+from grader.core.rubric_files import notes_on, rubric_file
 from grader.core.submission import Submission
 from grader.core.trace import Trace
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.supervisor import Job
 from grader.judging.judge_run import judge_exercise
-from grader.mutation.explained import Explained, Explanation, beside, read_explained
+from grader.mutation.explained import Explained, Explanation, read_explained
 from grader.mutation.operators import mutants_of
 from grader.mutation.operators.program import Candidate, Program
 from grader.mutation.operators.variants import variants_of
@@ -132,13 +133,14 @@ def selftest(rubrics: Sequence[Path], options: SelftestOptions, progress: Progre
 
 
 def _prepared(path: Path, options: SelftestOptions) -> tuple[Path, Exercise, Explained]:
+    path = rubric_file(path)
     (exercise,) = read_exercises(GradeRequest("", rubrics=(path,)))
-    known = read_explained(beside(path), exercise)
+    known = read_explained(notes_on(path), exercise)
     explained = replace(
         known, reference=options.reference or known.reference, template=options.template or known.template
     )
     if explained.reference is None:
-        hint = f"name it with --reference FOLDER, or as `reference:` in {beside(path).name}"
+        hint = f"name it with --reference FOLDER, or as `reference:` in {notes_on(path).name}"
         raise RubricError(f"{path}: expected a reference solution to test it with, found none", hint)
     return path, exercise, explained
 

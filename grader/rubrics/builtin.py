@@ -13,16 +13,14 @@ from grader.compiled import compiled, state_of, state_of_package
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
+from grader.core.rubric_files import rubrics_in
 from grader.core.shipped import shipped
 from grader.submissions.collected import shown
-
-#: Suffix of files beside rubrics that are not rubrics: notes on their self-tests.
-NOTES = ".selftest.yaml"
 
 
 def builtin_recording() -> Path:
     """Return the recording that the stimulus `odometry` plays, which names none."""
-    return shipped("rubrics") / "odometry"
+    return shipped("rubrics") / "exercise_2" / "odometry"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +60,7 @@ def builtin_headers() -> tuple[Header, ...]:
 
 
 def _paths() -> list[Path]:
-    return [path for path in sorted(shipped("rubrics").glob("*.yaml")) if not path.name.endswith(NOTES)]
+    return rubrics_in(shipped("rubrics"))
 
 
 def _recorded() -> list[Path]:

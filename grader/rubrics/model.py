@@ -212,6 +212,9 @@ class RubricShape(Shape):
         default=(), description="launch files and parameter files of the rubric's own, beside it"
     )
     checks: tuple[CheckFile, ...] = Field(default=(), description="files with your own checks, beside the rubric")
+    hints: tuple[CheckFile, ...] = Field(
+        default=(), description="Python files with your own rules for hints, beside the rubric"
+    )
     simulations: tuple[CheckFile, ...] = Field(
         default=(), description="Python files with your own simulations, beside the rubric"
     )

@@ -1,6 +1,7 @@
-"""Reads what a rubric brings in files beside it: checks, simulations, and definitions of messages.
+"""Reads what a rubric brings in files beside it: checks, hint rules, simulations, and definitions of messages.
 
-Checks run in the judging process. Simulations run in the worker, which gets the text of their file with each plan.
+Checks and hint rules run in the judging process. Simulations run in the worker, which gets the text of their file with
+each plan.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ from typing import Any
 from grader.core.author_files import line_of, run, words_of
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
+from grader.core.exercise import HintRule, Outcome, ProblemKind
 from grader.interfaces.definitions import files_in
 from grader.rubrics.check_parameters import choice_model, simulation_shape
+from grader.rubrics.mistakes import nearest
 from grader.rubrics.types import BESIDE
 from grader.simulation import loading
 from grader.simulation.participant import Simulation
@@ -33,7 +36,7 @@ MAX_BYTES = 256 * 1024
 #: Name of the table in such a file.
 TABLE = "CHECKS"
 _ID = re.compile(r"[a-z][a-z0-9_]*")
-_ALONE = "such a file may import the standard library, grader and what is installed, but no file beside it"
+_ALONE = "such a file may import the standard library, grader.api and what is installed, but no file beside it"
 
 
 #: Most files of interface packages that a rubric may bring.
@@ -159,6 +162,83 @@ def load_simulations(files: Sequence[OwnFile]) -> dict[str, OwnSimulation]:
     return found
 
 
+def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> tuple[HintRule, ...]:
+    """Run files with hint rules, and return their rules in the order of the files and of their text.
+
+    Args:
+        files: The files; one may hold checks too.
+        known: The checks that the rubric may use, by name.
+
+    Raises:
+        RubricError: A file cannot be run, or has no rule; or a rule has the name of another one, names a check that
+            does not exist, or cannot be asked.
+    """
+    if not files:
+        return ()
+    from grader.judging.diagnosis import RULES  # noqa: PLC0415  takes 50 ms, and most rubrics have no rules
+
+    taken = {rule.id for rule in RULES}
+    found: list[HintRule] = []
+    for file in files:
+        rules, where = _ran(file, _rules), shown(str(file.path), 500)
+        if not rules:
+            text = f"{where}:1: expected hint rules, which are functions with @hint_rule(...) above them, found none"
+            raise RubricError(text)
+        problems = []
+        for rule in rules:
+            wrong = "expected a new name, found one that is taken" if rule.id in taken else _no_rule(rule, known)
+            line = getattr(getattr(rule.function, "__code__", None), "co_firstlineno", 1)
+            problems += [f"{where}:{line}: `{shown(rule.id)}`: {wrong}"] if wrong else []
+            taken.add(rule.id)
+        if problems:
+            raise RubricError("\n".join(problems))
+        found += rules
+    return tuple(found)
+
+
+def _rules(file: OwnFile) -> tuple[Any, ...]:
+    """Return the rules of a file, which other processes can recreate."""
+    from grader.judging.diagnosis.rules import Rule  # noqa: PLC0415  as above
+
+    copyreg.pickle(Rule, _reduced_rule)
+    path = str(file.path.resolve())
+    module = _module(path, file.content)
+    rules = (value for value in vars(module).values() if isinstance(value, Rule))
+    return tuple(dataclasses.replace(rule, file=(path, file.content)) for rule in dict.fromkeys(rules))
+
+
+def _reduced_rule(rule: Any) -> tuple[Any, ...]:
+    """Return how another process recreates a rule of a rubric's own; it has to run the file first."""
+    path, content = rule.file
+    return _remade_rule, (path, content, rule.id)
+
+
+def _remade_rule(path: str, content: bytes, id_: str) -> Any:
+    return next(rule for rule in _rules(OwnFile(path, Path(path), content)) if rule.id == id_)
+
+
+def _no_rule(rule: Any, known: Mapping[str, type]) -> str:
+    """Return why a rule cannot be asked; empty if it can."""
+    unknown = next((name for name in rule.checks if isinstance(name, str) and name not in known), None)
+    if unknown is not None:
+        near = nearest(unknown, known)
+        return f"expected the name of a check, found `{shown(unknown)}`{f'; {near}' if near else ''}"
+    parts = (
+        ("priority", isinstance(rule.priority, int) and not isinstance(rule.priority, bool), "a whole number"),
+        ("problem", isinstance(rule.problem, (ProblemKind, type(None))), "a ProblemKind"),
+        ("outcome", isinstance(rule.outcome, (Outcome, type(None))), "an Outcome"),
+        ("fault", isinstance(rule.fault, (bool, type(None))), "True, False or None"),
+    )
+    for name, right, expected in parts:
+        if not right:
+            return f"expected {expected} as {name}, found {shown(repr(getattr(rule, name)))}"
+    try:
+        inspect.signature(rule.function).bind(None)
+    except (TypeError, ValueError):
+        return "expected a function of one argument, the case, found another one"
+    return ""
+
+
 def digest_of(rubric: bytes, files: Sequence[OwnFile]) -> str:
     """Return the `sha256:` digest of a rubric and the files it brings; without such files, that of the rubric alone."""
     digest = hashlib.sha256(rubric)
@@ -190,16 +270,20 @@ def _own_file(  # noqa: PLR0913  what to read, and its limits
     return OwnFile(name, path, content)
 
 
-def _table(file: OwnFile, name: str, ran: Callable[[OwnFile], object]) -> dict[str, Any]:
-    """Run a file and return its table; raises RubricError with the line that failed."""
-    where = shown(str(file.path), 500)
+def _ran(file: OwnFile, run_: Callable[[OwnFile], Any]) -> Any:
+    """Run a file and return what it gives; raises RubricError with the line that failed."""
     try:
-        table = ran(file)
+        return run_(file)
     except (Exception, SystemExit) as error:  # whatever the author's file raises, the author has to fix
         line = max(line_of(error, str(file.path.resolve())), line_of(error, file.name))
-        text = f"{where}:{line}: expected a file that can be imported, found "
+        text = f"{shown(str(file.path), 500)}:{line}: expected a file that can be imported, found "
         text += f"{type(error).__name__}: {shown(words_of(error), 200)}"
         raise RubricError(text, _ALONE if isinstance(error, ImportError) else "") from None
+
+
+def _table(file: OwnFile, name: str, ran: Callable[[OwnFile], object]) -> dict[str, Any]:
+    """Run a file and return its table; raises RubricError with the line that failed."""
+    where, table = shown(str(file.path), 500), _ran(file, ran)
     if not isinstance(table, dict) or not table:
         found = "none" if table is None else "an empty one" if table == {} else f"a {type(table).__name__}"
         raise RubricError(f'{where}:1: expected a table {name} = {{"name": Class}}, found {found}')

@@ -6,13 +6,14 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, Problem, ProblemKind, Roles
 from grader.core.quantities import NS_PER_MS, FieldOf, counted, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Trace
+from grader.judging.facts import AnswerFacts, AnswerRow
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
 from grader.judging.plots import Drawing, threshold_drawing
 from grader.judging.series import lag_ns
@@ -69,6 +70,7 @@ class ThresholdResponse:
         unit: Unit of the input, for reasons and charts, e.g. `m`.
     """
 
+    roles: ClassVar[Roles] = Roles(hears=("input",), speaks=("output",))
     input: str
     output: str
     threshold: float
@@ -107,7 +109,8 @@ class ThresholdResponse:
         violations = [v for v in found if v is not None]
         evidence = self._evidence(inputs, answers)
         if violations:
-            return self._violated(trace, violations, inputs, every, evidence)
+            wrong = self._violated(trace, violations, inputs, every, evidence)
+            return replace(wrong, facts=self._facts(inputs, answers, wrong.problem))
         side = "above" if self.side == "above" else "at or below"
         reason = (
             f"{self.output}: {number(self._expected(mine[0].value))} for each of {counted(len(mine), 'value')} {side} "
@@ -163,6 +166,10 @@ class ThresholdResponse:
     def _evidence(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> dict[str, object]:
         rows = [[seconds(h.start_ns), h.value, _state(h, answers), self._expected(h.value)] for h in inputs]
         return {"columns": ["t_s", "input", "answer", "expected"], "rows": rows, "answers": len(answers)}
+
+    def _facts(self, inputs: Sequence[Held], answers: Sequence[Reading], problem: Problem | None) -> AnswerFacts:
+        rows = (AnswerRow(h.value, _state(h, answers), self._expected(h.value)) for h in inputs)
+        return AnswerFacts(tuple(rows), late=problem is not None and problem.kind is ProblemKind.BEHIND)
 
     def _violated(
         self,

@@ -13,6 +13,7 @@ from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern, counted, seconds, within
 from grader.core.trace import Message, Trace
+from grader.judging.facts import DrawFacts, SeriesFacts
 from grader.judging.findings import explain_fault, explain_no_message, met, not_met
 from grader.judging.output import number_in
 from grader.judging.plots import Drawing, Plot, value_panels
@@ -262,6 +263,7 @@ class FieldFunction:
         wanted = curve(self.formula)
         jitter_s = seconds(JITTER_NS[trace.clock])
         start, wrong = self._best_start(wanted, samples, jitter_s)
+        facts = SeriesFacts(tuple(s.value for s in samples[:10]))
         evidence = {
             "topic": self.topic,
             "formula": self.formula,
@@ -271,9 +273,9 @@ class FieldFunction:
             "first_n": start,
         }
         if wrong:
-            return self._differs(wanted, messages, samples, (start, wrong), evidence)
+            return replace(self._differs(wanted, messages, samples, (start, wrong), evidence), facts=facts)
         if len(samples) < self.at_least:
-            return self._few(trace, samples, evidence)
+            return replace(self._few(trace, samples, evidence), facts=facts)
         lost = f", the first one seen being n = {start}" if start else ""
         reason = f"{self.topic}: {self.field} follows {self.formula} in {counted(len(samples), 'message')}{lost}"
         return met(reason, evidence)
@@ -399,7 +401,8 @@ class RandomInRange:
         reason = f"{self.topic}: first {side} at {moment(first.t_ns)} ({number(first.value)}{unit}); "
         reason += f"{len(bad)} of {len(values)} values lie outside {number(self.low)} to {number(self.high)}{unit}"
         evidence = self._evidence(values) | {"outside": len(bad), "first_outside_s": seconds(first.t_ns)}
-        return not_met(reason, evidence, hint=self._hint, problem=ProblemKind.WRONG_VALUE)
+        facts = DrawFacts(min(r.value for r in values), max(r.value for r in values), outside=len(bad))
+        return not_met(reason, evidence, hint=self._hint, problem=ProblemKind.WRONG_VALUE, facts=facts)
 
     def _computed(self, values: Sequence[Reading]) -> Finding | None:
         got = [r.value for r in values]
@@ -420,7 +423,8 @@ class RandomInRange:
         else:
             shown = f"{pattern} ({numbers(got[:5])}, ...)"
         reason = f"{self.topic}: the values are not random but {shown}"
-        return not_met(reason, self._evidence(values) | {"pattern": pattern}, hint=self._hint, problem=problem)
+        evidence, facts = self._evidence(values) | {"pattern": pattern}, DrawFacts(min(got), max(got), pattern=pattern)
+        return not_met(reason, evidence, hint=self._hint, problem=problem, facts=facts)
 
     def _drawn(self, values: Sequence[Reading]) -> Finding:
         got = [r.value for r in values]

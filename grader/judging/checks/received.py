@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field as dataclass_field
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from grader.core.chart import Look, Panel, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import NS_PER_MS, NS_PER_S, FieldOf, counted, seconds
 from grader.core.trace import ClockKind, Endpoint, LogRecord, Message, Trace
 from grader.judging.charts import expected_series, series
 from grader.judging.checks.logs import LOGGER_HINT
+from grader.judging.facts import LogFacts
 from grader.judging.findings import (
     explain_fault,
     explain_no_subscription,
@@ -348,6 +350,7 @@ class LogsReceived:
         field: Path of the number; by default `data`, or else the only number of a message.
     """
 
+    roles: ClassVar[Roles] = Roles(hears=("topic",))
     process: str
     topic: str
     field: Annotated[str, FieldOf("topic")] = ""
@@ -372,6 +375,7 @@ class LogsReceived:
         sought = self._sought(values, trace)
         unlogged = _missing(values, followed(records, sought), trace)
         evidence: dict[str, object] = {"values": [v.value for v in values], "missing": [v.value for v in unlogged]}
+        facts = LogFacts(len(values), len(unlogged))
         if not unlogged:
             if behind := self._behind(trace, values, records):
                 return not_met(
@@ -381,17 +385,19 @@ class LogsReceived:
             return met(f"{reason} ({numbers(v.value for v in values)})", evidence)
         if not _missing(values, followed([*records, *printed_lines(trace, self.process)], sought), trace):
             reason = f"{self.process}: all {len(values)} values of {self.topic} are printed, not all of them are logged"
-            return only_printed(reason, evidence, _PRINT_HINT)
+            return replace(only_printed(reason, evidence, _PRINT_HINT), facts=facts)
         absent = _missing(values, standing(records, sought), trace)
         evidence["missing"] = [v.value for v in absent or unlogged]
+        facts = LogFacts(len(values), len(absent or unlogged))
         if fault is not None:
             lost = f"{len(absent or unlogged)} of {len(values)} values of {self.topic} were not logged"
-            return faulted(fault, lost, evidence)
+            return replace(faulted(fault, lost, evidence), facts=facts)
         if absent:
-            return self._unlogged(subscriptions, values, absent, evidence)
+            return replace(self._unlogged(subscriptions, values, absent, evidence), facts=facts)
         among = surroundings(records, sought[values.index(unlogged[0])])
         share = f"{len(unlogged)} of {len(values)} values"
-        return _hidden(self, share, (unlogged[0].value, unlogged[0].start_ns), among, evidence)
+        hidden = _hidden(self, share, (unlogged[0].value, unlogged[0].start_ns), among, evidence)
+        return replace(hidden, facts=facts)
 
     def _behind(self, trace: Trace, values: Sequence[Held], records: Sequence[Output]) -> str:
         """Return that a process logs at each message, but the number of the message before; empty if it does not.

@@ -8,12 +8,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.exercise import Finding, Problem, ProblemKind, Roles
 from grader.core.quantities import NS_PER_MS, FieldOf, counted, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace, unmet_policy
+from grader.judging.facts import AnswerFacts
 from grader.judging.findings import FAULT_KEY, explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met
 from grader.judging.plots import Drawing, threshold_drawing
 from grader.judging.series import steps_behind
@@ -71,6 +72,7 @@ class AnswersTogether:
         unit: Unit of the input, for reasons and charts, e.g. `m`.
     """
 
+    roles: ClassVar[Roles] = Roles(hears=("input",), speaks=("input", "output"))
     input: str
     output: str
     threshold: float
@@ -181,7 +183,8 @@ class AnswersTogether:
             return not_met(reason, evidence, problem=self._wrong)
         reason += f"; the answers fit the input of {counted(behind, 'message')} earlier"
         hint = f"answer the newest message on {self.input}"
-        return not_met(reason, {**evidence, "behind": behind}, hint=hint, problem=self._wrong)
+        known, late = {**evidence, "behind": behind}, AnswerFacts(late=True)
+        return not_met(reason, known, hint=hint, problem=self._wrong, facts=late)
 
     def _inconsistent(
         self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, int]

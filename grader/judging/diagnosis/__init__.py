@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import ast
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from fractions import Fraction
 
+from grader.core.author_files import AuthorMistake, line_of, words_of
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Check, Criterion, Exercise, Outcome, ProblemKind
+from grader.core.exercise import Check, Criterion, Exercise, Finding, Outcome
 from grader.core.report import Verdict
 from grader.core.submission import Submission
 from grader.core.trace import Fault, Trace, main_not_called, same_node_name
-from grader.judging.checks.fan import ThresholdResponse
-from grader.judging.checks.fields import RandomInRange
-from grader.judging.checks.programs import NoFault
-from grader.judging.checks.rate import TopicRate
-from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis import (
     attributes,
     callbacks,
@@ -33,12 +29,13 @@ from grader.judging.diagnosis import (
     silence,
     values,
 )
-from grader.judging.diagnosis.rules import Case, Clue, Rule
+from grader.judging.diagnosis.rules import Case, Clue, Rule, in_order, unfit
 from grader.judging.diagnosis.wiring import bare_statements
 from grader.judging.findings import FAULT_KEY, fault_evidence, fault_hint, fault_sentence
 from grader.judging.source import Source, argument, chain, first_line, last_name, read, text_of
+from grader.judging.wording import quote
 
-#: Modules of rules, in the order of evaluation; the rules of each follow the order of the text.
+#: Modules of rules; each rule says itself where it stands among all.
 _MODULES = (
     loading,
     scopes,
@@ -54,46 +51,77 @@ _MODULES = (
     positions,
     fan,
 )
-#: All rules; the first that applies wins.
-RULES: tuple[Rule, ...] = tuple(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))
+#: All rules of the grader in the order of their priorities; the first that applies wins.
+RULES: tuple[Rule, ...] = in_order(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))
 _LOST = (Outcome.NOT_MET, Outcome.PARTLY)
 _LOG = logging.getLogger(__name__)
 #: Evidence key for the id of the cause.
 CAUSE_KEY = "diagnosis"
 
 
-def diagnose(
+def diagnose(  # noqa: PLR0913  what was found, and everything that may explain it
     verdicts: tuple[Verdict, ...],
     exercise: Exercise,
     traces: Mapping[str, Trace],
     submission: Submission,
     sources: Mapping[str, str],
+    facts: Mapping[str, object],
+    mistakes: list[AuthorMistake],
 ) -> tuple[Verdict, ...]:
-    """Return the verdicts, in rubric order, with a place and one hint wherever a cause is very likely."""
+    """Return the verdicts, in rubric order, with a place and one hint wherever a cause is very likely.
+
+    Args:
+        verdicts: The verdicts.
+        exercise: The exercise; its own rules are asked too.
+        traces: Scenario id -> trace.
+        submission: Tells which files were found.
+        sources: Wanted file name -> its text.
+        facts: Criterion id -> what its check hands to rules.
+        mistakes: Mistakes in the exercise's own rules are appended here.
+    """
     asked = {c.scenario for v, c in zip(verdicts, exercise.criteria, strict=True) if v.outcome in _LOST}
     if not asked:
         return verdicts
     # only these, because parsing a file takes longer than judging it
     names = dict.fromkeys(p for s in exercise.scenarios if s.id in asked for p in s.processes if p in sources)
     read_ = {name: read(submission.files[name].found or name, sources[name]) for name in names}
-    reporter = _Reporter(exercise)
+    reporter = _Reporter(exercise, rules_of(exercise), facts, mistakes)
     return tuple(reporter.on(v, c, traces, read_) for v, c in zip(verdicts, exercise.criteria, strict=True))
 
 
-def clue_for(case: Case) -> tuple[str, Clue] | None:
+def rules_of(exercise: Exercise) -> tuple[Rule, ...]:
+    """Return the rules that are asked about an exercise in their order; of equal ones, its own come first."""
+    own = [rule for rule in exercise.hints if isinstance(rule, Rule)]
+    return in_order((*own, *RULES)) if own else RULES
+
+
+def clue_for(
+    case: Case, rules: Sequence[Rule] | None = None, mistakes: list[AuthorMistake] | None = None
+) -> tuple[str, Clue] | None:
     """Return id and clue of the first rule that applies to a case; None if no cause is very likely.
 
-    A rule that raises is logged and skipped: our own bugs must not prevent a report.
+    A rule that raises is skipped, because a mistake in it must not prevent a report: a rule of a rubric's own is
+    appended to `mistakes`, another one is logged.
     """
-    for rule in RULES:
+    for rule in RULES if rules is None else rules:
         try:
             clue = rule.clue(case)
-        except Exception:
-            _LOG.exception("the rule %s failed on the criterion %s", rule.id, case.criterion.id)
+            if rule.file is not None and clue is not None and (wrong := unfit(clue, case)):
+                raise TypeError(wrong)
+        except Exception as error:
+            if rule.file is None:
+                _LOG.exception("the rule %s failed on the criterion %s", rule.id, case.criterion.id)
+            elif mistakes is not None:
+                mistakes.append(_mistake(rule, rule.file[0], error))
             continue
         if clue is not None:
             return rule.id, clue
     return None
+
+
+def _mistake(rule: Rule, path: str, error: Exception) -> AuthorMistake:
+    text = f"the rule {rule.id}: {type(error).__name__}: {quote(words_of(error))}"
+    return AuthorMistake(path.rsplit("/", 1)[-1], line_of(error, path, 0), text)
 
 
 def hint_for(fault: Fault, trace: Trace, text: str) -> str:
@@ -107,10 +135,18 @@ def hint_for(fault: Fault, trace: Trace, text: str) -> str:
     reason = fault_sentence(fault)
     evidence = {FAULT_KEY: fault_evidence(fault)}
     verdict = Verdict("fault", "", Outcome.NOT_MET, Fraction(0), Fraction(1), reason, evidence=evidence)
-    criterion = Criterion("fault", "", Fraction(1), trace.scenario, NoFault())
+    criterion = Criterion("fault", "", Fraction(1), trace.scenario, _Fault())
     sources = {fault.process: read(fault.file or fault.process, text)} if text else {}
     found = clue_for(Case(criterion, verdict, trace, sources, fault))
     return found[1].hint if found is not None else fault_hint(fault)
+
+
+@dataclass(frozen=True, slots=True)
+class _Fault:
+    """The check of a fault without a rubric."""
+
+    def judge(self, trace: Trace) -> Finding:
+        raise NotImplementedError("a fault is there already")
 
 
 @dataclass(slots=True)
@@ -118,6 +154,9 @@ class _Reporter:
     """Remembers the criterion with which each cause was reported, so that none is reported twice."""
 
     exercise: Exercise
+    rules: Sequence[Rule]
+    facts: Mapping[str, object]
+    mistakes: list[AuthorMistake]
     owner: dict[str, str] = field(default_factory=dict)
     lost: dict[str, Check] = field(default_factory=dict)
 
@@ -128,13 +167,14 @@ class _Reporter:
         trace = traces.get(criterion.scenario)
         if verdict.outcome not in _LOST or trace is None or trace.harness_problem:
             return verdict
-        found = clue_for(self._case(verdict, criterion, trace, sources))
-        earlier = "" if found is not None else self._follows(criterion.check, verdict)
+        found = clue_for(self._case(verdict, criterion, trace, sources), self.rules, self.mistakes)
         if verdict.outcome is Outcome.NOT_MET:
             self.lost[criterion.id] = criterion.check
         if found is None:
-            return _same_as(earlier, verdict) if earlier else verdict
+            return verdict
         id_, clue = found
+        if clue.same_as:
+            return _same_as(clue.same_as, verdict)
         key = clue.key or f"{id_}:{clue.location}"
         earlier = self.owner.setdefault(key, criterion.id)
         evidence = {**verdict.evidence, CAUSE_KEY: id_}
@@ -145,24 +185,8 @@ class _Reporter:
         scenario = next(s for s in self.exercise.scenarios if s.id == criterion.scenario)
         own = {name: sources[name] for name in scenario.processes if name in sources}
         siblings = tuple(c.check for c in self.exercise.criteria if c is not criterion)
-        return Case(criterion, verdict, trace, own, _fault_of(verdict, trace), siblings)
-
-    def _follows(self, check: Check, verdict: Verdict) -> str:
-        """Return the criterion whose failure explains why two nodes do not work together; empty if unclear."""
-        problem = verdict.problem
-        if not isinstance(check, AnswersTogether) or problem is None:
-            return ""
-        quiet = problem.kind in (ProblemKind.STOPPED, ProblemKind.NO_MESSAGE)
-        fixed = problem.kind is ProblemKind.NEVER_CHANGES
-        stopped = problem.kind is ProblemKind.STOPPED and check.input in problem.topics
-        answered = problem.kind is ProblemKind.WRONG_ANSWER or (quiet and check.output in problem.topics)
-        for id_, other in self.lost.items():
-            controller = isinstance(other, ThresholdResponse) and other.output == check.output
-            sensor = isinstance(other, RandomInRange) and other.topic == check.input
-            pace = isinstance(other, TopicRate) and other.topic == check.input
-            if (controller and answered) or (sensor and fixed) or (pace and stopped):
-                return id_
-        return ""
+        facts, lost = self.facts.get(criterion.id), dict(self.lost)
+        return Case(criterion, verdict, trace, own, fault_of(verdict, trace), siblings, facts, lost)
 
 
 def _same_as(criterion: str, verdict: Verdict) -> Verdict:
@@ -170,7 +194,7 @@ def _same_as(criterion: str, verdict: Verdict) -> Verdict:
     return replace(verdict, hint=hint, same_cause_as=criterion)
 
 
-def _fault_of(verdict: Verdict, trace: Trace) -> Fault | None:
+def fault_of(verdict: Verdict, trace: Trace) -> Fault | None:
     """Return the fault of the trace that a verdict rests on."""
     known = verdict.evidence.get(FAULT_KEY)
     if not isinstance(known, Mapping):
