@@ -237,7 +237,7 @@ class ClassRun:
             into=self.store.fresh(entry.name).resolve(),
             exercises=grading.exercises,
             rubrics=grading.rubrics,
-            odom_bag=grading.odom_bag,
+            bags=grading.bags,
             conditions=self.conditions[entry.name],
             variant_key=grading.variant_key,
             interfaces=grading.interfaces,

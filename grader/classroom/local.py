@@ -37,7 +37,7 @@ class Task:
     into: Path  # destination folder for the files of `worker.PARTS`; must not exist yet
     exercises: tuple[str, ...]  # exercise ids to grade; empty for all exercises of the rubrics
     rubrics: tuple[Path, ...]  # rubric files; empty for the built-in ones
-    odom_bag: Path | None  # an /odom recording to play instead of the built-in one
+    bags: tuple[tuple[str, Path], ...]  # recordings to play instead of those of the rubrics; see `GradeRequest`
     conditions: Conditions  # what the result depends on besides the submission
     workers: int  # most scenarios recorded in parallel
     standalone: bool  # whether the HTML report includes its scripts, instead of sharing them with the class

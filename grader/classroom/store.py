@@ -285,7 +285,7 @@ class Conditions:
 
     grader: str
     rubrics: tuple[tuple[str, str], ...]  # exercise id and digest of its rubric, in grading order
-    recording: str  # digest of the /odom recording; empty if none is played
+    recording: str  # digest of the recordings that are played; empty if there are none
     seed: int | None  # seed of all drawn values; None for a whole class in which each submission has its own
     clock: str
     isolation: str

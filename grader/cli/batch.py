@@ -17,6 +17,7 @@ from grader.cli.options import (
     interfaces_option,
     parse_share,
     print_result,
+    recording_options,
     require,
     time_budget_option,
 )
@@ -61,7 +62,7 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @interfaces_option
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw everybody's values from N.")
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key, not by the one kept in RESULTS.")
-@click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
+@recording_options
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for one submission.")
 @click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for one submission.")
 @time_budget_option

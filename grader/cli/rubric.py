@@ -150,7 +150,7 @@ def _new(  # noqa: PLR0913  one parameter an option
         raise GraderError(f"{output}: expected a new file, found one that is there", "name another, or remove it")
     with shown_progress(wanted=True) as progress:
         request = ObserveRequest(
-            files, round(duration * 1e9), None, clock, isolation, (), read_simulations(simulations), read_sent(sent)
+            files, round(duration * 1e9), (), clock, isolation, (), read_simulations(simulations), read_sent(sent)
         )
         skeleton = new_rubric(request, progress, id_=id_, beside=output.parent if output is not None else Path())
     for remark in skeleton.remarks:

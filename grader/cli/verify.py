@@ -17,6 +17,7 @@ from grader.cli.options import (
     interfaces_option,
     isolation_option,
     print_result,
+    recording_options,
     shown_progress,
 )
 from grader.core.conditions import CONDITIONS, TOGETHER
@@ -56,7 +57,7 @@ _EPILOG = (
 )
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, as a report names it.")
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key and the files handed in.")
-@click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
+@recording_options
 @interfaces_option
 @isolation_option
 @click.option("--student", metavar="ID", default="", help="Use the variant of this student; see --variant-key.")
@@ -73,7 +74,7 @@ def command(  # noqa: PLR0913  one parameter an option
     evidence: Path | None,
     seed: int | None,
     seed_key: Path | None,
-    odom_bag: Path | None,
+    bags: tuple[tuple[str, Path], ...],
     interfaces: tuple[Path, ...],
     isolation: str,
     student: str,
@@ -93,7 +94,7 @@ def command(  # noqa: PLR0913  one parameter an option
         raise click.BadParameter("--quick and --condition exclude each other")
     if evidence is not None and len(submissions) != 1:
         raise click.BadParameter("--evidence is that of one submission: expected one SUBMISSION, found several")
-    if evidence is not None and (seed is not None or seed_key is not None or exercises or odom_bag or student):
+    if evidence is not None and (seed is not None or seed_key is not None or exercises or bags or student):
         raise click.BadParameter("--evidence says what was recorded, and with which seed: leave out the other options")
     key = drawn_with(seed, seed_key)
     draw = drawn_by(student, variant_key)
@@ -109,7 +110,7 @@ def command(  # noqa: PLR0913  one parameter an option
         rubrics=rubrics,
         seed=seed,
         seed_key=key or PRACTICE,
-        odom_bag=odom_bag,
+        bags=bags,
         isolation=isolation,
         student=student.strip(),
         variant_key=variant_key,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field
 from enum import Enum
 from fractions import Fraction
@@ -12,7 +12,7 @@ from numbers import Rational, Real
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, TypeGuard
 
 from grader.core.dataclass import dataclass
-from grader.core.scenario import OdometryStream, Scenario
+from grader.core.scenario import RecordedStream, Scenario
 from grader.core.trace import Trace
 
 
@@ -388,9 +388,9 @@ class Exercise:
     variant: Variant | None = None  # the values for this student; None if nothing varies
     interfaces: tuple[str, ...] = ()  # paths of the folders with interface packages that the rubric brings
     bonus: Fraction = Fraction(0)  # points above the maximum that an instructor may give
-    hints: tuple[HintRule, ...] = ()  # the rubric's own hint rules, in the order of its files
+    hints: Iterable[HintRule] = ()  # the rubric's own hint rules, in the order of its files
 
     @property
-    def plays_odometry(self) -> bool:
-        """Whether any scenario plays the /odom recording."""
-        return any(isinstance(stimulus, OdometryStream) for s in self.scenarios for stimulus in s.stimuli)
+    def recorded(self) -> tuple[RecordedStream, ...]:
+        """The recordings that its scenarios play."""
+        return tuple(stimulus for s in self.scenarios for stimulus in s.stimuli if isinstance(stimulus, RecordedStream))

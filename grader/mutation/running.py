@@ -14,7 +14,8 @@ from pathlib import Path
 
 from libcst import ParserSyntaxError
 
-from grader.app.grade import Progress, plan_jobs, read_exercises, read_recording
+from grader.app.bags import Recordings, read_recordings
+from grader.app.grade import Progress, plan_jobs, read_exercises
 from grader.app.interface_packages import provide
 from grader.app.request import GradeRequest
 from grader.app.seeds import PRACTICE
@@ -24,7 +25,6 @@ from grader.core.exercise import Exercise
 from grader.core.rubric_files import notes_on, rubric_file
 from grader.core.submission import Submission
 from grader.core.trace import Trace
-from grader.execution.bag import Odometry
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.supervisor import Job
 from grader.judging.judge_run import judge_exercise
@@ -49,7 +49,7 @@ class TrialRunner:
     workers: int
     request: GradeRequest
     exercise: Exercise
-    odometry: Odometry | None
+    bags: Recordings
     seed: int
     reference: Submission
     sources: Mapping[str, str]
@@ -60,7 +60,7 @@ class TrialRunner:
 
     def grade(self, submission: Submission) -> tuple[TrialResult, dict[str, Trace]]:
         """Grade a complete submission; the traces are those of its scenarios."""
-        jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed, self.interfaces)
+        jobs = plan_jobs(self.request, [self.exercise], submission, self.bags, self.seed, self.interfaces)
         recorded = self.session.record(jobs, self.request.clock, self.progress)
         self.recordings += len(recorded)
         traces = {scenario: trace for (_, scenario), trace in recorded.items()}
@@ -87,7 +87,7 @@ class TrialRunner:
             done += len(chunk)
 
     def _jobs(self, candidate: Candidate, submission: Submission) -> Mapping[tuple[str, str], Job]:
-        jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed, self.interfaces)
+        jobs = plan_jobs(self.request, [self.exercise], submission, self.bags, self.seed, self.interfaces)
         concerned = {s.id for s in self.exercise.scenarios if candidate.file in s.processes}
         return {key: job for key, job in jobs.items() if key[1] in concerned}
 
@@ -161,7 +161,7 @@ def _bench(  # noqa: PLR0913  each comes from a different stage
         session=session,
         request=request,
         exercise=exercise,
-        odometry=read_recording(request, [exercise]),
+        bags=read_recordings(request, [exercise]),
         seed=PRACTICE.seed(reference.digest) if options.seed is None else options.seed,
         reference=reference,
         sources=_sources(reference, exercise),

@@ -18,8 +18,8 @@ from grader.core.shipped import shipped
 from grader.submissions.collected import shown
 
 
-def builtin_odometry() -> Path:
-    """Return the project's own /odom recording."""
+def builtin_recording() -> Path:
+    """Return the recording that the stimulus `odometry` plays, which names none."""
     return shipped("rubrics") / "exercise_2" / "odometry"
 
 
@@ -36,7 +36,8 @@ class Header:
 @cache
 def builtin_exercises() -> tuple[Exercise, ...]:
     """Return the built-in exercises, ordered by number; raises RubricError without any."""
-    return compiled("rubrics", state_of(_paths()) + state_of_package(), _read_exercises)
+    beside = sorted(shipped("rubrics").rglob("*.py"))  # checks and hint rules that a rubric names
+    return compiled("rubrics", state_of([*_paths(), *_recorded(), *beside]) + state_of_package(), _read_exercises)
 
 
 def _read_exercises() -> tuple[Exercise, ...]:
@@ -61,6 +62,11 @@ def builtin_headers() -> tuple[Header, ...]:
 
 def _paths() -> list[Path]:
     return rubrics_in(shipped("rubrics"))
+
+
+def _recorded() -> list[Path]:
+    """Return the files of the recordings beside the rubrics, which the digests of exercises cover."""
+    return sorted(builtin_recording().iterdir())
 
 
 def _header(path: Path) -> Header:

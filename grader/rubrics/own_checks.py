@@ -13,7 +13,7 @@ import hashlib
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -25,6 +25,7 @@ from grader.core.exercise import HintRule, Outcome, ProblemKind
 from grader.interfaces.definitions import files_in
 from grader.rubrics.check_parameters import choice_model, simulation_shape
 from grader.rubrics.mistakes import nearest
+from grader.rubrics.types import BESIDE
 from grader.simulation import loading
 from grader.simulation.participant import Simulation
 from grader.simulation.robots import SIMULATIONS
@@ -40,6 +41,10 @@ _ALONE = "such a file may import the standard library, grader.api and what is in
 
 #: Most files of interface packages that a rubric may bring.
 MOST_DEFINITIONS = 400
+#: Most files in a recording, and the largest one in bytes: all travel to each machine of a cluster, and minutes of
+#: laser scans take a few megabytes.
+MOST_BAG_FILES = 20
+MOST_BAG_BYTES = 64 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +101,37 @@ def definition_files(rubric: Path, folders: Sequence[str], never_in: Sequence[Pa
     return tuple(found)
 
 
+def bag_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ()) -> tuple[OwnFile, ...]:
+    """Return the files of the recordings that a rubric names, sorted by name.
+
+    Raises:
+        RubricError: A recording is missing, or has too many files or a file that cannot be used; see `own_files`.
+    """
+    found: list[OwnFile] = []
+    for name in dict.fromkeys(names):
+        path, where = rubric.parent / name, f"{shown(str(rubric), 500)}: recorded: {shown(name)}"
+        files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
+        if not 0 < len(files) <= MOST_BAG_FILES:
+            text = f"{where}: expected a recording of 1 to {MOST_BAG_FILES} files, found {len(files) or 'none'}"
+            raise RubricError(text, "name a rosbag2 folder, or a .mcap or .db3 file")
+        parts = [file.relative_to(rubric.parent).as_posix() for file in files]
+        found += [_own_file(rubric, part, never_in, f"{where}", least=0, most=MOST_BAG_BYTES) for part in parts]
+    return tuple(found)
+
+
+def named_bags(data: object) -> tuple[str, ...]:
+    """Return the recordings named by the stimuli in a rubric's data; the rubric's shape reports anything else."""
+    scenarios = data.get("scenarios") if isinstance(data, Mapping) else None
+    stimuli = [one.get("stimuli") for one in _mappings(scenarios)]
+    played = [one.get("recorded") for several in stimuli for one in _mappings(several)]
+    names = [one.get("bag") for one in _mappings(played)]
+    return tuple(dict.fromkeys(name for name in names if isinstance(name, str) and re.fullmatch(BESIDE, name)))
+
+
+def _mappings(value: object) -> list[Mapping[str, Any]]:
+    return [one for one in value if isinstance(one, Mapping)] if isinstance(value, list) else []
+
+
 def named_files(data: object, key: str) -> tuple[str, ...]:
     """Return the files or folders named under a key of a rubric's data; the rubric's shape reports anything else."""
     names = data.get(key) if isinstance(data, Mapping) else None
@@ -126,8 +162,23 @@ def load_simulations(files: Sequence[OwnFile]) -> dict[str, OwnSimulation]:
     return found
 
 
-def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> tuple[HintRule, ...]:
-    """Run files with hint rules, and return their rules in the order of the files and of their text.
+@dataclass(frozen=True, slots=True)
+class OwnHints:
+    """The hint rules of a rubric, by the files that hold them.
+
+    A file runs when its rules are first asked for: they need all of diagnosis, which takes 50 ms to import.
+    """
+
+    files: tuple[OwnFile, ...]
+
+    def __iter__(self) -> Iterator[HintRule]:
+        """Yield the rules in the order of the files and of their text."""
+        for file in self.files:
+            yield from _rules(file)
+
+
+def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> Iterable[HintRule]:
+    """Run files with hint rules, and return their rules.
 
     Args:
         files: The files; one may hold checks too.
@@ -139,46 +190,32 @@ def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> tuple[Hin
     """
     if not files:
         return ()
-    from grader.judging.diagnosis import RULES  # noqa: PLC0415  takes 50 ms, and most rubrics have no rules
+    from grader.judging.diagnosis import RULES  # noqa: PLC0415  most rubrics have no rules
 
     taken = {rule.id for rule in RULES}
-    found: list[HintRule] = []
+    problems: list[str] = []
     for file in files:
         rules, where = _ran(file, _rules), shown(str(file.path), 500)
         if not rules:
             text = f"{where}:1: expected hint rules, which are functions with @hint_rule(...) above them, found none"
             raise RubricError(text)
-        problems = []
         for rule in rules:
             wrong = "expected a new name, found one that is taken" if rule.id in taken else _no_rule(rule, known)
             line = getattr(getattr(rule.function, "__code__", None), "co_firstlineno", 1)
             problems += [f"{where}:{line}: `{shown(rule.id)}`: {wrong}"] if wrong else []
             taken.add(rule.id)
-        if problems:
-            raise RubricError("\n".join(problems))
-        found += rules
-    return tuple(found)
+    if problems:
+        raise RubricError("\n".join(problems))
+    return OwnHints(tuple(files))
 
 
 def _rules(file: OwnFile) -> tuple[Any, ...]:
-    """Return the rules of a file, which other processes can recreate."""
+    """Run a file and return its rules."""
     from grader.judging.diagnosis.rules import Rule  # noqa: PLC0415  as above
 
-    copyreg.pickle(Rule, _reduced_rule)
     path = str(file.path.resolve())
-    module = _module(path, file.content)
-    rules = (value for value in vars(module).values() if isinstance(value, Rule))
-    return tuple(dataclasses.replace(rule, file=(path, file.content)) for rule in dict.fromkeys(rules))
-
-
-def _reduced_rule(rule: Any) -> tuple[Any, ...]:
-    """Return how another process recreates a rule of a rubric's own; it has to run the file first."""
-    path, content = rule.file
-    return _remade_rule, (path, content, rule.id)
-
-
-def _remade_rule(path: str, content: bytes, id_: str) -> Any:
-    return next(rule for rule in _rules(OwnFile(path, Path(path), content)) if rule.id == id_)
+    rules = (value for value in vars(_module(path, file.content)).values() if isinstance(value, Rule))
+    return tuple(dataclasses.replace(rule, file=path) for rule in dict.fromkeys(rules))
 
 
 def _no_rule(rule: Any, known: Mapping[str, type]) -> str:
@@ -211,12 +248,14 @@ def digest_of(rubric: bytes, files: Sequence[OwnFile]) -> str:
     return f"sha256:{digest.hexdigest()}"
 
 
-def _own_file(rubric: Path, name: str, never_in: Sequence[Path], where: str, least: int = 1) -> OwnFile:
+def _own_file(  # noqa: PLR0913  what to read, and its limits
+    rubric: Path, name: str, never_in: Sequence[Path], where: str, least: int = 1, most: int = MAX_BYTES
+) -> OwnFile:
     path = rubric.parent / name
     try:
         real = path.resolve(strict=True)
         inside = real.is_relative_to(rubric.parent.resolve()) and real.is_file()
-        content = real.read_bytes() if inside and real.stat().st_size <= MAX_BYTES else b""
+        content = real.read_bytes() if inside and real.stat().st_size <= most else b""
         theirs = [folder for folder in never_in if folder.is_dir() and real.is_relative_to(folder.resolve())]
     except FileNotFoundError:
         raise RubricError(f"{where}: expected a file beside the rubric, found nothing there") from None
@@ -228,7 +267,7 @@ def _own_file(rubric: Path, name: str, never_in: Sequence[Path], where: str, lea
         text = f"{where}: expected a file that students cannot write, found one in {shown(str(theirs[0]))}"
         raise RubricError(text, "keep rubrics and what they bring apart from submissions")
     if not least <= len(content) or (not content and real.stat().st_size):
-        raise RubricError(f"{where}: expected {least} byte to {MAX_BYTES // 1024} KiB, found none or more")
+        raise RubricError(f"{where}: expected {least} byte to {most // 1024} KiB, found none or more")
     return OwnFile(name, path, content)
 
 

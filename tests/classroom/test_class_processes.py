@@ -48,7 +48,7 @@ print(done)
 
 
 def task(tmp_path: Path, label: str, deadline_s: float = 600.0) -> Task:
-    return Task(label, label, tmp_path, tmp_path / label, (), (), None, CONDITIONS, 1, False, deadline_s)
+    return Task(label, label, tmp_path, tmp_path / label, (), (), (), CONDITIONS, 1, False, deadline_s)
 
 
 def scheduler(jobs: int = 2) -> LocalScheduler:
@@ -225,7 +225,7 @@ def test_tasks_reach_the_process_as_they_are(tmp_path: Path, odd: str) -> None:
     )
     heard = []
     here = LocalScheduler(1, (sys.executable, "-c", program))
-    one = Task("x", odd, tmp_path / odd, tmp_path / "into", (), (), None, CONDITIONS, 1, False, 600.0)
+    one = Task("x", odd, tmp_path / odd, tmp_path / "into", (), (), (), CONDITIONS, 1, False, 600.0)
     list(here.run([one], lambda name, step: heard.append(step)))
     assert heard[-1] == str(tmp_path / odd)
 

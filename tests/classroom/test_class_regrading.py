@@ -69,7 +69,7 @@ class RecordingScheduler:
             made,
             submission=replace(made.submission, digest=digest, path=request.submission),
             seed=request.seed,
-            reproduce=reproduction(request, exercises, None, request.seed),
+            reproduce=reproduction(request, exercises, "", request.seed),
         )
         on_recorded(run, exercises)
         return judge_run(exercises, run)

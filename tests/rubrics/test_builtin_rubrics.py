@@ -16,7 +16,7 @@ from ruamel.yaml import YAML
 from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S
 from grader.core.rubric_files import rubrics_in
-from grader.core.scenario import OdometryStream, longest_course_ns, shortest
+from grader.core.scenario import RecordedStream, longest_course_ns, shortest
 from grader.judging.checks import CHECKS
 from grader.rubrics.builtin import builtin_headers, builtin_rubrics
 from grader.rubrics.loader import read_rubric
@@ -106,7 +106,7 @@ def test_odometry_comes_late_and_goes_early() -> None:
     """
     (scenario,) = exercise("odom_subscriber").scenarios
     (stream,) = scenario.stimuli
-    assert isinstance(stream, OdometryStream)
+    assert isinstance(stream, RecordedStream)
     assert shortest(stream.start_ns) == 5 * NS_PER_S
     assert shortest(stream.duration_ns) == 15 * NS_PER_S
     assert isinstance(scenario.span.duration_ns, int)
