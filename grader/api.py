@@ -171,6 +171,7 @@ if TYPE_CHECKING:
     from grader.simulation import Turtle as Turtle
     from grader.simulation import Unicycle as Unicycle
     from grader.testing import TraceBuilder as TraceBuilder
+    from grader.testing import builtin_check as builtin_check
     from grader.testing import explain as explain
     from grader.testing import judge as judge
 
@@ -239,7 +240,7 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.simulation": "Simulation Moment Output DifferentialDrive Turtle Unicycle",
     },
     "Tests": {
-        "grader.testing": "TraceBuilder judge explain",
+        "grader.testing": "TraceBuilder judge explain builtin_check",
     },
 }
 #: Public name -> its name in its own module, where no other function has it.

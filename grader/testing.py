@@ -44,7 +44,7 @@ from grader.judging.diagnosis.rules import Case, Clue, Rule, unfit
 from grader.judging.findings import met, not_met, partly
 from grader.judging.source import read
 
-__all__ = ["TraceBuilder", "explain", "judge", "met", "not_met", "partly"]
+__all__ = ["TraceBuilder", "builtin_check", "explain", "judge", "met", "not_met", "partly"]
 
 #: Order within one instant: the scenario, the grader, the graph, the nodes.
 _PHASE = {Mark: 0, Delivery: 1, GraphSnapshot: 2}
@@ -75,6 +75,17 @@ def judge(check: Check, trace: Trace, sources: Mapping[str, str] | None = None) 
     if repr(trace) != before:
         raise ValueError(f"{type(check).__name__} changed the trace")
     return finding
+
+
+def builtin_check(name: str, **parameters: Any) -> Check:
+    """Return one of the grader's checks, by its name and parameters as in a rubric; times are in nanoseconds.
+
+    Raises:
+        KeyError: There is no such check.
+        TypeError: A parameter is missing, or there is no such parameter.
+    """
+    check: Check = CHECKS[name](**parameters)
+    return check
 
 
 def _asked(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
