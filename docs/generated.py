@@ -38,8 +38,9 @@ from grader.rubrics.loader import read_rubric
 from grader.rubrics.schema import rubric_schema
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT / "tests" / "recorded"))
+sys.path += [str(ROOT / "tests"), str(ROOT / "tests" / "recorded")]
 import archive  # noqa: E402  the recordings of the test submissions
+import sample_folders  # noqa: E402  where those are
 
 #: A recording of each exercise that shows what a report and its charts look like.
 EXAMPLES = {
@@ -382,10 +383,14 @@ def _exercise(exercise: Exercise, explained: list[CriterionExplanation]) -> str:
         f"{files}; {float(points):g} points; `grade . --exercise {exercise.id}`",
         "\n".join(["| criterion | points | check |", "|---|---|---|", *rows]),
         _on_site(f"[A report of a real submission](examples/{exercise.id}.html), with one mistake."),
-        f"To see a report of a submission with one mistake: `grade tests/submissions/{EXAMPLES[exercise.id]} "
+        f"To see a report of a submission with one mistake: `grade {_place(EXAMPLES[exercise.id])} "
         f"--exercise {exercise.id} --open`",
     ]
     return "\n\n".join(lines)
+
+
+def _place(submission: str) -> str:
+    return sample_folders.folder_of(submission).relative_to(ROOT).as_posix()
 
 
 def _on_site(text: str) -> str:
@@ -439,7 +444,7 @@ def exercises() -> dict[str, Exercise]:
 @cache
 def example_report(exercise: str) -> Report:
     """Return the report of the recorded submission that stands for an exercise."""
-    return archive.judged(archive.read_archive()[EXAMPLES[exercise]])
+    return archive.judged(archive.recordings()[EXAMPLES[exercise]])
 
 
 def files() -> dict[str, str | bytes]:

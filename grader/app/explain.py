@@ -192,7 +192,7 @@ def _stimulus(stimulus: Stimulus) -> str:  # noqa: PLR0911  one for each kind
     if isinstance(stimulus, Simulated):
         return f"the simulation {stimulus.name} reacts to what is published"
     played = f"from {_time(stimulus.start_ns)} on for {_time(stimulus.duration_ns)}"
-    return f"the grader plays recorded odometry on {stimulus.topic}, {played}"
+    return f"the grader plays recorded {stimulus.type} on {stimulus.topic}, {played}"
 
 
 def _time(time: Time) -> str:

@@ -93,16 +93,16 @@ def again(evidence: Evidence, how: Judgement) -> tuple[list[Exercise], Run]:
     return exercises, replace(run, reproduce=same)
 
 
-def judged_again(evidence: Evidence, exercises: Sequence[Exercise], request: GradeRequest, odometry: str) -> Report:
+def judged_again(evidence: Evidence, exercises: Sequence[Exercise], request: GradeRequest, played: str) -> Report:
     """Judge kept recordings as the report of a request that would record the same; raises EvidenceError for damage.
 
-    The odometry is the digest of the recording that exercises play.
+    `played` is the digest of the recordings that exercises play.
     """
     run = run_from(evidence.manifest, exercises, kept_traces(evidence, exercises))
     given = Reproduction(
         command=command_words(request, run.seed),
         rubrics=run.reproduce.rubrics,
-        recording=odometry if any(exercise.plays_odometry for exercise in exercises) else "",
+        recording=played if any(exercise.recorded for exercise in exercises) else "",
     )
     submission = replace(run.submission, path=request.submission)
     return judge_run(exercises, replace(run, submission=submission, reproduce=given), pictures=True)

@@ -62,7 +62,7 @@ class SubmissionError(GraderError):
 
 
 class RecordingError(GraderError):
-    """An /odom recording cannot be used; the user who gave it has to act."""
+    """A recording to play cannot be used; whoever gave it, the user or the author of the rubric, has to act."""
 
 
 class EvidenceError(GraderError):

@@ -12,7 +12,7 @@ from numbers import Rational, Real
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, TypeGuard
 
 from grader.core.dataclass import dataclass
-from grader.core.scenario import OdometryStream, Scenario
+from grader.core.scenario import RecordedStream, Scenario
 from grader.core.trace import Trace
 
 
@@ -391,6 +391,6 @@ class Exercise:
     hints: Iterable[HintRule] = ()  # the rubric's own hint rules, in the order of its files
 
     @property
-    def plays_odometry(self) -> bool:
-        """Whether any scenario plays the /odom recording."""
-        return any(isinstance(stimulus, OdometryStream) for s in self.scenarios for stimulus in s.stimuli)
+    def recorded(self) -> tuple[RecordedStream, ...]:
+        """The recordings that its scenarios play."""
+        return tuple(stimulus for s in self.scenarios for stimulus in s.stimuli if isinstance(stimulus, RecordedStream))

@@ -130,7 +130,7 @@ class Reproduction:
     # The arguments of the command, before shell quoting; empty if no command made the report
     command: tuple[str, ...] = ()
     rubrics: tuple[tuple[str, str], ...] = ()  # exercise id and digest of its rubric, in the order graded
-    recording: str = ""  # digest of the /odom recording that was played; empty if none was
+    recording: str = ""  # digest of the recordings that were played; empty if none was
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ from grader.core.exercise import HintRule, Outcome, ProblemKind
 from grader.interfaces.definitions import files_in
 from grader.rubrics.check_parameters import choice_model, simulation_shape
 from grader.rubrics.mistakes import nearest
+from grader.rubrics.types import BESIDE
 from grader.simulation import loading
 from grader.simulation.participant import Simulation
 from grader.simulation.robots import SIMULATIONS
@@ -40,6 +41,10 @@ _ALONE = "such a file may import the standard library, grader.api and what is in
 
 #: Most files of interface packages that a rubric may bring.
 MOST_DEFINITIONS = 400
+#: Most files in a recording, and the largest one in bytes: all travel to each machine of a cluster, and minutes of
+#: laser scans take a few megabytes.
+MOST_BAG_FILES = 20
+MOST_BAG_BYTES = 64 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +99,37 @@ def definition_files(rubric: Path, folders: Sequence[str], never_in: Sequence[Pa
         names = [path.relative_to(rubric.parent).as_posix() for path in paths]
         found += [_own_file(rubric, name, never_in, f"{where} {shown(name)}", least=0) for name in names]
     return tuple(found)
+
+
+def bag_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ()) -> tuple[OwnFile, ...]:
+    """Return the files of the recordings that a rubric names, sorted by name.
+
+    Raises:
+        RubricError: A recording is missing, or has too many files or a file that cannot be used; see `own_files`.
+    """
+    found: list[OwnFile] = []
+    for name in dict.fromkeys(names):
+        path, where = rubric.parent / name, f"{shown(str(rubric), 500)}: recorded: {shown(name)}"
+        files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
+        if not 0 < len(files) <= MOST_BAG_FILES:
+            text = f"{where}: expected a recording of 1 to {MOST_BAG_FILES} files, found {len(files) or 'none'}"
+            raise RubricError(text, "name a rosbag2 folder, or a .mcap or .db3 file")
+        parts = [file.relative_to(rubric.parent).as_posix() for file in files]
+        found += [_own_file(rubric, part, never_in, f"{where}", least=0, most=MOST_BAG_BYTES) for part in parts]
+    return tuple(found)
+
+
+def named_bags(data: object) -> tuple[str, ...]:
+    """Return the recordings named by the stimuli in a rubric's data; the rubric's shape reports anything else."""
+    scenarios = data.get("scenarios") if isinstance(data, Mapping) else None
+    stimuli = [one.get("stimuli") for one in _mappings(scenarios)]
+    played = [one.get("recorded") for several in stimuli for one in _mappings(several)]
+    names = [one.get("bag") for one in _mappings(played)]
+    return tuple(dict.fromkeys(name for name in names if isinstance(name, str) and re.fullmatch(BESIDE, name)))
+
+
+def _mappings(value: object) -> list[Mapping[str, Any]]:
+    return [one for one in value if isinstance(one, Mapping)] if isinstance(value, list) else []
 
 
 def named_files(data: object, key: str) -> tuple[str, ...]:
@@ -212,12 +248,14 @@ def digest_of(rubric: bytes, files: Sequence[OwnFile]) -> str:
     return f"sha256:{digest.hexdigest()}"
 
 
-def _own_file(rubric: Path, name: str, never_in: Sequence[Path], where: str, least: int = 1) -> OwnFile:
+def _own_file(  # noqa: PLR0913  what to read, and its limits
+    rubric: Path, name: str, never_in: Sequence[Path], where: str, least: int = 1, most: int = MAX_BYTES
+) -> OwnFile:
     path = rubric.parent / name
     try:
         real = path.resolve(strict=True)
         inside = real.is_relative_to(rubric.parent.resolve()) and real.is_file()
-        content = real.read_bytes() if inside and real.stat().st_size <= MAX_BYTES else b""
+        content = real.read_bytes() if inside and real.stat().st_size <= most else b""
         theirs = [folder for folder in never_in if folder.is_dir() and real.is_relative_to(folder.resolve())]
     except FileNotFoundError:
         raise RubricError(f"{where}: expected a file beside the rubric, found nothing there") from None
@@ -229,7 +267,7 @@ def _own_file(rubric: Path, name: str, never_in: Sequence[Path], where: str, lea
         text = f"{where}: expected a file that students cannot write, found one in {shown(str(theirs[0]))}"
         raise RubricError(text, "keep rubrics and what they bring apart from submissions")
     if not least <= len(content) or (not content and real.stat().st_size):
-        raise RubricError(f"{where}: expected {least} byte to {MAX_BYTES // 1024} KiB, found none or more")
+        raise RubricError(f"{where}: expected {least} byte to {most // 1024} KiB, found none or more")
     return OwnFile(name, path, content)
 
 

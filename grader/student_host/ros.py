@@ -498,6 +498,7 @@ def install_traffic(  # noqa: PLR0913 - all that the traffic depends on
     clock: VirtualClock,
     settle: Callable[[], None],
     leave: Callable[[], None],
+    depart: Callable[[], None],
     give_up: Callable[[], None],
     work_ns: Callable[[], int],
 ) -> None:
@@ -508,11 +509,13 @@ def install_traffic(  # noqa: PLR0913 - all that the traffic depends on
         clock: Notified of every message.
         settle: Yields to the grader at the same instant.
         leave: The same, but returns only after all sent messages have arrived; called before a sender is destroyed.
+        depart: The same, before the process may end at once.
         give_up: Called for an endpoint whose events the middleware times on the real clock.
         work_ns: Returns how much processor time the program has used.
     """
     ledger.events.install(BACKGROUND)
     _install_endpoints(ledger, settle, leave, give_up)
+    install_departures(leave, depart, ledger.remove)
     in_a_row = 0
 
     def counted(name: str, handle: Any, send: Callable[[], Any]) -> Any:
@@ -659,7 +662,6 @@ def _install_endpoints(
         _settle_what_is_best(ledger, kind, settle)
     note_nodes(ledger.add_node)
     _report_departures_first(ledger, "__init__", settle)
-    install_departures(leave, ledger.remove)
     declare = rclpy.node.Node.declare_parameters
 
     def declared(self: Any, *args: Any, **kwargs: Any) -> Any:
@@ -767,25 +769,27 @@ def _note_found(ledger: Ledger, cls: Any, name: str) -> None:
     setattr(cls, name, looked)
 
 
-def install_departures(leave: Callable[[], None], remove: Callable[[], None] = lambda: None) -> None:
-    """Call `leave` before a node, a context or the process ends, and `remove` before a node does."""
+def install_departures(
+    leave: Callable[[], None], depart: Callable[[], None], remove: Callable[[], None] = lambda: None
+) -> None:
+    """Call `leave` before a node or a context ends, `remove` before a node does, `depart` before the process does."""
 
-    def leaving(owner: Any, name: str, then: Callable[[], None] = lambda: None) -> None:
+    def leaving(owner: Any, name: str, *before: Callable[[], None]) -> None:
         go = getattr(owner, name)
 
         @functools.wraps(go)
         def gone(*args: Any, **kwargs: Any) -> Any:
-            leave()
-            then()
+            for each in before:
+                each()
             return go(*args, **kwargs)
 
         setattr(owner, name, gone)
 
-    leaving(rclpy.node.Node, "destroy_node", remove)
-    leaving(rclpy.context.Context, "shutdown")
-    leaving(rclpy.context.Context, "try_shutdown")
+    leaving(rclpy.node.Node, "destroy_node", leave, remove)
+    leaving(rclpy.context.Context, "shutdown", leave)
+    leaving(rclpy.context.Context, "try_shutdown", leave)
     for owner, name in ((os, "_exit"), (os, "abort"), (os, "kill"), (os, "killpg"), (signal, "raise_signal")):
-        leaving(owner, name)
+        leaving(owner, name, depart)
 
 
 def install_own_signals(settle: Callable[[], None]) -> None:

@@ -135,7 +135,7 @@ class WallTime:
         rclpy.service.Service.send_response = noting(rclpy.service.Service.send_response)
         ros.note_nodes()
         ros.note_other_domains(lambda: self.domain, lambda note: self._link.send({"kind": "note", **note}))
-        ros.install_departures(self._leave)
+        ros.install_departures(self._leave, self._leave)
 
     def _install_waits(self, existed: weakref.WeakKeyDictionary[Any, _Existed]) -> None:
         """Forget the new publishers of a thread that spins, or that has found a subscription or a server."""

@@ -241,7 +241,7 @@ def test_it_travels_to_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     checks = tuple(checks_of([rubric]))
     assert checks == ((b"course/pump_checks.py", CHECKS_FILE.encode()),)
     conditions = Conditions("0", (), "", None, "auto", "auto")
-    terms = Terms(conditions, (), ((b"course/pump.yaml", RUBRIC.encode()),), b"", (), False, 1.0, checks)
+    terms = Terms(conditions, (), ((b"course/pump.yaml", RUBRIC.encode()),), (), False, 1.0, checks)
     task = write_task(terms, GradingJob("ada", b"ada", b"class/ada", b""), tmp_path / "there")
     (found,) = (tmp_path / "there").rglob("pump.yaml")
     assert (task.rubrics, read_rubric(found).digest) == ((rubric,), before)

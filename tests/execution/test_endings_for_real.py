@@ -78,6 +78,19 @@ def test_what_was_published_before_the_end_is_in_the_trace(run: Callable[..., Tr
     assert numbers(trace) == list(range(10)), (trace.notes, trace.faults())
 
 
+@pytest.mark.parametrize("ending", ["hard_exit", "killed", "terminated", "aborted", "interrupted"])
+@pytest.mark.parametrize("thread", [False, True], ids=["", "in_a_thread"])
+def test_who_ends_at_once_ends_at_its_time(run: Callable[..., Trace], ending: str, *, thread: bool) -> None:
+    """Also where it has said nothing for a while, so that it has let time pass on its own."""
+    wait = f"time.sleep(0.05)\ntime.sleep(0.05)\ntime.sleep(0.05)\n{ENDINGS[ending]}"
+    if thread:
+        wait = f"def wait():\n{textwrap.indent(wait, '    ')}\nthreading.Thread(target=wait).start()\n"
+        wait += "rclpy.spin(node)" if ending in ("terminated", "interrupted") else "time.sleep(2)"
+    (fault,) = run(TALKER + wait).faults()
+    # three pauses, each 1 us late, and the first after the looks of the node at the clock
+    assert 150 * MS <= fault.t_ns < 150 * MS + 10_000, fault
+
+
 @pytest.mark.parametrize("at_the_end", ["", "raise ValueError('over')", "atexit.register(node.burst)"])
 def test_what_is_published_while_the_interpreter_ends_is_in_the_trace(
     run: Callable[..., Trace], at_the_end: str

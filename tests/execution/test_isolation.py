@@ -131,7 +131,7 @@ host = sorted(name for name in os.listdir({sandbox.isolation.host_seen_at!r}) if
 package = {str(package)!r}
 print(json.dumps([host, os.listdir({sandbox.isolation.submission_seen_at!r}),
     os.listdir(package) if os.path.isdir(package) else [],
-    [name for name in found if name in ("exercise_1.yaml", "rubric_file.py", "bubblewrap.py")]]))
+    [name for name in found if name in ("rubric.yaml", "rubric_file.py", "bubblewrap.py")]]))
 """
     host = sorted(path.name for path in HOST.glob("*.py"))
     assert said(sandbox.run(code)) == [host, ["node.py"], [], []]

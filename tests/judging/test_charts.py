@@ -34,7 +34,7 @@ from grader.judging.recorded_values import MOST_SAMPLES, recorded_values
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 
-EXERCISES = {path.stem: read_rubric(path) for path in builtin_rubrics().values()}
+EXERCISES = {path.parent.name: read_rubric(path) for path in builtin_rubrics().values()}
 ONE, TWO, THREE = (EXERCISES[f"exercise_{n}"] for n in (1, 2, 3))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from archive import read_archive
+from archive import recordings
 from diagnosis_samples import (
     RECORDINGS,
     RIGHT,
@@ -22,6 +22,7 @@ from diagnosis_samples import (
     rows,
     spoilt,
 )
+from sample_folders import folders_in
 
 from grader.core.exercise import Outcome
 from grader.core.report import ExerciseReport, Verdict
@@ -145,7 +146,7 @@ def test_a_rule_that_fails_is_logged_and_passed_over(
 
 def test_every_rule_is_shown_to_work() -> None:
     """By a row of a table, or by a recorded submission, whose hints are compared too."""
-    recorded = [json.loads(one.report)["exercises"] for one in read_archive().values()]
+    recorded = [json.loads(one.report)["exercises"] for one in recordings().values()]
     verdicts = [verdict for exercises in recorded for exercise in exercises for verdict in exercise["criteria"]]
     shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS, *SLIPS)} | {v["evidence"].get(CAUSE_KEY) for v in verdicts}
     # it only names another criterion, so that reports do not name it
@@ -361,8 +362,7 @@ OTHERWISE = [
 
 def right_programs(file: str) -> dict[str, str]:
     """The graded files of that name among the correct submissions."""
-    folders = Path(__file__).parents[1] / "submissions"
-    found = sorted([*folders.glob(f"correct/**/{file}"), *folders.glob(f"threads/**/{file}")])
+    found = sorted(path for folder in folders_in("correct", "threads") for path in folder.rglob(file))
     return {p.parent.name: text for p in found if (text := source_text(p)) is not None}
 
 

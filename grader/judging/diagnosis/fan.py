@@ -418,7 +418,9 @@ def _answered_once(controller: _Controller) -> Clue | None:
             function = source.function_of(call)
             stores = [s for name in names for s in source.stores(name) if source.function_of(s) is function]
             if stores and function is not None and is_flag(test.test):
-                hint = f"'if {source.code(test.test, 40)}' lets one answer through: answer each temperature"
+                hint = (
+                    f"'if {source.code(test.test, 40)}' lets one answer through: answer each message on {check.input}"
+                )
                 return Clue(hint, source.place(test), key="answered_once")
     return None
 
@@ -504,7 +506,8 @@ def _slow_timer(controller: _Controller) -> Clue | None:
         worth = constant(source, item.period)
         inside = set(runs(source, item))
         if worth is not None and worth.value > 1.25 and all(c in inside for c in calls):
-            hint = f"{timer_code(source, item)} answers every {number(worth.value)} s only: answer each temperature"
+            slow = f"{timer_code(source, item)} answers every {number(worth.value)} s only"
+            hint = f"{slow}: answer each message on {check.input}"
             return Clue(hint, source.place(worth.origin), key="slow_timer")
     return None
 

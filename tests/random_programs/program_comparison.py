@@ -1,0 +1,107 @@
+"""Compares what a random program did with what it must do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from program_description import Program
+from program_model import Expected, expected_of
+from program_text import file_of
+
+from grader.core.trace import Fault, LogRecord, Message, OutputLine, Trace
+from grader.execution.plan import Plan
+from grader.execution.recording_session import RecordingSession
+from grader.execution.supervisor import Job
+
+NS_PER_MS = 1_000_000
+#: How many entries before and after the first difference are shown.
+AROUND = 3
+#: What Python says when a program fails; faults are compared instead.
+STDERR = "stderr"
+Entries = Mapping[str, Sequence[tuple[int, str]]]
+
+
+def plan_of(program: Program, folder: Path, clock: str = "virtual") -> Plan:
+    """Write the files of a program into a folder, and return the plan to record it."""
+    folder.mkdir(exist_ok=True)
+    folder.chmod(0o755)
+    names = [f"p{number}.py" for number in range(len(program.processes))]
+    for name, process in zip(names, program.processes, strict=True):
+        (folder / name).write_text(file_of(process), encoding="utf-8")
+        (folder / name).chmod(0o644)
+    return Plan(
+        scenario="random",
+        processes=tuple((name, name) for name in names),
+        root=str(folder),
+        host_seed="ab" * 32,
+        duration_ns=program.duration_ms * NS_PER_MS,
+        first_message_on="",
+        wait_at_most_ns=60_000 * NS_PER_MS,
+        numbers=(),
+        recordings=(),
+        clock=clock,
+    )
+
+
+def recorded(session: RecordingSession, program: Program, folder: Path, clock: str = "virtual") -> Trace:
+    """Record a program."""
+    return session.recorder.record([Job("random", plan_of(program, folder, clock))], lambda _: None)[0]
+
+
+def told_by_model(expected: Expected) -> dict[str, list[tuple[int, str]]]:
+    """Return what a model expects, by the name of what is compared."""
+    told = {f"topic /{topic}": [(t, str(n)) for t, n in entries] for topic, entries in expected.topics.items()}
+    told |= {f"log of p{number}.py": list(entries) for number, entries in expected.logs.items()}
+    told |= {f"output of p{number}.py": list(entries) for number, entries in expected.lines.items()}
+    return told | {f"end of p{n}.py": [(t, f"{e.kind}: {e.text}")] for n, (t, e) in expected.ends.items()}
+
+
+def told_by_trace(trace: Trace) -> dict[str, list[tuple[int, str]]]:
+    """Return what was recorded, by the name of what is compared."""
+    told: dict[str, list[tuple[int, str]]] = {}
+    for seen in trace.observations:
+        if seen.t_ns < trace.stop_ns and (entry := _entry(seen)) is not None:
+            told.setdefault(entry[0], []).append((seen.t_ns, entry[1]))
+    return told
+
+
+def _entry(seen: Any) -> tuple[str, str] | None:
+    if isinstance(seen, Message):
+        return f"topic {seen.topic}", str(seen.value.get("data"))
+    if isinstance(seen, LogRecord):
+        return f"log of {seen.process}", seen.text
+    if isinstance(seen, OutputLine) and seen.stream != STDERR:
+        return f"output of {seen.process}", seen.text
+    return (f"end of {seen.process}", f"{seen.kind.value}: {seen.text}") if isinstance(seen, Fault) else None
+
+
+def problems(trace: Trace) -> list[str]:
+    """Return what a recording itself complains about."""
+    return [*trace.notes, *([trace.harness_problem] if trace.harness_problem else [])]
+
+
+def differences(expected: Entries, found: Entries) -> list[str]:
+    """Return the first difference of each topic, log, output and end."""
+    told = []
+    for name in sorted({*expected, *found}):
+        must, did = list(expected.get(name, ())), list(found.get(name, ()))
+        if must != did:
+            first = next(
+                (n for n, (m, d) in enumerate(zip(must, did, strict=False)) if m != d), min(len(must), len(did))
+            )
+            part = slice(max(0, first - AROUND), first + AROUND)
+            told.append(f"{name}, entry {first}: must be {_shown(must[part])}, was {_shown(did[part])}")
+    return told
+
+
+def _shown(entries: Sequence[tuple[int, str]]) -> str:
+    return "; ".join(f"{t / NS_PER_MS:g} ms {text}" for t, text in entries) or "nothing"
+
+
+def compared(session: RecordingSession, program: Program, folder: Path) -> list[str]:
+    """Record a program in virtual time, and return how it differs from its model, with its files."""
+    trace = recorded(session, program, folder)
+    found = [*problems(trace), *differences(told_by_model(expected_of(program)), told_by_trace(trace))]
+    return [*found, *(file_of(process) for process in program.processes)] if found else []
