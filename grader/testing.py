@@ -114,10 +114,8 @@ def explain(
         return None
     outcome = Outcome.PARTLY if finding.credit else Outcome.NOT_MET
     # a check of one's own has its name from the rubric, which is not there: it is taken to be the one that is meant
-    known = [name for name, kind in CHECKS.items() if type(check) is kind]
-    meant = [name for name in rule.checks if isinstance(name, str) and name in (known or {name} - CHECKS.keys())]
-    name = next(iter(meant), "")
-    criterion = Criterion("tested", "", Fraction(1), trace.scenario, check, check_name=name)
+    meant = (name for name in rule.checks if isinstance(name, str) and name not in CHECKS)
+    criterion = _criterion("tested", check, trace, next(meant, ""))
     verdict = Verdict(
         "tested",
         "",
@@ -131,11 +129,18 @@ def explain(
         problem=finding.problem,
     )
     files = {name: read(name, text) for name, text in sources.items()}
-    case = Case(criterion, verdict, trace, files, fault_of(verdict, trace), tuple(siblings), finding.facts)
+    others = tuple(_criterion(f"sibling_{n}", one, trace) for n, one in enumerate(siblings))
+    case = Case(criterion, verdict, trace, files, fault_of(verdict, trace), others, finding.facts)
     clue = rule.clue(case)
     if clue is not None and (wrong := unfit(clue, case)):
         raise ValueError(f"the rule {rule.id}: {wrong}")
     return clue
+
+
+def _criterion(id_: str, check: Check, trace: Trace, own: str = "") -> Criterion:
+    """Return a criterion with a check, which has its name in rubrics, or `own` if it is not the grader's."""
+    name = next((name for name, kind in CHECKS.items() if type(check) is kind), own)
+    return Criterion(id_, "", Fraction(1), trace.scenario, check, check_name=name)
 
 
 @dataclass(slots=True)
