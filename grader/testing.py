@@ -272,7 +272,7 @@ class TraceBuilder:
         return self
 
     def mark(self, t_s: float, name: str, detail: str = "") -> TraceBuilder:
-        """Add an event of the scenario itself; `grader.core.trace.Mark` lists the names."""
+        """Add an event of the scenario itself; `Mark` lists the names."""
         return self.add(Mark(nanoseconds(t_s), name, detail))
 
     def trace(self, scenario: str = "alone") -> Trace:
