@@ -130,9 +130,9 @@ if TYPE_CHECKING:
     from grader.judging.findings import only_printed as only_printed
     from grader.judging.findings import partly as partly
     from grader.judging.findings import waiting_for as waiting_for
-    from grader.judging.output import printed_lines as printed_lines
-    from grader.judging.output import student_records as student_records
-    from grader.judging.output import written as written
+    from grader.judging.logs.outputs import printed_lines as printed_lines
+    from grader.judging.logs.outputs import student_records as student_records
+    from grader.judging.logs.outputs import written as written
     from grader.judging.plots import Drawing as Drawing
     from grader.judging.plots import Plot as Plot
     from grader.judging.service_calls import Call as Call
@@ -205,7 +205,7 @@ CONTENTS: dict[str, dict[str, str]] = {
             "Reading Held published delivered published_numbers delivered_numbers held value_at number_at "
             "student_endpoints"
         ),
-        "grader.judging.output": "student_records printed_lines written",
+        "grader.judging.logs.outputs": "student_records printed_lines written",
         "grader.judging.service_calls": "Call calls_of",
     },
     "Text": {

@@ -28,22 +28,9 @@ from grader.judging.findings import (
     not_met,
     only_printed,
 )
-from grader.judging.output import (
-    LoggedNumbers,
-    Output,
-    Sought,
-    after,
-    followed,
-    in_window,
-    numbers_in,
-    printed_lines,
-    shows_about,
-    standing,
-    student_records,
-    surroundings,
-    times,
-    wrong_conversion,
-)
+from grader.judging.logs.conversions import LoggedNumbers, times, wrong_conversion
+from grader.judging.logs.matching import Sought, followed, shows_about, standing, surroundings
+from grader.judging.logs.outputs import Output, after, in_window, numbers_in, printed_lines, student_records
 from grader.judging.plots import Drawing, Plot
 from grader.judging.texts import Printed, clean
 from grader.judging.values import (
