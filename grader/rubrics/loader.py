@@ -241,7 +241,7 @@ class _Brought:
     checks: Mapping[str, type]
     simulations: Mapping[str, OwnSimulation]
     provided: Mapping[str, str]
-    hints: tuple[HintRule, ...]
+    hints: Iterable[HintRule]
 
 
 def read_rubric(

@@ -13,7 +13,7 @@ import hashlib
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -162,8 +162,23 @@ def load_simulations(files: Sequence[OwnFile]) -> dict[str, OwnSimulation]:
     return found
 
 
-def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> tuple[HintRule, ...]:
-    """Run files with hint rules, and return their rules in the order of the files and of their text.
+@dataclass(frozen=True, slots=True)
+class OwnHints:
+    """The hint rules of a rubric, by the files that hold them.
+
+    A file runs when its rules are first asked for: they need all of diagnosis, which takes 50 ms to import.
+    """
+
+    files: tuple[OwnFile, ...]
+
+    def __iter__(self) -> Iterator[HintRule]:
+        """Yield the rules in the order of the files and of their text."""
+        for file in self.files:
+            yield from _rules(file)
+
+
+def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> Iterable[HintRule]:
+    """Run files with hint rules, and return their rules.
 
     Args:
         files: The files; one may hold checks too.
@@ -175,46 +190,32 @@ def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> tuple[Hin
     """
     if not files:
         return ()
-    from grader.judging.diagnosis import RULES  # noqa: PLC0415  takes 50 ms, and most rubrics have no rules
+    from grader.judging.diagnosis import RULES  # noqa: PLC0415  most rubrics have no rules
 
     taken = {rule.id for rule in RULES}
-    found: list[HintRule] = []
+    problems: list[str] = []
     for file in files:
         rules, where = _ran(file, _rules), shown(str(file.path), 500)
         if not rules:
             text = f"{where}:1: expected hint rules, which are functions with @hint_rule(...) above them, found none"
             raise RubricError(text)
-        problems = []
         for rule in rules:
             wrong = "expected a new name, found one that is taken" if rule.id in taken else _no_rule(rule, known)
             line = getattr(getattr(rule.function, "__code__", None), "co_firstlineno", 1)
             problems += [f"{where}:{line}: `{shown(rule.id)}`: {wrong}"] if wrong else []
             taken.add(rule.id)
-        if problems:
-            raise RubricError("\n".join(problems))
-        found += rules
-    return tuple(found)
+    if problems:
+        raise RubricError("\n".join(problems))
+    return OwnHints(tuple(files))
 
 
 def _rules(file: OwnFile) -> tuple[Any, ...]:
-    """Return the rules of a file, which other processes can recreate."""
+    """Run a file and return its rules."""
     from grader.judging.diagnosis.rules import Rule  # noqa: PLC0415  as above
 
-    copyreg.pickle(Rule, _reduced_rule)
     path = str(file.path.resolve())
-    module = _module(path, file.content)
-    rules = (value for value in vars(module).values() if isinstance(value, Rule))
-    return tuple(dataclasses.replace(rule, file=(path, file.content)) for rule in dict.fromkeys(rules))
-
-
-def _reduced_rule(rule: Any) -> tuple[Any, ...]:
-    """Return how another process recreates a rule of a rubric's own; it has to run the file first."""
-    path, content = rule.file
-    return _remade_rule, (path, content, rule.id)
-
-
-def _remade_rule(path: str, content: bytes, id_: str) -> Any:
-    return next(rule for rule in _rules(OwnFile(path, Path(path), content)) if rule.id == id_)
+    rules = (value for value in vars(_module(path, file.content)).values() if isinstance(value, Rule))
+    return tuple(dataclasses.replace(rule, file=path) for rule in dict.fromkeys(rules))
 
 
 def _no_rule(rule: Any, known: Mapping[str, type]) -> str:

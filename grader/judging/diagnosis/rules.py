@@ -153,7 +153,8 @@ class Rule:
         text: Pattern that the text of an exception must have; empty for any.
         priority: Its place among all rules: the one with the lowest number is asked first, and the first clue wins.
         about: The mistake in a sentence, for `grade explain --rules`; may be empty.
-        file: The author's file with the rule, and the text of it; None for a rule of the grader.
+        file: Path of the author's file with the rule; empty for a rule of the grader.
+        function: What the decorator was above; None for a rule that was made without one.
     """
 
     id: str
@@ -165,8 +166,8 @@ class Rule:
     text: str = ""
     priority: int = FIRST
     about: str = ""
-    file: tuple[str, bytes] | None = None
-    function: Callable[..., object] | None = None  # what the decorator was above
+    file: str = ""
+    function: Callable[..., object] | None = None
 
     def explains(self, criterion: Criterion) -> bool:
         """Return whether it is about the check of a criterion."""
