@@ -143,9 +143,9 @@ if TYPE_CHECKING:
     from grader.judging.findings import only_printed as only_printed
     from grader.judging.findings import partly as partly
     from grader.judging.findings import waiting_for as waiting_for
-    from grader.judging.output import printed_lines as printed_lines
-    from grader.judging.output import student_records as student_records
-    from grader.judging.output import written as written
+    from grader.judging.logs.outputs import printed_lines as printed_lines
+    from grader.judging.logs.outputs import student_records as student_records
+    from grader.judging.logs.outputs import written as written
     from grader.judging.plots import Drawing as Drawing
     from grader.judging.plots import Plot as Plot
     from grader.judging.plots import threshold_drawing as threshold_drawing
@@ -232,7 +232,7 @@ CONTENTS: dict[str, dict[str, str]] = {
             "Reading Held published delivered published_numbers delivered_numbers held value_at number_at "
             "student_endpoints as_number carries_number heard_from_ns last_of_instant EXACT JITTER_NS"
         ),
-        "grader.judging.output": "student_records printed_lines written",
+        "grader.judging.logs.outputs": "student_records printed_lines written",
         "grader.judging.series": "lag_ns steps_behind",
         "grader.judging.service_calls": "Call calls_of",
     },

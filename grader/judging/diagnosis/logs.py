@@ -27,7 +27,7 @@ from grader.judging.diagnosis.wiring import (
     timer_code,
 )
 from grader.judging.facts import LogFacts, LogPaceFacts, PositionFacts
-from grader.judging.output import printed_lines, student_records
+from grader.judging.logs.outputs import printed_lines, student_records
 from grader.judging.source import Source, argument, chain, last_name, text_of
 from grader.judging.wording import number
 

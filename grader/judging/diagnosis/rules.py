@@ -15,7 +15,7 @@ from grader.core.exercise import Check, Criterion, Location, Outcome, ProblemKin
 from grader.core.report import Verdict
 from grader.core.trace import Fault, FaultKind, Trace
 from grader.judging.diagnosis.wiring import is_log, made_for
-from grader.judging.output import student_records
+from grader.judging.logs.outputs import student_records
 from grader.judging.source import Source, first_line
 from grader.judging.values import published, student_endpoints
 
