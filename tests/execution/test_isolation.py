@@ -499,7 +499,7 @@ def _living(marker: str) -> list[str]:
     return found
 
 
-def _wait_until(true: Callable[[], bool], seconds: float = 10.0) -> bool:
+def _wait_until(true: Callable[[], bool], seconds: float = 60.0) -> bool:
     deadline = time.monotonic() + seconds
     while not true():
         if time.monotonic() > deadline:
@@ -744,7 +744,7 @@ heard = []
 node.create_subscription(String, "back", lambda message: heard.append(message.data), 30)
 forth = node.create_publisher(String, "forth", 30)
 student = subprocess.Popen(command["argv"], env=command["environment"], pass_fds=command["pass_fds"])
-deadline = time.monotonic() + 30
+deadline = time.monotonic() + 300
 def wait(true):
     while not true() and time.monotonic() < deadline and student.poll() is None:
         rclpy.spin_once(node, timeout_sec=0.02)
