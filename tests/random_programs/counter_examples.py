@@ -5,9 +5,9 @@ from __future__ import annotations
 from program_description import End, Ending, Every, Node, Process, Program, Spinning, Timer
 
 
-def alone(node: Node, spinning: Spinning = Spinning.SPIN, **other: int) -> Program:
+def alone(node: Node, spinning: Spinning = Spinning.SPIN) -> Program:
     """Return a program of one node."""
-    return Program((Process((node,), spinning, **other),), 2000)
+    return Program((Process((node,), spinning),), 2000)
 
 
 COUNTER_EXAMPLES: dict[str, Program] = {

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from program_description import Program
+from program_description import Program, Spinning
 from program_model import Expected, expected_of
 from program_text import file_of
 
@@ -16,6 +16,8 @@ from grader.execution.recording_session import RecordingSession
 from grader.execution.supervisor import Job
 
 NS_PER_MS = 1_000_000
+#: Processes with several threads.
+SEVERAL = (Spinning.THREAD, Spinning.MULTI)
 #: How many entries before and after the first difference are shown.
 AROUND = 3
 #: What Python says when a program fails; faults are compared instead.
@@ -82,6 +84,21 @@ def problems(trace: Trace) -> list[str]:
     return [*trace.notes, *([trace.harness_problem] if trace.harness_problem else [])]
 
 
+def by_source(told: Entries, program: Program) -> dict[str, Sequence[tuple[int, str]]]:
+    """Take the log and output of a process with several threads apart by the names of their callbacks.
+
+    In which order threads do something at one instant is not promised.
+    """
+    apart: dict[str, list[tuple[int, str]]] = {}
+    several = {f"p{n}.py" for n, process in enumerate(program.processes) if process.spinning in SEVERAL}
+    for name, entries in told.items():
+        kind, _, process = name.partition(" of ")
+        for t_ns, text in entries:
+            split = process in several and kind != "end"
+            apart.setdefault(f"{name}, {text.split()[0]}" if split else name, []).append((t_ns, text))
+    return dict(apart)
+
+
 def differences(expected: Entries, found: Entries) -> list[str]:
     """Return the first difference of each topic, log, output and end."""
     told = []
@@ -103,5 +120,6 @@ def _shown(entries: Sequence[tuple[int, str]]) -> str:
 def compared(session: RecordingSession, program: Program, folder: Path) -> list[str]:
     """Record a program in virtual time, and return how it differs from its model, with its files."""
     trace = recorded(session, program, folder)
-    found = [*problems(trace), *differences(told_by_model(expected_of(program)), told_by_trace(trace))]
+    expected, did = told_by_model(expected_of(program)), told_by_trace(trace)
+    found = [*problems(trace), *differences(by_source(expected, program), by_source(did, program))]
     return [*found, *(file_of(process) for process in program.processes)] if found else []
