@@ -77,6 +77,7 @@ def test_what_was_published_before_the_end_is_in_the_trace(run: Callable[..., Tr
     trace = run("def main():\n" + textwrap.indent(main, "    ") + "\nmain()\n")
     assert numbers(trace) == list(range(10)), (trace.notes, trace.faults())
 
+
 @pytest.mark.parametrize("ending", ["hard_exit", "killed", "terminated", "aborted", "interrupted"])
 @pytest.mark.parametrize("thread", [False, True], ids=["", "in_a_thread"])
 def test_who_ends_at_once_ends_at_its_time(run: Callable[..., Trace], ending: str, *, thread: bool) -> None:
