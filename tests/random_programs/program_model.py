@@ -251,12 +251,19 @@ class ProcessModel:
         self.write("main 0")
 
     def in_turns(self, executor: Executor) -> Steps:
+        """Call spin_once, which adds the node to the executor and removes it again, and so wakes the executor twice.
+
+        One that goes on for ever and never blocks lets time pass until there is something to do: it is the same as one
+        that blocks.
+        """
         turns = self.process.turns
         while self.ok:
-            yield from executor.spin_once(self.process.timeout_ms * NS_PER_MS)
-            turns -= 1
-            if turns == 0:
+            if turns:
+                executor.wake()
+            yield from executor.spin_once(self.process.timeout_ms * NS_PER_MS if turns else None)
+            if turns == 1:
                 break
+            turns -= 1 if turns else 0
 
     def until_answered(self, executor: Executor, node: NodeModel) -> Steps:
         client = next(iter(node.clients))
@@ -265,6 +272,7 @@ class ProcessModel:
             future = FutureModel(executor)
             future.callbacks.append(nothing)
             yield from node.request(client, turn, future)
+            executor.wake()
             while self.ok and not future.done:
                 future.callbacks.append(nothing)
                 yield from executor.spin_once(None, future)

@@ -6,7 +6,9 @@ come before services.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from hypothesis import strategies as st
 from program_description import (
@@ -52,6 +54,7 @@ PERIODS = (50, 100, 100, 125, 200, 250, 300, 470)
 NAPS = (7, 30, 50, 100, 120, 260)
 DURATION_MS = 2000
 SLOTS = 2
+NUMBERS, FEW, MANY, SOME = st.integers(-3, 9), st.integers(2, 9), st.integers(0, 4), st.integers(0, 2)
 
 
 #: Ends that work in a callback whose spin waits for something else as well, in the threads of a pool, and in the main
@@ -85,62 +88,71 @@ class Room:
     awaits: bool = True
     waits: bool = False
 
-    def values(self, *, heard: bool) -> st.SearchStrategy[Value]:
+    def value(self, draw: st.DrawFn, *, heard: bool) -> Value:
         """Draw a value; with a number that was heard only where there is one."""
-        return st.one_of(
-            st.integers(-3, 9).map(Fixed),
-            st.just(Runs()),
-            *([st.just(Heard())] if heard else []),
-            *([st.sampled_from(self.slots).map(Kept)] if self.slots else []),
-            *([] if self.shared else [st.just(Parameter())]),
-        )
+        kinds: list[type] = [Fixed, Runs, *([Heard] if heard else []), *([Kept] if self.slots else [])]
+        kind = draw(st.sampled_from(kinds if self.shared else [*kinds, Parameter]))
+        if kind is Fixed:
+            return Fixed(draw(NUMBERS))
+        made: Value = Kept(draw(st.sampled_from(self.slots))) if kind is Kept else kind()
+        return made
 
     def statements(
-        self, channels: str, *, heard: bool, deep: bool = True, rate: bool = False
-    ) -> st.SearchStrategy[tuple[Statement, ...]]:
+        self, draw: st.DrawFn, channels: str, *, heard: bool, deep: bool = True, rate: bool = False
+    ) -> tuple[Statement, ...]:
         """Draw what a callback does; it sends on these channels only."""
-        value = self.values(heard=heard)
-        kinds: list[st.SearchStrategy[Statement]] = [
-            st.builds(Say, value),
-            st.builds(Write, value),
-            st.builds(Nap, st.sampled_from(NAPS)),
-        ]
-        if self.slots:
-            kinds += [st.builds(Keep, st.sampled_from(self.slots), value, st.booleans())]
-        if topics := [c for c in channels if c in self.topics]:
-            kinds += [st.builds(Publish, st.sampled_from(topics), value)] * 3
-        if self.timers:
-            timers = st.sampled_from(self.timers)
-            kinds += [st.builds(Cancel, timers), st.builds(Reset, timers)]
-            kinds += [st.builds(Pace, timers, st.sampled_from(PERIODS))]
-        if not self.shared:
-            kinds += [st.builds(SetParameter, value)]
-        if rate:
-            kinds += [st.just(SleepRate())] * 2
+        topics = [c for c in channels if c in self.topics]
+        asked = [client.name for client in self.clients if client.service in channels]
+        kinds: list[type] = [Say, Write, Nap, *([Keep] if self.slots else []), *([Publish] * 3 if topics else [])]
+        kinds += [Cancel, Reset, Pace] if self.timers else []
+        kinds += [*([] if self.shared else [SetParameter]), *([SleepRate] * 2 if rate else [])]
         if deep:
-            kinds += self.questions(channels, value)
-            inner = self.statements(channels, heard=heard, deep=False)
-            kinds += [st.builds(Every, st.integers(2, 5), inner)]
-            if self.ends:
-                before = (Nap(LAST_NAP_MS),) if self.waits else ()
-                ends = st.sampled_from(self.ends).map(lambda how: (*before, End(how)))
-                kinds += [st.builds(lambda n, i, e: Every(n, i + e), st.integers(3, 9), inner, ends)]
-        return st.lists(st.one_of(kinds), max_size=4 if deep else 2).map(tuple)
+            kinds += [*([Ask] if asked else []), *([Await] if asked and self.awaits else [])]
+            kinds += [*([CallAndWait] if asked and self.waits else []), Every, *([End] if self.ends else [])]
 
-    def questions(self, channels: str, value: st.SearchStrategy[Value]) -> list[st.SearchStrategy[Statement]]:
-        """Return what draws a call of each service, and what is done with the answer."""
-        found: list[st.SearchStrategy[Statement]] = []
-        for client in self.clients:
-            if client.service not in channels:
-                continue
-            later = "" if self.shared else channels[channels.index(client.service) + 1 :]
-            then = replace(self, topics="", slots=(), timers=(), shared=True) if self.shared else self
-            found += [st.builds(Ask, st.just(client.name), value, then.statements(later, heard=True, deep=False))]
-            if self.awaits:
-                found += [st.builds(Await, st.just(client.name), value)]
-            if self.waits:
-                found += [st.builds(CallAndWait, st.just(client.name), value)]
-        return found
+        def nested() -> tuple[Statement, ...]:
+            return self.statements(draw, channels, heard=heard, deep=False)
+
+        def number() -> Value:
+            return self.value(draw, heard=heard)
+
+        def of(names: Sequence[Any]) -> Any:
+            return draw(st.sampled_from(names))
+
+        def ask() -> Ask:
+            client = of(asked)
+            return Ask(client, number(), self.then(draw, client, channels))
+
+        make: dict[type, Callable[[], Statement]] = {
+            Say: lambda: Say(number()),
+            Write: lambda: Write(number()),
+            Nap: lambda: Nap(of(NAPS)),
+            Keep: lambda: Keep(of(self.slots), number(), draw(st.booleans())),
+            Publish: lambda: Publish(of(topics), number()),
+            Cancel: lambda: Cancel(of(self.timers)),
+            Reset: lambda: Reset(of(self.timers)),
+            Pace: lambda: Pace(of(self.timers), of(PERIODS)),
+            SetParameter: lambda: SetParameter(number()),
+            SleepRate: SleepRate,
+            Ask: ask,
+            Await: lambda: Await(of(asked), number()),
+            CallAndWait: lambda: CallAndWait(of(asked), number()),
+            Every: lambda: Every(draw(FEW), nested()),
+            End: lambda: Every(draw(FEW), (*nested(), *self.ending(draw))),
+        }
+        return tuple(make[of(kinds)]() for _ in range(draw(MANY if deep else SOME)))
+
+    def ending(self, draw: st.DrawFn) -> tuple[Statement, ...]:
+        """Draw an end of the program; in the main thread beside another one not at an instant of that one."""
+        return (*((Nap(LAST_NAP_MS),) if self.waits else ()), End(draw(st.sampled_from(self.ends))))
+
+    def then(self, draw: st.DrawFn, name: str, channels: str) -> tuple[Statement, ...]:
+        """Draw what is done with an answer."""
+        service = next(client.service for client in self.clients if client.name == name)
+        if self.shared:
+            alone = replace(self, topics="", slots=(), timers=())
+            return alone.statements(draw, "", heard=True, deep=False)
+        return self.statements(draw, channels[channels.index(service) + 1 :], heard=True, deep=False)
 
 
 def after(channel: str) -> str:
@@ -197,7 +209,7 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
     room = rooms if several else rooms * (len(groups) + 1)
 
     def callback(group: int, channels: str, *, heard: bool = True) -> tuple[Statement, ...]:
-        return draw(room[group].statements(channels, heard=heard))
+        return room[group].statements(draw, channels, heard=heard)
 
     of = [draw(st.integers(0, len(groups))) for _ in (*topics, *services)]
     node = Node(
@@ -224,7 +236,7 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
                 f"v{number}{n}",
                 service,
                 callback(group, after(service)),
-                draw(room[group].values(heard=True)),
+                room[group].value(draw, heard=True),
                 group,
             )
             for n, (service, group) in enumerate(zip(services, of[len(topics) :], strict=True))
@@ -235,7 +247,7 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
     if spinning is not Spinning.THREAD:
         return node, None
     rate = draw(st.sampled_from((0, 50, 100, 250)))
-    body = draw(beside.statements(TOPICS + SERVICES, heard=True, rate=bool(rate)))
+    body = beside.statements(draw, TOPICS + SERVICES, heard=True, rate=bool(rate))
     pause: Statement = SleepRate() if rate else Nap(draw(st.sampled_from(NAPS)))
     return node, Loop("m", draw(st.sampled_from((3, 12, 100))), (*body, pause), rate)
 
@@ -273,13 +285,14 @@ def programs(draw: st.DrawFn) -> Program:
             own.append(node)
         if spinning is Spinning.UNTIL and not own[0].clients:
             spinning = Spinning.SPIN
-        turns = {Spinning.ONCE: (0, 3, 12), Spinning.UNTIL: (1, 5)}.get(spinning, (0,))
+        turns = draw(st.sampled_from({Spinning.ONCE: (0, 3, 12), Spinning.UNTIL: (1, 5)}.get(spinning, (0,))))
+        timeouts = (10, 50, 100, 333) if turns else (0, 0, 50, 333)  # only one that goes on for ever may never block
         made.append(
             Process(
                 tuple(own),
                 spinning,
-                timeout_ms=draw(st.sampled_from((10, 50, 100, 333))) if spinning is Spinning.ONCE else 0,
-                turns=draw(st.sampled_from(turns)),
+                timeout_ms=draw(st.sampled_from(timeouts)) if spinning is Spinning.ONCE else 0,
+                turns=turns,
                 loop=loop,
                 threads=draw(st.integers(2, 4)) if spinning is Spinning.MULTI else 0,
             )
