@@ -27,7 +27,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
+sys.path.append(str(Path(__file__).resolve().parent.parent / "tests"))
+import sample_folders  # where the test submissions are
 
 from grader.app.grade import grade_in
 from grader.app.request import GradeRequest
@@ -36,7 +37,6 @@ from grader.execution.recording_session import RecordingSession, open_session
 from grader.reporting.delivery import write_whole
 from grader.reporting.json_report import dumps
 
-SUBMISSIONS = Path(__file__).resolve().parent.parent / "tests" / "submissions"
 CHECKED = "auto-checked"
 MODES = ("virtual", "wall", "auto", "auto-load", CHECKED)
 #: Numbers in reasons, which differ from run to run.
@@ -71,7 +71,7 @@ def judged(
     session: RecordingSession, folder: str, exercises: tuple[str, ...], how: GradeRequest, reports: Path
 ) -> dict[str, Any]:
     """Keep the report of one folder, and return outcomes other than `met`, and why it went to the wall clock."""
-    request = replace(how, submission=str(SUBMISSIONS / folder), exercises=exercises)
+    request = replace(how, submission=str(sample_folders.folder_of(folder)), exercises=exercises)
     try:
         report = grade_in(session, request, print_nothing)
     except GraderError as fault:
@@ -177,8 +177,7 @@ def shared_out(folders: Mapping[str, Any], part: str) -> dict[str, Any]:
 
 def what_is_known(path: Path) -> tuple[dict[str, Any], Results]:
     """Return what every folder should be given, and the results so far."""
-    expected = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
-    return expected, json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    return sample_folders.expected(), json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
 def main() -> int:

@@ -24,6 +24,9 @@ from pathlib import Path
 from counting import counted, counts
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / "tests"))
+from sample_folders import folders_in  # where the test submissions are
+
 GRADE = str(Path(sys.executable).with_name("grade"))
 REFERENCE = ROOT / "reference_solutions"
 FILES = ("velocity_publisher.py", "odom_subscriber.py", "temperature_sensor.py", "fan_controller.py")
@@ -63,8 +66,7 @@ def samples() -> Mapping[str, Sequence[Mapping[str, Path]]]:
     """Return kind -> the samples of it, each as file name -> file that replaces the reference solution's."""
     found: dict[str, list[Mapping[str, Path]]] = {}
     for kind in ("correct", "wrong", "broken"):
-        folders = sorted(path for path in (ROOT / "tests" / "submissions" / kind).iterdir() if path.is_dir())
-        given = ({name: folder / name for name in FILES if (folder / name).is_file()} for folder in folders)
+        given = ({name: folder / name for name in FILES if (folder / name).is_file()} for folder in folders_in(kind))
         found[kind] = [files for files in given if files]
     hostile = sorted((ROOT / "tests" / "attacks" / "nodes").glob("a*.py"))
     return {**found, "hostile": [{"velocity_publisher.py": path} for path in hostile]}

@@ -1,6 +1,6 @@
 """How many disguised copies `grade batch --similarity` lists, and how many pairs besides: recall and precision.
 
-The programs in tests/submissions that are right were written differently on purpose: they stand for people who worked
+The test submissions that are right were written differently on purpose: they stand for people who worked
 alone. Six of ten are handed in a second time, each disguised in one of several ways. One class for each exercise.
 
     python benchmarks/similarity.py [SEED]
@@ -14,9 +14,10 @@ from dataclasses import replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tests" / "classroom"))
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "classroom")]
 
 import copies  # noqa: E402  beside the tests
+from sample_folders import folders_in  # noqa: E402  as above
 
 from grader.similarity.finding import (  # noqa: E402  as above
     find_similar,
@@ -31,7 +32,7 @@ WAYS = tuple(copies.DISGUISES)
 
 def people(prefix: str) -> list[Handed]:
     """Return a submission for each folder of right programs that begins with a word."""
-    folders = [f for kind in ("correct", "threads") for f in sorted((ROOT / "tests/submissions" / kind).iterdir())]
+    folders = folders_in("correct", "threads")
     return [Handed(f.name, f.name, *read_programs(f)) for f in folders if f.name.startswith(prefix)]
 
 

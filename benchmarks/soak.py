@@ -21,11 +21,12 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tests" / "attacks"))
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "attacks")]
 
 from arena import Arena
 from attack_rubric import publisher_rubric
 from attack_runs import HERE, REFERENCE, Attack, read_attacks
+from sample_folders import folders_in
 
 from grader.app.request import GradeRequest
 from grader.app.start import grade
@@ -76,7 +77,7 @@ def held(arena: Arena) -> Held:
 
 def submissions(arena: Arena, hostile: list[Attack]) -> Iterator[tuple[str, Path]]:
     """Yield right, faulty and hostile submissions in turn, without end, each with its kind."""
-    faulty = sorted(path.parent for path in (ROOT / "tests" / "submissions" / "broken").glob(f"*/{NODE}.py"))
+    faulty = [folder for folder in folders_in("broken") if (folder / f"{NODE}.py").is_file()]
     # Those that wait for their limit of real time take half a minute each; the attacks do that as well.
     faulty = [folder for folder in faulty if not folder.name.startswith(("waits_", "asks_"))]
     right = arena.folder("right")

@@ -14,6 +14,7 @@ import io
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from enum import Enum
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as MatplotlibFigure
 from ruamel.yaml import YAML
 
+from grader import api
 from grader.app.explain import explain_checks, explain_rubrics
 from grader.cli.main import app
 from grader.core.chart import Chart, Panel
@@ -36,8 +38,9 @@ from grader.rubrics.loader import read_rubric
 from grader.rubrics.schema import rubric_schema
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT / "tests" / "recorded"))
+sys.path += [str(ROOT / "tests"), str(ROOT / "tests" / "recorded")]
 import archive  # noqa: E402  the recordings of the test submissions
+import sample_folders  # noqa: E402  where those are
 
 #: A recording of each exercise that shows what a report and its charts look like.
 EXAMPLES = {
@@ -295,6 +298,68 @@ def _draw(ax: Axes, panel: Panel) -> None:
     ax.legend(loc="center left", bbox_to_anchor=(1, 0.5), fontsize=7, frameon=False)
 
 
+# --- the public interface ---------------------------------------------------------------------------------------------
+
+
+def interface() -> str:
+    """Return a section for each topic of `grader.api`: signature and docstring of each name."""
+    own = "\n\n".join(_public(name) for name in ("grade", "observe", "rejudge"))
+    sections = [f"## Grade, observe, judge again\n\n{own}"]
+    for title, homes in api.CONTENTS.items():
+        names = [name for each in homes.values() for name in each.split()]
+        sections.append(f"## {title}\n\n" + "\n\n".join(map(_public, names)))
+    return "\n\n".join(sections)
+
+
+def _public(name: str) -> str:
+    """Return the entry of one name."""
+    value = getattr(api, name)
+    if not (inspect.isfunction(value) or inspect.isclass(value)) or hasattr(value, "__args__"):
+        return f"### `{name}`\n\n`{value!r}`"
+    doc = inspect.cleandoc(value.__doc__ or "")
+    text = f"### `{name}`\n\n"
+    if inspect.isfunction(value):
+        text += f"```text\n{name}{_plain(inspect.signature(value))}\n```\n\n"
+    elif issubclass(value, Enum):
+        text += f"One of {', '.join(f'`{member}`' for member in value.__members__)}.\n\n"
+    elif not issubclass(value, Exception) and not getattr(value, "_is_protocol", False):
+        text += f"```text\n{name}{_plain(inspect.signature(value))}\n```\n\n"
+    return text + _as_markdown(doc) + _members(value)
+
+
+def _plain(signature: inspect.Signature) -> str:
+    """Return a signature with its annotations as they are written."""
+    text = re.sub(r"<[^<>]* at 0x[0-9a-f]+>", "...", str(signature))
+    return re.sub(r"(?<=: |> )'([^']*)'", r"\1", text).removesuffix(" -> None")
+
+
+def _members(value: Any) -> str:
+    """Return the methods and properties of a class that have a docstring, as a list."""
+    if not inspect.isclass(value) or issubclass(value, (Exception, Enum)):
+        return ""
+    rows = []
+    for name, member in vars(value).items():
+        about = inspect.cleandoc(getattr(member, "__doc__", None) or "").split("\n\n")[0]
+        if name.startswith("_") or not about or not (inspect.isfunction(member) or isinstance(member, property)):
+            continue
+        call = f"{name}{_plain(inspect.signature(member))}" if inspect.isfunction(member) else name
+        rows.append(f"| `{_cell(call.replace('(self, ', '(').replace('(self)', '()'))}` | {_cell(about)} |")
+    return "\n\n| member | |\n|---|---|\n" + "\n".join(rows) if rows else ""
+
+
+def _as_markdown(doc: str) -> str:
+    """Return a docstring with its sections as lists."""
+    lines = []
+    for line in doc.split("\n"):
+        if re.fullmatch(r"(Args|Attributes|Raises|Returns):", line):
+            lines += [f"{line.replace('Args', 'Arguments')}", ""]
+        elif found := re.fullmatch(r" {4}(\w+): (.*)", line):
+            lines.append(f"- `{found[1]}`: {found[2]}")
+        else:
+            lines.append(line.removeprefix("    ") if line.startswith("        ") else line)
+    return "\n".join(lines)
+
+
 # --- exercises --------------------------------------------------------------------------------------------------------
 
 
@@ -318,10 +383,14 @@ def _exercise(exercise: Exercise, explained: list[CriterionExplanation]) -> str:
         f"{files}; {float(points):g} points; `grade . --exercise {exercise.id}`",
         "\n".join(["| criterion | points | check |", "|---|---|---|", *rows]),
         _on_site(f"[A report of a real submission](examples/{exercise.id}.html), with one mistake."),
-        f"To see a report of a submission with one mistake: `grade tests/submissions/{EXAMPLES[exercise.id]} "
+        f"To see a report of a submission with one mistake: `grade {_place(EXAMPLES[exercise.id])} "
         f"--exercise {exercise.id} --open`",
     ]
     return "\n\n".join(lines)
+
+
+def _place(submission: str) -> str:
+    return sample_folders.folder_of(submission).relative_to(ROOT).as_posix()
 
 
 def _on_site(text: str) -> str:
@@ -375,7 +444,7 @@ def exercises() -> dict[str, Exercise]:
 @cache
 def example_report(exercise: str) -> Report:
     """Return the report of the recorded submission that stands for an exercise."""
-    return archive.judged(archive.read_archive()[EXAMPLES[exercise]])
+    return archive.judged(archive.recordings()[EXAMPLES[exercise]])
 
 
 def files() -> dict[str, str | bytes]:
@@ -390,6 +459,7 @@ NAMES: Mapping[str, Callable[[], str]] = {
     "grammar": grammar,
     "gallery": gallery,
     "examples": examples,
+    "interface": interface,
 }
 
 _PART = re.compile(r"(<!-- generated: (\w+) -->)\n.*?(<!-- end of generated: \2 -->)", re.DOTALL)

@@ -1,6 +1,6 @@
-"""Helpers to test your own checks: build traces by hand, and run a check on them.
+"""Helpers to test your own checks and hint rules: build traces by hand, and ask a check or a rule about them.
 
-    from grader.testing import TraceBuilder, judge
+    from grader.api import TraceBuilder, judge
 
     def test_a_steady_pump_is_met():
         trace = TraceBuilder("pump.py").messages("/flow", "std_msgs/msg/Float32", {"data": 1.5}, rate_hz=10).trace()
@@ -11,13 +11,15 @@ Times are seconds since the scenario began. Add observations in any order; the t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
+from fractions import Fraction
 from typing import Any
 
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Check, Finding, reads_sources
+from grader.core.exercise import Check, Criterion, Finding, Outcome, reads_sources
 from grader.core.quantities import NS_PER_S, nanoseconds
+from grader.core.report import Verdict
 from grader.core.trace import (
     ClockKind,
     Delivery,
@@ -36,9 +38,13 @@ from grader.core.trace import (
     Trace,
 )
 from grader.judging.authored import breach
+from grader.judging.checks import CHECKS
+from grader.judging.diagnosis import fault_of
+from grader.judging.diagnosis.rules import Case, Clue, Rule, unfit
 from grader.judging.findings import met, not_met, partly
+from grader.judging.source import read
 
-__all__ = ["TraceBuilder", "judge", "met", "not_met", "partly"]
+__all__ = ["TraceBuilder", "explain", "judge", "met", "not_met", "partly"]
 
 #: Order within one instant: the scenario, the grader, the graph, the nodes.
 _PHASE = {Mark: 0, Delivery: 1, GraphSnapshot: 2}
@@ -75,6 +81,50 @@ def _asked(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Fin
     if sources is not None and reads_sources(check):
         return check.judge_sources(trace, sources)
     return check.judge(trace)
+
+
+def explain(
+    rule: Rule, check: Check, trace: Trace, sources: Mapping[str, str], siblings: Sequence[Check] = ()
+) -> Clue | None:
+    """Ask one hint rule about what a check finds in a trace; None if nothing is lost, or the rule does not apply.
+
+    Args:
+        rule: The rule.
+        check: The check; it may be one of the rubric's own.
+        trace: The trace.
+        sources: Text of the students' files by name.
+        siblings: Checks of other criteria of the exercise, if the rule looks at them.
+
+    Raises:
+        ValueError: The check or the rule returned something that cannot be reported.
+    """
+    finding = judge(check, trace, sources)
+    if finding.credit == 1:
+        return None
+    outcome = Outcome.PARTLY if finding.credit else Outcome.NOT_MET
+    # a check of one's own has its name from the rubric, which is not there: it is taken to be the one that is meant
+    known = [name for name, kind in CHECKS.items() if type(check) is kind]
+    meant = [name for name in rule.checks if isinstance(name, str) and name in (known or {name} - CHECKS.keys())]
+    name = next(iter(meant), "")
+    criterion = Criterion("tested", "", Fraction(1), trace.scenario, check, check_name=name)
+    verdict = Verdict(
+        "tested",
+        "",
+        outcome,
+        finding.credit,
+        Fraction(1),
+        finding.reason,
+        hint=finding.hint,
+        location=finding.location,
+        evidence=finding.evidence,
+        problem=finding.problem,
+    )
+    files = {name: read(name, text) for name, text in sources.items()}
+    case = Case(criterion, verdict, trace, files, fault_of(verdict, trace), tuple(siblings), finding.facts)
+    clue = rule.clue(case)
+    if clue is not None and (wrong := unfit(clue, case)):
+        raise ValueError(f"the rule {rule.id}: {wrong}")
+    return clue
 
 
 @dataclass(slots=True)

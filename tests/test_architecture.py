@@ -9,14 +9,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from sample_folders import GROUPS, folders_in
 
 PACKAGE = Path(__file__).resolve().parent.parent / "grader"
 
 #: What pure packages never touch: files, processes, clocks, chance.
 IMPURE = {"os", "subprocess", "socket", "time", "datetime", "random", "threading", "pathlib", "tempfile", "rclpy"}
-#: Modules in pure packages that are not pure: a path is a value in some, one finds the shipped files, others deliver
-#: what has been rendered or read what a platform says in the environment.
+#: Modules in pure packages that are not pure: a path is a value in some, two find what is shipped and rubrics, others
+#: deliver what has been rendered or read what a platform says in the environment.
 EXCUSED = {
+    "core/rubric_files.py": {"os", "pathlib"},
     "core/shipped.py": {"pathlib"},
     "core/submission.py": {"pathlib"},
     "reporting/delivery.py": IMPURE,
@@ -228,7 +230,8 @@ def test_no_file_names_a_place_on_one_machine() -> None:
     )
     if listed.returncode != 0:
         pytest.skip("this is no checkout")
-    names = [name for name in listed.stdout.splitlines() if not name.startswith("tests/submissions/")]
+    written = tuple(f"{place.relative_to(PACKAGE.parent)}/" for place in folders_in(*GROUPS))
+    names = [name for name in listed.stdout.splitlines() if not name.startswith(written)]
     texts = {name: (PACKAGE.parent / name) for name in names if name != "tests/test_architecture.py"}
     assert [n for n, p in texts.items() if p.exists() and names_a_home(p.read_text(encoding="utf-8"))] == []
 
@@ -245,3 +248,31 @@ def test_a_place_on_one_machine_is_recognised(place: str) -> None:
 def test_places_that_every_machine_has_are_none(place: str) -> None:
     """Neither are paths inside a sandbox."""
     assert not names_a_home(place)
+
+
+#: What asks checks for their roles and facts instead of knowing their classes.
+KNOWS_NO_CHECK = (
+    "judging/diagnosis/__init__.py",
+    "judging/diagnosis/rules.py",
+    "judging/plots.py",
+    "judging/figures.py",
+    "rubrics/check_parameters.py",
+)
+
+
+def test_the_engine_of_hint_rules_and_the_charts_know_no_check() -> None:
+    """A check declares what its parameters are, and hands typed facts to rules."""
+    for name in KNOWS_NO_CHECK:
+        assert [module for module in imports_of(PACKAGE / name) if module.startswith("grader.judging.checks")] == []
+
+
+def test_no_hint_rule_reads_the_evidence_of_reports() -> None:
+    """That is JSON for readers of reports; what rules need is in typed facts."""
+    rules = sorted((PACKAGE / "judging" / "diagnosis").glob("*.py"))
+    reads = [
+        f"{path.name}:{node.lineno}"
+        for path in rules
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.Attribute) and node.attr == "evidence" and path.name != "__init__.py"
+    ]
+    assert reads == []

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 from process_table import Running, read, running, students_of
+from sample_folders import folder_of
 
-SUBMISSIONS = Path(__file__).resolve().parent / "submissions"
 GRADE = str(Path(sys.executable).with_name("grade"))
 
 pytestmark = pytest.mark.ros
@@ -133,8 +133,9 @@ BAD = {
 @pytest.mark.parametrize("name", BAD)
 def test_bad_code_ends_in_a_report(scratch: Path, name: str) -> None:
     """What went wrong is in it; the command ends by itself and leaves nothing behind."""
-    exercise = exercise_of(SUBMISSIONS / "broken" / name)
-    code, out, err = run(scratch, SUBMISSIONS / "broken" / name, "--exercise", exercise, "--json")
+    submission = folder_of(f"broken/{name}")
+    exercise = exercise_of(submission)
+    code, out, err = run(scratch, submission, "--exercise", exercise, "--json")
     report = json.loads(out)
     assert code in (0, 1), err
     assert report["final"] is True

@@ -9,13 +9,14 @@ from grader.app.request import GradeRequest
 from grader.app.start import grade
 from grader.judging.checks import CHECKS
 from grader.judging.run_check import check_name
+from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 
 ROOT = Path(__file__).resolve().parent.parent
 REAL = ROOT / "tests" / "real_checks"
 NODES = ROOT / "tests" / "execution" / "service_nodes"
 #: Rubrics that are asked of real nodes, here or in the tests of whole submissions.
-RUBRICS = [p for p in (*(ROOT / "rubrics").glob("*.yaml"), *REAL.glob("*.yaml")) if ".selftest." not in p.name]
+RUBRICS = [p for p in (*builtin_rubrics().values(), *REAL.glob("*.yaml")) if ".selftest." not in p.name]
 RUBRICS += [p.parent / f"{p.parent.name}.yaml" for p in (ROOT / "examples").glob("*/README.md")]
 
 

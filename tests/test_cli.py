@@ -25,6 +25,7 @@ from grader.cli import interactive, main
 from grader.core import errors
 from grader.core.exercise import Outcome
 from grader.core.report import Report
+from grader.core.scenario import ODOMETRY
 
 
 class Session:
@@ -88,7 +89,7 @@ def test_every_option_reaches_the_session(run_session: Session) -> None:
             exercises=("b", "a"),
             rubrics=(Path("r1.yaml"), Path("r2.yaml")),
             seed=5,
-            odom_bag=Path("bag"),
+            bags=((ODOMETRY, Path("bag")),),
             clock="wall",
             isolation="none",
             time_budget_s=20,

@@ -14,8 +14,11 @@ from pathlib import Path
 import click
 import generated
 import pytest
+from sample_folders import GOLDEN, collections
 
+from grader import api
 from grader.cli.main import app
+from grader.core.rubric_files import rubric_file
 from grader.judging.checks import CHECKS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -26,6 +29,7 @@ DOCUMENTS = [
     "ROADMAP.md",
     "SECURITY.md",
     *sorted(p.relative_to(ROOT).as_posix() for p in (ROOT / "docs").rglob("*.md")),
+    *sorted(p.relative_to(ROOT).as_posix() for p in (ROOT / "rubrics").glob("*/README.md")),
 ]
 
 _LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -63,7 +67,7 @@ def missing(text: str, folder: Path) -> list[str]:
     text = _ONLY_SITE.sub("", text)
     made = [f"examples/{exercise}.html" for exercise in generated.EXAMPLES]
     dead = [target for target in links(text) if not (folder / target).exists() and target not in made]
-    named = [path for path in paths(text) if not _SCHEMA.search(path)]
+    named = [str(rubric_file(Path(path))) for path in paths(text) if not _SCHEMA.search(path)]
     return dead + [path for path in named if not any(ROOT.glob(path.rstrip("/")))]
 
 
@@ -78,7 +82,7 @@ def test_what_does_not_exist_is_found() -> None:
     """A link, a path, a path inside a command, one of several, and a pattern that fits nothing."""
     text = (
         "[a](docs/none.md#part) [b](README.md) [c](https://a.b/c) `grader/none.py` `python tests/none.py --all`"
-        " `grader/student_host/{clock,none}.py` `rubrics/*.none` `rubrics/*.yaml` `out/grader/x.py`"
+        " `grader/student_host/{clock,none}.py` `rubrics/*.none` `rubrics/*/*.yaml` `out/grader/x.py`"
     )
     wanted = ["docs/none.md", "grader/none.py", "tests/none.py", "grader/student_host/none.py", "rubrics/*.none"]
     assert missing(text, ROOT) == wanted
@@ -146,8 +150,8 @@ def _said() -> str:
                 texts.append(node.value)
             elif isinstance(node, ast.JoinedStr):
                 texts.append("".join(str(p.value) if isinstance(p, ast.Constant) else "..." for p in node.values))
-    golden = (ROOT / "tests" / "submissions" / "golden.yaml").read_text(encoding="utf-8")
-    return "\n".join([*texts, golden])
+    golden = [(collection / GOLDEN).read_text(encoding="utf-8") for collection in collections()]
+    return "\n".join([*texts, *golden])
 
 
 def _messages() -> list[str]:
@@ -189,7 +193,7 @@ def test_an_old_part_is_noticed() -> None:
 
 def test_the_site_names_every_command_option_check_and_key() -> None:
     """The pages are made from the code; nothing of it is left out."""
-    commands, checks, grammar, gallery, examples = (make() for make in generated.NAMES.values())
+    commands, checks, grammar, gallery, examples, interface = (make() for make in generated.NAMES.values())
     for name, command in app.commands.items():
         described = [parameter for parameter in command.params if not getattr(parameter, "hidden", False)]
         options = [option for parameter in described for option in parameter.opts if option.startswith("--")]
@@ -199,6 +203,7 @@ def test_the_site_names_every_command_option_check_and_key() -> None:
     assert [
         word for word in ("just_above", "stimuli", "cancel_after", "some_of", "copies") if f"`{word}`" not in grammar
     ] == []
+    assert [name for name in api.__all__ if f"\n### `{name}`\n" not in interface] == []
     assert [name for name in generated.exercises() if f'<a id="{name}"></a>' not in gallery] == []
     assert [
         p.parent.name for p in ROOT.glob("examples/*/README.md") if f'<a id="{p.parent.name}"></a>' not in examples

@@ -13,9 +13,10 @@ from typing import Any
 
 import pytest
 from _pytest.mark import ParameterSet
-from archive import SEED, SUBMISSIONS, expected, golden, outcomes, told
+from archive import SEED, outcomes, told
 from grading import grade_until_decided, say_nothing
 from process_table import running, students_of
+from sample_folders import expected, folder_of, golden
 
 from grader.app.request import GradeRequest
 from grader.app.start import grade
@@ -55,7 +56,7 @@ def live() -> Iterator[ParameterSet]:
 def test_a_submission_gets_what_it_is_worth(folder: str) -> None:
     """A correct node loses nothing however it is written; a wrong one loses what it got wrong."""
     wanted = expected()[folder]
-    report = grade_until_decided(GradeRequest(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"]), seed=SEED))
+    report = grade_until_decided(GradeRequest(str(folder_of(folder)), exercises=tuple(wanted["graded"]), seed=SEED))
     assert outcomes(report) == wanted["expected"], reasons(report)
     steady = folder not in UNSTEADY and all(exercise.clock.value == "virtual" for exercise in report.exercises)
     # The exception of this one is raised inside rclpy, in the words of the release.

@@ -51,7 +51,7 @@ def desk(tmp_path: Path) -> Path:
     """Return a folder with a class, a submission, a rubric and a solution, under the names that the pages use."""
     solution = ROOT / "reference_solutions" / "velocity_publisher.py"
     shutil.copy(solution, tmp_path / "solution.py")
-    shutil.copy(ROOT / "rubrics" / "exercise_1.yaml", tmp_path / "mine.yaml")
+    shutil.copy(ROOT / "rubrics" / "exercise_1" / "rubric.yaml", tmp_path / "mine.yaml")
     for folder in ("ada", "FOLDER", "SUBMISSION", "class/1 - Ada Lovelace", "class/2 - Bob", "."):
         (tmp_path / folder).mkdir(parents=True, exist_ok=True)
         shutil.copy(solution, tmp_path / folder / "velocity_publisher.py")

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sample_folders import folder_of, folders_in
 from verifying import GRADE, differences, verified, written
 
 pytestmark = [pytest.mark.ros, pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="there is one processor only")]
 
 ROOT = Path(__file__).parents[1]
-SUBMISSIONS = ROOT / "tests" / "submissions"
 WITH_THREADS = ("threading", "MultiThreadedExecutor", "ThreadPool")
 EXECUTORS = ["MultiThreadedExecutor()", "MultiThreadedExecutor(num_threads=2)", "SingleThreadedExecutor()"]
 #: What a node does, in its constructor. `say` logs, `group()` makes a reentrant callback group.
@@ -81,10 +81,10 @@ def folder() -> Iterator[Path]:
 def with_threads() -> list[str]:
     """Return the test submissions that use threads, as `correct/NAME`."""
     found = []
-    for place in sorted(SUBMISSIONS.glob("*/*")):
+    for place in folders_in("broken", "correct", "threads", "wrong"):
         texts = [path.read_text(encoding="utf-8", errors="replace") for path in place.rglob("*.py")]
         if any(word in text for text in texts for word in WITH_THREADS):
-            found.append(place.relative_to(SUBMISSIONS).as_posix())
+            found.append(f"{place.parent.name}/{place.name}")
     return found
 
 
@@ -108,7 +108,7 @@ def test_what_a_program_does(folder: Path, names: list[str]) -> None:
 @pytest.mark.parametrize("names", sampled(with_threads()))
 def test_what_a_submission_does(names: list[str]) -> None:
     """So that outcomes, reasons, hints and charts are the same as well."""
-    code, found = verified([str(SUBMISSIONS / name) for name in names], "--condition", "processors")
+    code, found = verified([str(folder_of(name)) for name in names], "--condition", "processors")
     assert (code, differences(found)) == (0, {})
 
 

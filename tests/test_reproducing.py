@@ -8,11 +8,12 @@ import pytest
 from click.testing import CliRunner
 
 from grader.app import start
+from grader.app.bags import recording_digest
 from grader.app.grade import read_exercises
-from grader.app.request import GradeRequest, command_words, recording_digest, reproduction
+from grader.app.request import GradeRequest, command_words, reproduction
 from grader.cli import main
-from grader.core.scenario import TimedMessage
-from grader.execution.bag import Odometry
+from grader.core.scenario import ODOMETRY, TimedMessage
+from grader.execution.bag import Recording
 
 
 def test_the_seed_is_named_even_if_nobody_asked_for_one() -> None:
@@ -27,7 +28,7 @@ def test_every_option_that_the_result_depends_on_comes_back(monkeypatch: pytest.
         exercises=("b", "a"),
         rubrics=(Path("r 1.yaml"), Path("r2.yaml")),
         seed=7,
-        odom_bag=Path("bag"),
+        bags=((ODOMETRY, Path("bag")), ("/scan", Path("a b")), ("sensor_msgs/msg/Imu", Path("c"))),
         clock="wall",
         isolation="none",
         time_budget_s=20.5,
@@ -54,7 +55,7 @@ def test_a_path_is_taken_for_nothing_else() -> None:
 def test_every_rubric_has_its_digest() -> None:
     """A changed rubric gives another report, and one sees which it was."""
     exercises = read_exercises(GradeRequest("x"))
-    found = reproduction(GradeRequest("x"), exercises, None, 7)
+    found = reproduction(GradeRequest("x"), exercises, "", 7)
     assert found.rubrics == tuple((e.id, e.digest) for e in exercises)
     assert found.recording == ""
 
@@ -62,7 +63,7 @@ def test_every_rubric_has_its_digest() -> None:
 def test_the_digest_of_a_recording_is_that_of_what_is_played() -> None:
     """Any other time, byte or topic gives another one."""
     message = TimedMessage(5, b"ab", {})
-    recording = Odometry("/odom", (message, replace(message, t_ns=9)))
+    recording = Recording("/odom", ODOMETRY, (message, replace(message, t_ns=9)))
     digests = {
         recording_digest(recording),
         recording_digest(replace(recording, topic="/o")),

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.grade import read_exercises, read_recording
+from grader.app.bags import read_given, read_recordings
+from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest
 from grader.app.start import grade, may_run, opened_early
 from grader.core.errors import RecordingError, RubricError, SubmissionError
 from grader.core.exercise import Location, Outcome
+from grader.core.scenario import ODOMETRY
 from grader.execution.ros_installation import find_ros
 from grader.rubrics.builtin import builtin_rubrics, exercise_ids
 
@@ -91,14 +93,13 @@ def test_a_worker_is_started_for_every_file_of_an_exercise(id_: str, tmp_path: P
 def test_the_recording_is_read_only_where_it_is_played(tmp_path: Path) -> None:
     """Exercise 1 plays none; a recording that was named must be usable all the same."""
     first = GradeRequest("x", exercises=("velocity_publisher",))
-    assert read_recording(first, read_exercises(first)) is None
+    assert read_recordings(first, read_exercises(first)) == {}
     second = GradeRequest("x", exercises=("odom_subscriber",))
-    recording = read_recording(second, read_exercises(second))
-    assert recording is not None
+    (recording,) = read_recordings(second, read_exercises(second)).values()
     assert recording.topic == "/odom"
-    named = GradeRequest("x", exercises=("velocity_publisher",), odom_bag=tmp_path / "none.mcap")
+    named = GradeRequest("x", exercises=("velocity_publisher",), bags=((ODOMETRY, tmp_path / "none.mcap"),))
     with pytest.raises(RecordingError):
-        read_recording(named, read_exercises(named))
+        read_given(named, read_recordings(named, read_exercises(named)))
 
 
 @pytest.mark.parametrize("name", ["a" * 5000, "a" * 5000 + ".py", "a\0b", "a\0b.py", ""])

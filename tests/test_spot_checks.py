@@ -263,7 +263,7 @@ def graded(tmp_path: Path, file: Path, hear: Progress = say_nothing, **options: 
     folder.mkdir(exist_ok=True)
     shutil.copy(file, folder / "velocity_publisher.py")
     rubric = tmp_path / "rubric.yaml"
-    text = (HERE.parents[1] / "rubrics" / "exercise_1.yaml").read_text(encoding="utf-8")
+    text = (HERE.parents[1] / "rubrics" / "exercise_1" / "rubric.yaml").read_text(encoding="utf-8")
     rubric.write_text(text.replace("10 s", "3 s").replace("60 s", "3 s"), encoding="utf-8")
     return grade_until_decided(GradeRequest(str(folder), rubrics=(rubric,), **options), hear)
 
@@ -303,7 +303,7 @@ def test_what_only_a_rubrics_check_tells_apart_is_found(folder: Path) -> None:
     (file,) = folder.iterdir()
     asked = {"battery_service_server.py": "project_3", "simple_publisher.py": "project_1"}
     asked |= {"odom_subscriber.py": "exercise_2", "velocity_publisher.py": "exercise_1"}
-    rubrics = (HERE.parents[1] / "rubrics" / f"{asked[file.name]}.yaml",)
+    rubrics = (HERE.parents[1] / "rubrics" / asked[file.name] / "rubric.yaml",)
     report = grade_until_decided(GradeRequest(str(folder), rubrics=rubrics, spot_checks=1.0))
     (exercise,) = report.exercises
     assert exercise.clock is ClockKind.WALL

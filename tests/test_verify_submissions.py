@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ruamel.yaml import YAML
+from sample_folders import expected, folder_of
 from verifying import differences, verified
 
 pytestmark = pytest.mark.ros
 
 ROOT = Path(__file__).parents[1]
-SUBMISSIONS = ROOT / "tests" / "submissions"
 #: Submissions that do differ, for reasons that the page about recordings that repeat names: what Python prints about a
 #: mistake shows addresses of objects, or a server is asked more often than its queue can hold.
 DIFFERING = {"broken/service_callback_first", "wrong/battery_sleeps"}
@@ -25,9 +24,8 @@ TAKEN, AT_ONCE = 60, 30
 
 def submissions() -> list[str]:
     """Return the submissions that have a file of an exercise, sorted, so that those of a kind are neighbours."""
-    expected = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
     files = {path.name for path in (ROOT / "reference_solutions").rglob("*.py")}
-    return [name for name in sorted(expected) if any(p.name in files for p in (SUBMISSIONS / name).rglob("*.py"))]
+    return [name for name in sorted(expected()) if any(p.name in files for p in folder_of(name).rglob("*.py"))]
 
 
 def cases() -> list[Any]:
@@ -52,7 +50,7 @@ def written_files_alone(difference: Mapping[str, Any]) -> bool:
 @pytest.mark.parametrize(("names", "condition"), cases())
 def test_submissions_repeat(names: list[str], condition: str) -> None:
     """Those that are recorded in virtual time."""
-    _, found = verified([str(SUBMISSIONS / name) for name in names], "--condition", condition)
+    _, found = verified([str(folder_of(name)) for name in names], "--condition", condition)
     (tried,) = found["conditions"]
     if tried["state"] == "not_tried":
         pytest.skip(tried["why"])

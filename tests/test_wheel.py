@@ -80,11 +80,12 @@ def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel: Path) -> N
     """An instructor needs nothing but the wheel; a student finds no solution in it."""
     names = zipfile.ZipFile(wheel).namelist()
     for needed in (
-        "exercise_1.yaml",
-        "exercise_2.yaml",
-        "exercise_3.yaml",
+        "exercise_1/rubric.yaml",
+        "exercise_1/selftest.yaml",
+        "exercise_2/rubric.yaml",
+        "exercise_3/rubric.yaml",
         "rubric.schema.json",
-        "odometry/metadata.yaml",
+        "exercise_2/odometry/metadata.yaml",
     ):
         assert f"grader/shipped/rubrics/{needed}" in names
     assert "grader/reporting/report.schema.json" in names
@@ -157,6 +158,23 @@ def test_a_failure_of_npm_is_told_in_its_own_words(npm: Path, tmp_path: Path) ->
     npm.write_text("#!/bin/sh\necho no network >&2\nexit 1\n")
     with pytest.raises(RuntimeError, match=r"npm pack: expected echarts@[\s\S]*found:\nno network"):
         HOOK["fetch"](tmp_path / "vendor")
+
+
+def test_an_installed_rubric_has_all_its_names(wheel: Path, tmp_path: Path) -> None:
+    """The folder of its exercise, the file in it, and the file that it was before: each is read, none is a copy."""
+    place = tmp_path / "installed"
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-compile", "--target"]
+    subprocess.run([*pip, str(place), str(wheel)], check=True)
+    rubrics = place / "grader" / "shipped" / "rubrics"
+    names = [rubrics / f"exercise_2{form}" for form in ("", "/rubric.yaml", ".yaml")]
+    code = "from grader.cli.main import main; main()"
+    command = [sys.executable, "-c", code, "rubric", "check", *map(str, names)]
+    environment = {**os.environ, "PYTHONPATH": str(place)}
+    done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=tmp_path, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+    said = f"{names[1]}: odom_subscriber: 1 scenario, 4 criteria, 30 points"
+    assert done.stdout.splitlines() == [said] * 3
+    assert [path.name for path in rubrics.iterdir() if path.is_file()] == ["rubric.schema.json"]
 
 
 @pytest.mark.ros

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from archive import expected, judged, read_archive
+from archive import judged, recordings
 from click.testing import CliRunner
 from ruamel.yaml import YAML
+from sample_folders import expected
 from test_documents import parsed
 
 from grader.cli.main import app
@@ -53,7 +54,7 @@ def wanted(report: Report) -> set[Place]:
 @cache
 def report_of(folder: str) -> Report:
     """Judge what was recorded of a submission."""
-    return judged(read_archive()[folder])
+    return judged(recordings()[folder])
 
 
 @pytest.mark.parametrize("folder", WRONG)

@@ -16,7 +16,9 @@ from playwright.sync_api import Browser, sync_playwright
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-SUBMISSIONS = ROOT / "tests" / "submissions"
+sys.path.append(str(ROOT / "tests"))
+from sample_folders import folder_of  # noqa: E402  where the test submissions are
+
 #: Whose files the report shows: right ones, but for these.
 MISTAKES = ("wrong/velocity_10_hz", "wrong/odom_swapped_xy")
 CLASS = {
@@ -45,9 +47,9 @@ def main() -> None:
         folder = Path(temporary)
         shutil.copytree(ROOT / "reference_solutions", folder / "maria")
         for mistake in MISTAKES:
-            shutil.copytree(SUBMISSIONS / mistake, folder / "maria", dirs_exist_ok=True)
+            shutil.copytree(folder_of(mistake), folder / "maria", dirs_exist_ok=True)
         for name, source in CLASS.items():
-            shutil.copytree(SUBMISSIONS / source, folder / "class" / name)
+            shutil.copytree(folder_of(source), folder / "class" / name)
         (folder / "typed").write_text(SCRIPT, encoding="utf-8")
         words = ["termtosvg", str(HERE / "terminal.svg"), "-c", "bash typed", "-g", "92x32", "-t", "window_frame"]
         with subprocess.Popen(

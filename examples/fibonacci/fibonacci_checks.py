@@ -3,11 +3,14 @@
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
-from grader.core.trace import Trace
-from grader.judging.service_calls import calls_of
-from grader.testing import met, not_met
+from grader.api import Finding, HarnessError, Trace, calls_of, met, not_met
+
+
+@dataclass(frozen=True)
+class ResultFacts:
+    """What hint rules may know of a wrong result."""
+
+    lacking: int  # numbers that are missing at its end, if all others are right; 0 otherwise
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,10 @@ class FibonacciResults:
                 if got != wanted:
                     found, expected = ("none" if n is None else n for n in (got, wanted))
                     reason = f"{self.action}, order {order}: number {place} is {found}, expected {expected}"
-                    return not_met(reason, {"order": order, "sequence": list(result["sequence"][:50])})
+                    numbers, right = list(result["sequence"]), fibonacci(order)
+                    lacking = len(right) - len(numbers) if numbers == right[: len(numbers)] else 0
+                    facts = ResultFacts(lacking)
+                    return not_met(reason, {"order": order, "sequence": numbers[:50]}, facts=facts)
         if compared < self.at_least:
             reason = f"{self.action}: {compared} results, expected at least {self.at_least}"
             return not_met(reason, {"results": compared}, blocked_by="action_result")

@@ -4,8 +4,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from grader.core.quantities import DurationNs
-from grader.simulation import DifferentialDrive, Moment, Output
+from grader.api import DifferentialDrive, DurationNs, Moment, Output
 
 #: The scanner: number of rays, the angle of the outermost ones in rad, and its limits in m.
 RAYS, OUTERMOST, RANGE_MIN, RANGE_MAX = 31, 1.0, 0.05, 6.0

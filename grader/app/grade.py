@@ -7,32 +7,30 @@ import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import grader
+from grader.app.bags import Recordings, read_given, read_recordings, recordings_digest, refuse_unplayed
 from grader.app.interface_packages import Provided, definitions, known_interfaces, provide
-from grader.app.request import GradeRequest, recording_digest, reproduction
+from grader.app.request import GradeRequest, reproduction
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
-from grader.compiled import compiled, state_of
 from grader.core.dataclass import dataclass
 from grader.core.errors import EvidenceError, SubmissionError
 from grader.core.exercise import Exercise, exercise_name
 from grader.core.releases import TRIED
 from grader.core.report import Environment, Report
-from grader.core.shipped import PACKAGE
 from grader.core.submission import Run, Submission
 from grader.core.trace import Trace
-from grader.execution.bag import Odometry, read_odometry
 from grader.execution.plan import plan_scenario
 from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
 from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
-from grader.rubrics.builtin import builtin_exercises, builtin_odometry, exercise_ids
+from grader.rubrics.builtin import builtin_exercises, exercise_ids
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import HASHES, read_reaches, read_sources
 from grader.submissions.submission import stage_collected, stage_submission
@@ -154,12 +152,13 @@ def prepared(
             submission = _staged(request, exercises, root)
         if request.every:
             exercises, submission = begun(exercises, submission)
-        odometry = read_recording(request, exercises)
+        recordings = read_recordings(request, exercises)
+        played = recordings_digest(read_given(request, recordings))
         seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
         environment = _environment(session)
         provided = provide(session, exercises, request.interfaces, submission, request.time_budget_s)
         submission = replace(submission, notes=(*submission.notes, *provided.problems))
-        kept = _kept(request, exercises, submission, odometry, seed, environment, provided.offered)
+        kept = _kept(request, exercises, submission, played, seed, environment, provided.offered)
         done = {exercise for exercise, _ in kept}
         unrecorded = [exercise for exercise in exercises if exercise.id not in done]
         prefixes: tuple[str, ...] = ()
@@ -168,7 +167,7 @@ def prepared(
             submission = replace(submission, notes=(*submission.notes, *problems))
         reaches = read_reaches(submission.root)
         folders, own_hashes = provided.folders, not HASHES.isdisjoint(reaches)
-        jobs = plan_jobs(request, unrecorded, submission, odometry, seed, folders, prefixes, own_hashes=own_hashes)
+        jobs = plan_jobs(request, unrecorded, submission, recordings, seed, folders, prefixes, own_hashes=own_hashes)
         run = Run(
             submission=submission,
             traces=kept,
@@ -177,7 +176,7 @@ def prepared(
             seed=seed,
             duration_s=time.perf_counter() - started,
             notes=(*submission.notes, *_notes(request, session), *provided.notes),
-            reproduce=reproduction(request, exercises, odometry, seed),
+            reproduce=reproduction(request, exercises, played, seed),
             interfaces=provided.packages,
             offered=provided.offered,
         )
@@ -205,7 +204,7 @@ def _kept(  # noqa: PLR0913  all that a recording depends on
     request: GradeRequest,
     exercises: Sequence[Exercise],
     submission: Submission,
-    odometry: Odometry | None,
+    played: str,
     seed: int,
     environment: Environment,
     interfaces: str,
@@ -216,7 +215,7 @@ def _kept(  # noqa: PLR0913  all that a recording depends on
     from grader.app.kept_recordings import PlannedRun, kept_traces, recorded_alike  # noqa: PLC0415 - seldom needed
     from grader.execution.evidence.store import open_evidence  # noqa: PLC0415 - takes long, and is seldom needed
 
-    planned = PlannedRun(submission.digest, seed, "" if odometry is None else recording_digest(odometry), interfaces)
+    planned = PlannedRun(submission.digest, seed, played, interfaces)
     try:
         evidence = open_evidence(request.recordings)
         if evidence.manifest.environment != environment:
@@ -251,32 +250,18 @@ def read_exercises(
         exercises = [read(path) for path in request.rubrics]
     else:
         exercises = list(builtin_exercises())
+    refuse_unplayed(request.bags, exercises)
     chosen = exercise_ids(request.exercises, exercises)
     if request.exercises:
         return [exercise for exercise in exercises if exercise.id in chosen]
     return [e for e in exercises if request.rubrics or request.every or not e.by_request]
 
 
-@cache
-def builtin_recording() -> Odometry:
-    """Return the built-in /odom recording."""
-    folder = builtin_odometry()
-    code = (PACKAGE / name for name in ("execution/bag.py", "core/scenario.py"))
-    return compiled("odometry", state_of([*folder.iterdir(), *code]), lambda: read_odometry(folder))
-
-
-def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odometry | None:
-    """Read the /odom recording if one was given or an exercise plays one."""
-    if request.odom_bag is not None:
-        return read_odometry(request.odom_bag)
-    return builtin_recording() if any(exercise.plays_odometry for exercise in exercises) else None
-
-
 def plan_jobs(  # noqa: PLR0913  each comes from a different stage
     request: GradeRequest,
     exercises: Sequence[Exercise],
     submission: Submission,
-    odometry: Odometry | None,
+    recordings: Recordings,
     seed: int,
     interfaces: Sequence[Path] = (),
     prefixes: tuple[str, ...] = (),
@@ -298,7 +283,7 @@ def plan_jobs(  # noqa: PLR0913  each comes from a different stage
                     scenario,
                     submission,
                     seed=seed,
-                    odometry=odometry,
+                    recordings=recordings,
                     clock=clock,
                     own_hashes=own_hashes,
                 ),

@@ -17,7 +17,7 @@ class PlannedRun:
 
     submission: str  # digest of the submission
     seed: int
-    odometry: str  # digest of the /odom recording; empty if none is played
+    recording: str  # digest of the recordings that are played; empty if there are none
     interfaces: str = ""  # digest of the interface packages of rubric and class; empty if there are none
 
 
@@ -38,7 +38,7 @@ def recorded_alike(evidence: Evidence, exercises: Sequence[Exercise], planned: P
         if exercise.id in asked
         and found.issuperset(exercise.files)
         and all(asked[exercise.id].get(s.id) == scenario_digest(s) for s in exercise.scenarios)
-        and (manifest.run.recording == planned.odometry or not exercise.plays_odometry)
+        and (manifest.run.recording == planned.recording or not exercise.recorded)
     )
 
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 
-from grader.app.grade import Progress, builtin_recording
+from grader.app.bags import observed, recordings_of
+from grader.app.grade import Progress
 from grader.app.inputs import NamedSimulation, SentMessages, messages, simulated
 from grader.app.interface_packages import provide
 from grader.app.programs import find_targets, stage
@@ -16,10 +17,9 @@ from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S
 from grader.core.report import Summary
-from grader.core.scenario import OdometryStream, Scenario, Span, is_launch_file
+from grader.core.scenario import RecordedStream, Scenario, Span, is_launch_file
 from grader.core.submission import Submission
 from grader.core.trace import Trace
-from grader.execution.bag import read_odometry
 from grader.execution.launching import NODES
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import open_session, planned_clock
@@ -29,8 +29,8 @@ from grader.judging.summary import summarise
 from grader.judging.values import student_endpoints
 from grader.submissions.sources import source_text
 
-#: When a given recording starts playing; before that the nodes receive no odometry.
-ODOMETRY_AFTER_NS = NS_PER_S
+#: When a given recording starts playing; before that the nodes receive nothing of it.
+RECORDED_AFTER_NS = NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class ObserveRequest:
     # Python files, launch files, packages, workspaces and executables as `FOLDER/NAME`; each runs in its own process
     files: tuple[Path, ...]
     duration_ns: int = 10 * NS_PER_S  # how long they are observed
-    odom_bag: Path | None = None  # an /odom recording to play; None for no odometry
+    bags: tuple[tuple[str, Path], ...] = ()  # recordings to play: `(topic or message type, path)`
     clock: str = "auto"  # `virtual`, `wall` or `auto`
     isolation: str = "auto"  # `auto` or `none`
     interfaces: tuple[Path, ...] = ()  # folders with interface packages
@@ -83,14 +83,12 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
     names = [target.name for target in targets]
     if scenario is None:
         scenario = undisturbed(request, names)
-    plays = any(isinstance(stimulus, OdometryStream) for stimulus in scenario.stimuli)
-    odometry = None
-    if plays:
-        odometry = builtin_recording() if request.odom_bag is None else read_odometry(request.odom_bag)
+    streams = [stimulus for stimulus in scenario.stimuli if isinstance(stimulus, RecordedStream)]
+    recordings = recordings_of(streams, request.interfaces)
     with open_session(request.isolation, progress=progress) as session:
         submission = stage(targets, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
-        plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
+        plan = plan_scenario("observe", scenario, submission, seed=seed, recordings=recordings, clock=clock)
         provided = provide(session, (), request.interfaces, submission)
         installed = session.folder / "installed"
         prefixes, _ = install_shares(submission.root, submission.projects, installed, session.ros)
@@ -114,8 +112,8 @@ def _sources(trace: Trace, submission: Submission) -> dict[str, str]:
 
 def undisturbed(request: ObserveRequest, names: Sequence[str]) -> Scenario:
     """Return the scenario of programs with the simulations and the recording of a request, and no messages."""
-    stream = OdometryStream("/odom", ODOMETRY_AFTER_NS, max(NS_PER_S, request.duration_ns - ODOMETRY_AFTER_NS))
-    stimuli = (*simulated(request.simulations, request.interfaces), *((stream,) if request.odom_bag else ()))
+    played = observed(request.bags, RECORDED_AFTER_NS, max(NS_PER_S, request.duration_ns - RECORDED_AFTER_NS))
+    stimuli = (*simulated(request.simulations, request.interfaces), *played)
     launched = sum(map(is_launch_file, names)) * NODES
     limits = Limits(participants=Limits().participants + len(names) + launched)
     return Scenario("observed", tuple(names), Span(request.duration_ns), stimuli, limits=limits)

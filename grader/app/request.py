@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,10 +12,10 @@ from grader.core.dataclass import dataclass
 from grader.core.exercise import Drawn, Exercise
 from grader.core.limits import TIME_BUDGET_S
 from grader.core.report import JsonObject, Reproduction
+from grader.core.scenario import ODOMETRY
 from grader.rubrics.draws import Draw, Recorded
 
 if TYPE_CHECKING:
-    from grader.execution.bag import Odometry
     from grader.submissions.collected import Collected
 
 
@@ -32,7 +31,8 @@ class GradeRequest:
     rubrics: tuple[Path, ...] = ()  # rubric files; empty for the built-in ones
     seed: int | None = None  # seed of all drawn values; None derives it from the submission and the seed key
     seed_key: SeedKey = PRACTICE  # the key to derive the seed with
-    odom_bag: Path | None = None  # an /odom recording to play instead of the built-in one
+    # Recordings to play instead of those of the rubrics: `(name, path)`, where the name is a topic or a message type
+    bags: tuple[tuple[str, Path], ...] = ()
     clock: str = "auto"  # `virtual`, `wall` or `auto`
     isolation: str = "auto"  # `auto`, `none` or the name of a tier
     time_budget_s: float = TIME_BUDGET_S  # real time that all recordings together may take
@@ -50,14 +50,15 @@ class GradeRequest:
     draw: Draw | None = None  # supplies variant values; if None, rubrics with variants are refused
 
 
-def reproduction(
-    request: GradeRequest, exercises: Sequence[Exercise], odometry: Odometry | None, seed: int
-) -> Reproduction:
-    """Return the command that reproduces a report, with digests of all that it reads besides the submission."""
+def reproduction(request: GradeRequest, exercises: Sequence[Exercise], played: str, seed: int) -> Reproduction:
+    """Return the command that reproduces a report, with digests of all that it reads besides the submission.
+
+    `played` is the digest of the recordings that are played.
+    """
     return Reproduction(
         command=command_words(request, seed),
         rubrics=tuple((exercise.id, exercise.digest) for exercise in exercises),
-        recording="" if odometry is None else recording_digest(odometry),
+        recording=played,
     )
 
 
@@ -75,8 +76,8 @@ def command_words(request: GradeRequest, seed: int) -> tuple[str, ...]:
         words += ["--student", request.student]
     if request.variant_key is not None:
         words += ["--variant-key", str(request.variant_key)]
-    if request.odom_bag is not None:
-        words += ["--odom-bag", str(request.odom_bag)]
+    for name, path in request.bags:
+        words += ["--odom-bag", str(path)] if name == ODOMETRY else ["--recording", f"{name}={path}"]
     for folder in request.interfaces:
         words += ["--interfaces", str(folder)]
     if request.clock != "auto":
@@ -90,14 +91,6 @@ def command_words(request: GradeRequest, seed: int) -> tuple[str, ...]:
     return tuple(words)
 
 
-def recording_digest(odometry: Odometry) -> str:
-    """Return `sha256:` over the topic, times and bytes of a recording; independent of the storage format."""
-    digest = hashlib.sha256(f"{odometry.topic}\n".encode())
-    for message in odometry.messages:
-        digest.update(f"{message.t_ns} {len(message.cdr)}\n".encode() + message.cdr)
-    return f"sha256:{digest.hexdigest()}"
-
-
 def _unambiguous_path(path: str) -> str:
     """Return a path that cannot be mistaken for an option or a subcommand."""
     return path if os.sep in path or path in (".", "..") else os.path.join(".", path)  # noqa: PTH118  a bare ./
@@ -105,9 +98,11 @@ def _unambiguous_path(path: str) -> str:
 
 def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -> JsonObject:
     """Convert to JSON what reproduces a report besides path, seed and rubrics, and add the variant values."""
+    bags = dict(request.bags)
     return {
         "exercises": list(request.exercises),
-        "odom_bag": None if request.odom_bag is None else str(request.odom_bag),
+        "odom_bag": str(bags.pop(ODOMETRY)) if ODOMETRY in bags else None,
+        **({"recordings": {name: str(path) for name, path in bags.items()}} if bags else {}),
         "clock": request.clock,
         "isolation": request.isolation,
         "student": request.student,
@@ -120,12 +115,13 @@ def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -
 def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> GradeRequest:
     """Return the request that would record a kept run again and judge it by these rubrics."""
     bag, key, student = data.get("odom_bag"), data.get("variant_key"), str(data.get("student", ""))
+    bags = {**({ODOMETRY: bag} if bag is not None else {}), **data.get("recordings", {})}
     return GradeRequest(
         submission=submission,
         exercises=tuple(str(id_) for id_ in data.get("exercises", ())),
         rubrics=rubrics,
         seed=seed,
-        odom_bag=Path(str(bag)) if bag is not None else None,
+        bags=tuple((str(name), Path(str(path))) for name, path in bags.items()),
         clock=str(data.get("clock", "auto")),
         isolation=str(data.get("isolation", "auto")),
         student=student,

@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from grader.core.rubric_files import rubrics_in
 from grader.core.shipped import shipped
 from grader.execution.inert import is_runnable
 from grader.execution.recording_session import RecordingSession, open_session
@@ -73,7 +74,7 @@ def may_run(submission: str, rubrics: Sequence[Path] = ()) -> bool:
     place, is_folder = Path(submission), os.path.isdir(submission)  # noqa: PTH112 - False for any unusable name
     if rubrics or not (is_folder or place.suffix == ".py"):
         return True
-    texts = (path.read_text(encoding="utf-8") for path in shipped("rubrics").glob("*.yaml"))
+    texts = (path.read_text(encoding="utf-8") for path in rubrics_in(shipped("rubrics")))
     wanted = {name.strip() for text in texts for found in _FILES.findall(text) for name in found.split(",")}
     if not is_folder:
         return place.name in wanted and is_runnable(place)

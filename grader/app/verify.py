@@ -149,7 +149,7 @@ def _subject(request: VerifyRequest, path: str, into: Path, evidence: Evidence |
     asked = replace(
         how,
         exercises=tuple(exercise.id for exercise in exercises),
-        odom_bag=None if how.odom_bag is None else how.odom_bag.absolute(),
+        bags=tuple((name, path.absolute()) for name, path in how.bags),
         interfaces=tuple(folder.absolute() for folder in how.interfaces),
     )
     given = json.dumps(request_to_json(asked, exercises))

@@ -10,12 +10,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from grader.app.bags import recordings_of
 from grader.app.interface_packages import known_interfaces
 from grader.core.dataclass import dataclass
-from grader.core.errors import HarnessError, RubricError
+from grader.core.errors import HarnessError, RecordingError, RubricError
 from grader.core.exercise import Criterion, Exercise
 from grader.core.quantities import duration
-from grader.core.scenario import Scenario, Simulated, is_launch_file, shortest
+from grader.core.scenario import RecordedStream, Scenario, Simulated, is_launch_file, shortest
 from grader.judging.checks import CHECKS
 from grader.rubrics.check_parameters import manual_of
 from grader.rubrics.draws import First
@@ -171,9 +172,23 @@ class Checked:
 def check_rubric(path: Path, course: tuple[Path, ...] = ()) -> Checked:
     """Check a rubric, which may use the interface packages of a course; raises RubricError with every mistake."""
     exercise = read_rubric(path, draw=First(), interfaces=known_interfaces(course))
+    _read_recordings(path, exercise)
     where = shown(str(path), 500)
     odd = oddities(exercise, read_yaml(path.read_text(encoding="utf-8-sig")))
     return Checked(f"{where}: {_summary(exercise)}", tuple(f"{where}:{m.line}:{m.column}: {m.text}" for m in odd))
+
+
+def _read_recordings(path: Path, exercise: Exercise) -> None:
+    """Read what the scenarios play, as grading does; raises RubricError, with the place of the stimulus."""
+    tree = read_yaml(path.read_text(encoding="utf-8-sig"))
+    for index, scenario in enumerate(exercise.scenarios):
+        for number, stimulus in enumerate(scenario.stimuli):
+            if isinstance(stimulus, RecordedStream) and stimulus.bag:
+                where = tree.at(("scenarios", index, "stimuli", number, "recorded", "bag"))
+                try:
+                    recordings_of([stimulus], tuple(map(Path, exercise.interfaces)))
+                except RecordingError as error:
+                    raise RubricMistakes(shown(str(path), 500), [where.mistake(error.message, error.hint)]) from None
 
 
 def complaints(error: RubricError) -> list[str]:

@@ -27,7 +27,7 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError, RubricError, SubmissionError
 from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S, seconds
-from grader.core.scenario import Scenario, Simulated
+from grader.core.scenario import ODOMETRY, Scenario, Simulated
 from grader.core.trace import FaultKind, Trace
 from grader.judging.checks import CHECKS
 from grader.judging.findings import fault_sentence
@@ -36,7 +36,6 @@ from grader.judging.wording import quote
 from grader.rubrics.loader import RubricMistakes, read_rubric
 from grader.rubrics.simulations import offered
 
-ODOMETRY = "nav_msgs/msg/Odometry"
 _VALUES = (1, 2, 3, 4)
 _CALLS = 3
 NO_FILES: Mapping[str, Path] = MappingProxyType({})
@@ -71,7 +70,7 @@ def _topics(trace: Trace, duration_s: float, given: SentMessages, simulated: fro
 def _messages(topic: str, type_: str, duration_s: float) -> DraftStimulus:
     start = in_seconds(FIRST_S)
     left_s = duration_s - FIRST_S
-    if type_ == ODOMETRY:
+    if type_ == ODOMETRY:  # a recording of this type ships with the grader
         played = {"topic": topic, "start": start, "duration": in_seconds(max(1.0, left_s - 1))}
         return DraftStimulus("odometry", played, "decide: how long is it silent before and after?")
     if carries_number(type_):

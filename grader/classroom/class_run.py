@@ -16,9 +16,10 @@ from functools import partial
 from pathlib import Path
 
 import grader
-from grader.app.grade import read_exercises, read_recording, wanted_files
+from grader.app.bags import read_given, read_recordings, recordings_digest
+from grader.app.grade import read_exercises, wanted_files
 from grader.app.interface_packages import offered_digest
-from grader.app.request import GradeRequest, recording_digest
+from grader.app.request import GradeRequest
 from grader.app.seeds import kept_key
 from grader.classroom.adjustments import Adjustments, read_adjustments, with_criteria
 from grader.classroom.class_page import RunOfClass, folders_of, links_between, title_of, without_folders
@@ -147,11 +148,10 @@ def _kept_options(course: ClassRequest, adjustments: Adjustments) -> LastRun:
 
 def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Conditions:
     """Collect what all results of a class depend on; raises RecordingError for an unusable recording."""
-    odometry = read_recording(grading, exercises)
     return Conditions(
         grader=grader.__version__,
         rubrics=tuple((exercise.id, exercise.digest) for exercise in exercises),
-        recording="" if odometry is None else recording_digest(odometry),
+        recording=recordings_digest(read_given(grading, read_recordings(grading, exercises))),
         seed=grading.seed,
         clock=grading.clock,
         isolation=grading.isolation,

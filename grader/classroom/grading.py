@@ -163,7 +163,8 @@ class ClassRun:
         Raises EnvironmentFault if nothing can be graded here, HarnessError if a disk is full; results so far are kept.
         """
         left = {entry.name for entry in due}
-        self._note(left)
+        if self.course.rerun != CHANGED:  # new or changed submissions are found without a note
+            self.store.note_pending(self.course.rerun, left)
         for entry in due:
             if entry.name in self.refusals:
                 status = refused(entry.label, self.conditions[entry.name], self.refusals[entry.name])
@@ -221,14 +222,10 @@ class ClassRun:
         self.store.remember(name, fresh, status)
         replaced = self.store.commit(name, fresh, status)
         left.discard(name)
-        self._note(left)
+        if self.course.rerun != CHANGED:
+            self.store.note_done(name, last=not left)
         self.watcher.done(name, status)
         return replaced
-
-    def _note(self, left: set[str]) -> None:
-        """Store which submissions `--rerun` still has to grade; new or changed ones are found without a note."""
-        if self.course.rerun != CHANGED:
-            self.store.note_pending(self.course.rerun, left)
 
     def _task(self, entry: HandedInEntry) -> Task:
         grading = self.course.grading
@@ -240,7 +237,7 @@ class ClassRun:
             into=self.store.fresh(entry.name).resolve(),
             exercises=grading.exercises,
             rubrics=grading.rubrics,
-            odom_bag=grading.odom_bag,
+            bags=grading.bags,
             conditions=self.conditions[entry.name],
             variant_key=grading.variant_key,
             interfaces=grading.interfaces,

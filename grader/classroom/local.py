@@ -37,7 +37,7 @@ class Task:
     into: Path  # destination folder for the files of `worker.PARTS`; must not exist yet
     exercises: tuple[str, ...]  # exercise ids to grade; empty for all exercises of the rubrics
     rubrics: tuple[Path, ...]  # rubric files; empty for the built-in ones
-    odom_bag: Path | None  # an /odom recording to play instead of the built-in one
+    bags: tuple[tuple[str, Path], ...]  # recordings to play instead of those of the rubrics; see `GradeRequest`
     conditions: Conditions  # what the result depends on besides the submission
     workers: int  # most scenarios recorded in parallel
     standalone: bool  # whether the HTML report includes its scripts, instead of sharing them with the class
@@ -124,7 +124,7 @@ class LocalScheduler:
         """Yield an attempt for each task; see `ClassScheduler`."""
         # The kernel kills a worker when the thread that started it ends, so the threads live until all tasks are done.
         pool = ThreadPoolExecutor(self._jobs + self._on_wall_clock, thread_name_prefix="batch")
-        places, waiting = threading.Semaphore(self._jobs), deque(tasks)
+        places, waiting = threading.Semaphore(self._jobs), _Waiting(tasks)
         try:
             for future in as_completed([pool.submit(self._next, waiting, on_step, places) for _ in tasks]):
                 yield future.result()
@@ -132,7 +132,7 @@ class LocalScheduler:
             self._close()
             pool.shutdown(wait=True, cancel_futures=True)
 
-    def _next(self, waiting: deque[Task], on_step: OnStep, places: threading.Semaphore) -> Attempt:
+    def _next(self, waiting: _Waiting, on_step: OnStep, places: threading.Semaphore) -> Attempt:
         with _Place(places) as place, self._next_task(waiting) as task:
             on_step(task.name, "starting")
             process = self._idle_one()
@@ -149,12 +149,10 @@ class LocalScheduler:
             return self._attempt(process, task, on_step, place, waiting)
 
     @contextmanager
-    def _next_task(self, waiting: deque[Task]) -> Iterator[Task]:
+    def _next_task(self, waiting: _Waiting) -> Iterator[Task]:
         """Take the task that is graded next, and count it while it is graded."""
         with self._lock:
-            wanted = self._checks < max(1, self._on_wall_clock)
-            task = next((task for task in waiting if task.spot_check == wanted), waiting[0])
-            waiting.remove(task)
+            task = waiting.take(drawn=self._checks < max(1, self._on_wall_clock))
             self._checks += task.spot_check
         try:
             yield task
@@ -163,7 +161,7 @@ class LocalScheduler:
                 self._checks -= task.spot_check
 
     def _attempt(
-        self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place, waiting: Sequence[Task]
+        self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place, waiting: _Waiting
     ) -> Attempt:
         """Grade in a process, and keep it for the next submission unless it failed, or others have taken its place."""
         overdue, status = threading.Event(), None
@@ -180,7 +178,7 @@ class LocalScheduler:
         finally:
             timer.cancel()
             with self._lock:
-                kept = place.taken or any(other.spot_check for other in waiting)
+                kept = place.taken or bool(waiting.drawn)
                 if kept := kept and status is not None and status.state is not State.FAILED:
                     self._idle.append(process)
             if not kept:
@@ -256,6 +254,19 @@ class LocalScheduler:
             _kill(process)
         for process in idle:
             self._end(process)
+
+
+class _Waiting:
+    """The tasks that nobody has begun, those that are drawn for a spot check apart from the others."""
+
+    def __init__(self, tasks: Sequence[Task]) -> None:
+        self.drawn = deque(task for task in tasks if task.spot_check)
+        self._others = deque(task for task in tasks if not task.spot_check)
+
+    def take(self, *, drawn: bool) -> Task:
+        """Take the next task, of the wanted ones while there are any."""
+        wanted, others = (self.drawn, self._others) if drawn else (self._others, self.drawn)
+        return (wanted or others).popleft()
 
 
 class _Place:

@@ -26,14 +26,22 @@ _Message = TypeVar("_Message", "Terms", "GradingJob", "JobResult", "Fitness", "_
 
 
 @dataclass(frozen=True, slots=True)
+class SentBag:
+    """A recording to play instead of that of a rubric."""
+
+    name: str  # the topic or message type whose recording it replaces
+    path: bytes  # its relative path
+    files: Files  # its files, by their paths below it; a recording in a single file has an empty path
+
+
+@dataclass(frozen=True, slots=True)
 class Terms:
     """What all submissions of a class are graded with."""
 
     conditions: Conditions  # what the results depend on
     exercises: tuple[str, ...]  # exercise ids to grade; empty for all exercises of the rubrics
     rubrics: Files  # relative path and content of each rubric file; empty for the built-in ones
-    odom_bag: bytes  # relative path of an /odom recording; empty for the built-in one
-    recording: Files  # its files, by their paths below it; a recording in a single file has an empty path
+    bags: tuple[SentBag, ...]  # recordings to play instead of those of the rubrics
     standalone: bool  # whether each HTML report includes its scripts
     deadline_s: float  # real time after which an attempt is killed
     checks: Files = ()  # relative path and content of the files that rubrics and class bring

@@ -169,8 +169,11 @@ class Store:
     def pending(self, rerun: str) -> frozenset[str] | None:
         """Return the names that a stopped run still had to grade; None if there was no such run."""
         try:
-            noted = json.loads((self.folder / _PENDING).read_bytes())
-            return frozenset(map(str, noted["names"])) if noted["rerun"] == rerun else None
+            first, *done = (self.folder / _PENDING).read_bytes().splitlines()
+            noted = json.loads(first)
+            # The last line may be cut off: its submission is graded once more.
+            found = frozenset(map(str, noted["names"])).difference(filter(None, map(_name_in, done)))
+            return found if noted["rerun"] == rerun else None
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return None
 
@@ -178,9 +181,20 @@ class Store:
         """Store what a run still has to grade, so that the same command resumes it."""
         left = sorted(names)
         if left:
-            self.write(_PENDING, json.dumps({"rerun": rerun, "names": left}).encode())
+            self.write(_PENDING, json.dumps({"rerun": rerun, "names": left}).encode() + b"\n")
         else:
             (self.folder / _PENDING).unlink(missing_ok=True)
+
+    def note_done(self, name: str, *, last: bool) -> None:
+        """Add to the note of `note_pending` that a submission is graded; the last one removes the note.
+
+        A line is added, because writing the note anew for each submission would take time with the square of the class.
+        """
+        if last:
+            self.note_pending("", ())
+            return
+        with suppress(OSError), (self.folder / _PENDING).open("ab") as note:  # without it, it is graded once more
+            note.write(json.dumps(name).encode() + b"\n")
 
     def _swap(self, fresh: Path, place: Path) -> None:
         """Replace a folder by another; if the machine stops, one of the two can always be recovered."""
@@ -236,6 +250,14 @@ def open_store(folder: Path) -> Iterator[Store]:
         os.close(lock)
 
 
+def _name_in(line: bytes) -> str:
+    """Return the name in a line of the note of what is pending; empty if the line is cut off."""
+    try:
+        return str(json.loads(line))
+    except (ValueError, RecursionError):
+        return ""
+
+
 def _read(path: Path) -> ResultStatus | None:
     with suppress(OSError):
         return load(path.read_bytes())
@@ -263,7 +285,7 @@ class Conditions:
 
     grader: str
     rubrics: tuple[tuple[str, str], ...]  # exercise id and digest of its rubric, in grading order
-    recording: str  # digest of the /odom recording; empty if none is played
+    recording: str  # digest of the recordings that are played; empty if there are none
     seed: int | None  # seed of all drawn values; None for a whole class in which each submission has its own
     clock: str
     isolation: str

@@ -136,7 +136,7 @@ def request_for(task: Task) -> GradeRequest:
         every=conditions.every,
         rubrics=task.rubrics,
         seed=conditions.seed,
-        odom_bag=task.odom_bag,
+        bags=task.bags,
         clock=conditions.clock,
         isolation=conditions.isolation,
         time_budget_s=conditions.time_budget_s,

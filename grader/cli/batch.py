@@ -11,11 +11,13 @@ import click
 from grader.cli.completion import complete_exercise
 from grader.cli.options import (
     PATH,
+    RUBRIC,
     complain,
     drawn_with,
     interfaces_option,
     parse_share,
     print_result,
+    recording_options,
     require,
     time_budget_option,
 )
@@ -56,11 +58,11 @@ _RERUNS = ("changed", "failed", "undecided", "all")
     help="Grade only this exercise; repeatable.",
 )
 @click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which a student has a file.")
-@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 @interfaces_option
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw everybody's values from N.")
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key, not by the one kept in RESULTS.")
-@click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
+@recording_options
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for one submission.")
 @click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for one submission.")
 @time_budget_option

@@ -14,6 +14,7 @@ from click.shell_completion import BashComplete, CompletionItem, add_completion_
 
 from grader.cli.options import EVIDENCE, print_for_programs
 from grader.core.errors import ALL_MET
+from grader.core.rubric_files import rubrics_in
 from grader.core.shipped import shipped
 from grader.reporting.formats import FORMATS
 
@@ -123,7 +124,7 @@ def _starting(incomplete: str, names: Iterator[str]) -> _Items:
 
 def _rubrics(ctx: click.Context) -> Iterator[str]:
     """Yield the texts of the rubrics on the command line, or else of the built-in ones."""
-    for path in ctx.params.get("rubrics") or sorted(shipped("rubrics").glob("*.yaml")):
+    for path in ctx.params.get("rubrics") or rubrics_in(shipped("rubrics")):
         with contextlib.suppress(OSError, UnicodeDecodeError):
             yield Path(path).read_text(encoding="utf-8")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from grader.cli.completion import complete_exercise
-from grader.cli.options import PATH, complain, print_for_programs, write_file
+from grader.cli.options import PATH, RUBRIC, complain, print_for_programs, write_file
 from grader.core.checkup import NO_SANDBOX, TIERS
 from grader.core.errors import ALL_MET
 
@@ -19,7 +19,7 @@ _exercises = click.option(
     shell_complete=complete_exercise,
     help="Grade only this; repeatable.",
 )
-_rubrics = click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+_rubrics = click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 _tiers = click.Choice(("auto", *TIERS))
 
 

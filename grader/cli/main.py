@@ -23,6 +23,7 @@ from grader.cli.options import (
     EVIDENCE,
     ISOLATION,
     PATH,
+    RUBRIC,
     SANDBOXES,
     audience_options,
     complain,
@@ -36,6 +37,7 @@ from grader.cli.options import (
     parse_share,
     print_result,
     readers,
+    recording_options,
     shown_progress,
     time_budget_option,
 )
@@ -125,7 +127,7 @@ class _Default(click.Command):
 @click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which there is a file.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, as a report names it.")
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key and the files handed in.")
-@click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
+@recording_options
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON, and nothing else.")
 @click.option(
     "-o",
@@ -137,7 +139,7 @@ class _Default(click.Command):
     shell_complete=complete_output,
     help=f"Write a report ({', '.join(FORMATS)}), `-` is standard output; or keep evidence=FOLDER; repeatable.",
 )
-@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 @interfaces_option
 @click.option(
     "--min-score",
@@ -352,7 +354,7 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
 @click.command(name="observe")
 @click.argument("files", metavar="PROGRAM...", nargs=-1, required=True, type=PATH)
 @click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
-@click.option("--odom-bag", type=PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
+@recording_options
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
 @click.option("--isolation", type=click.Choice(SANDBOXES), default="auto", envvar=ISOLATION, help="As for grading.")
 @inputs_options
@@ -362,7 +364,7 @@ def _observe(  # noqa: PLR0913  one parameter an option
     *,
     files: tuple[Path, ...],
     duration: float,
-    odom_bag: Path | None,
+    bags: tuple[tuple[str, Path], ...],
     clock: str,
     isolation: str,
     sent: tuple[str, ...],
@@ -383,7 +385,7 @@ def _observe(  # noqa: PLR0913  one parameter an option
     request = observe.ObserveRequest(
         files,
         round(duration * 1e9),
-        odom_bag,
+        bags,
         clock,
         isolation,
         interfaces,
@@ -418,20 +420,39 @@ def _doctor(*, as_json: bool) -> int:
 
 @click.command(name="explain")
 @click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_criterion)
-@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Look in this rubric; repeatable.")
+@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Look in this rubric; repeatable.")
+@click.option("--rules", is_flag=True, help="List the hint rules by priority: all, or those for the check NAME.")
+@click.option("--on", "evidence", metavar="EVIDENCE", type=PATH, help="Ask the rules about this kept recording.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
-def _explain(*, name: str | None, rubrics: tuple[Path, ...], as_json: bool) -> int:
+def _explain(*, name: str | None, rubrics: tuple[Path, ...], rules: bool, evidence: Path | None, as_json: bool) -> int:
     """Explain the criterion or the check NAME; without a name, list all of them.
 
     Says what is asked, in which situation and with which tolerance it is measured, and which part of the chapter asks
-    for it.
+    for it. With --rules, lists the rules that find hints; with --rules --on EVIDENCE, those that apply to a recording.
     """
+    if evidence is not None and (not rules or name is not None):
+        raise click.BadParameter("--on needs --rules, and no NAME: all rules are asked about the recording")
+    if rules:
+        return _explain_rules(name or "", rubrics, evidence, as_json=as_json)
     from grader.app.explain import everything, explain
     from grader.reporting.explained import explanations_to_json, list_all, render_explanations
 
     found = everything(rubrics) if name is None else explain(name, rubrics)
     render = list_all if name is None else render_explanations
     print_result(lambda: explanations_to_json(found), lambda page: render(found, width=page.width), as_json=as_json)
+    return ALL_MET
+
+
+def _explain_rules(name: str, rubrics: tuple[Path, ...], evidence: Path | None, *, as_json: bool) -> int:
+    from grader.app.hint_rules import explain_rules, try_rules
+    from grader.reporting.explained import render_rules, render_trials, rules_to_json
+
+    if evidence is None:
+        rules = explain_rules(rubrics, name)
+        print_result(lambda: rules_to_json(rules), lambda page: render_rules(rules, width=page.width), as_json=as_json)
+        return ALL_MET
+    trials = try_rules(evidence, rubrics)
+    print_result(lambda: rules_to_json(trials), lambda page: render_trials(trials, width=page.width), as_json=as_json)
     return ALL_MET
 
 

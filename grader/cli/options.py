@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from grader.core.checkup import TIERS
 from grader.core.errors import EnvironmentFault, GraderError
 from grader.core.limits import TIME_BUDGET_S
+from grader.core.rubric_files import rubric_file
+from grader.core.scenario import ODOMETRY
 from grader.reporting.formats import FORMATS
 
 if TYPE_CHECKING:
@@ -29,6 +34,17 @@ if TYPE_CHECKING:
 #: The format name in `-o evidence=FOLDER`, which keeps the recordings of a run.
 EVIDENCE = "evidence"
 PATH = click.Path(path_type=Path)
+
+
+class RubricPath(click.Path):
+    """The path of a rubric's file, which its exercise's folder stands for as well, and the name it once had."""
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> Path:  # type: ignore[override]
+        """Return the path of the file."""
+        return rubric_file(Path(os.fsdecode(super().convert(value, param, ctx))))
+
+
+RUBRIC = RubricPath(path_type=Path)
 _Command = TypeVar("_Command", bound=Callable[..., object])
 
 
@@ -59,6 +75,42 @@ isolation_option = click.option(
 
 
 #: Message definitions of a course.
+def _parse_recordings(ctx: click.Context, param: click.Parameter, value: Sequence[str]) -> tuple[tuple[str, Path], ...]:
+    """Parse the values of `--recording TOPIC=BAG`; a click callback."""
+    del ctx, param
+    parsed = []
+    for text in value:
+        name, equals, path = text.partition("=")
+        if not (equals and path) or re.fullmatch(r"(/[A-Za-z_]\w*)+|[a-z]\w*/msg/[A-Za-z]\w*", name, re.ASCII) is None:
+            wanted = "/scan=BAG or sensor_msgs/msg/LaserScan=BAG"
+            raise click.BadParameter(
+                f"expected a topic or a message type with a recording such as {wanted}, found {text!r}"
+            )
+        parsed.append((name, Path(path)))
+    return tuple(parsed)
+
+
+def recording_options(command: Callable[..., int]) -> Callable[..., int]:
+    """Add `--recording`, and its older form `--odom-bag`; the command gets both as `bags`."""
+
+    @wraps(command)
+    def called(*arguments: Any, bags: tuple[tuple[str, Path], ...], odom_bag: Path | None, **given: Any) -> int:
+        if odom_bag and ODOMETRY in dict(bags):
+            raise click.BadParameter(f"--odom-bag and --recording {ODOMETRY} exclude each other")
+        return command(*arguments, bags=(*([(ODOMETRY, odom_bag)] if odom_bag else []), *bags), **given)
+
+    recording = click.option(
+        "--recording",
+        "bags",
+        metavar="TOPIC=BAG",
+        multiple=True,
+        callback=_parse_recordings,
+        help="Play this recording on a topic, or on all topics of a message type, not that of the rubric; repeatable.",
+    )
+    odom_bag = click.option("--odom-bag", type=PATH, help=f"The same as --recording {ODOMETRY}=PATH.")
+    return recording(odom_bag(called))
+
+
 interfaces_option = click.option(
     "--interfaces",
     type=PATH,

@@ -13,6 +13,7 @@ from grader.cli.completion import complete_exercise, complete_output
 from grader.cli.options import (
     EVIDENCE,
     PATH,
+    RUBRIC,
     audience_options,
     complain,
     parse_outputs,
@@ -47,7 +48,7 @@ PAGE = "html"
     shell_complete=complete_exercise,
     help="Judge only this exercise; repeatable.",
 )
-@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 @click.option(
     "-o",

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from grader.cli.options import complain
+from grader.core.rubric_files import rubric_file
 
 if TYPE_CHECKING:
     from grader.classroom.last_run import LastRun
+
+#: The option whose values have a topic in front of a path.
+_BAGS = "bags"
 
 #: Parameters of `grade batch` that change marks, pages or exported files. The others concern one run only.
 KEPT = (
@@ -26,6 +30,7 @@ KEPT = (
     "interfaces",
     "seed",
     "seed_key",
+    _BAGS,
     "odom_bag",
     "clock",
     "isolation",
@@ -117,7 +122,7 @@ class RepeatingCommand(click.Command):
         """Raise ClassError if the last run used a file that is no longer there."""
         from grader.core.errors import ClassError
 
-        gone = [text for text in texts if self._is_path(name) and not os.path.lexists(text)]
+        gone = [path for text in texts if self._is_path(name) and not os.path.lexists(path := _place(name, text))]
         if gone:
             option = _name(self._kept[name])
             holds = f" ({_decisions(last.decisions)})" if name == "adjustments" else ""
@@ -137,7 +142,7 @@ class RepeatingCommand(click.Command):
                 complain(f"{now}; the last run had {then}", kind="note")
 
     def _said(self, name: str, texts: tuple[str, ...], last: LastRun | None = None) -> str:
-        values = [_near(text) if self._is_path(name) else text for text in texts]
+        values = [_with_path(name, text, _near) if self._is_path(name) else text for text in texts]
         option = f"--{_name(self._kept[name])}"
         holds = f" ({_decisions(last.decisions)})" if last is not None and name == "adjustments" else ""
         return " ".join([option, *values]) + holds
@@ -145,18 +150,38 @@ class RepeatingCommand(click.Command):
     def _words(self, repeated: _Texts) -> Iterator[str]:
         for name, texts in repeated.items():
             option = f"--{_name(self._kept[name])}"
-            yield from [f"{option}={_near(text) if self._is_path(name) else text}" for text in texts] or [option]
+            yield from [
+                f"{option}={_with_path(name, text, _near) if self._is_path(name) else text}" for text in texts
+            ] or [option]
 
     def _absolute(self, name: str, texts: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(os.path.abspath(text) for text in texts) if self._is_path(name) else texts  # noqa: PTH100  no link is followed
+        absolute = os.path.abspath  # follows no link
+        return tuple(_with_path(name, text, absolute) for text in texts) if self._is_path(name) else texts
 
     def _is_path(self, name: str) -> bool:
-        return isinstance(self._kept[name].type, click.Path)
+        return name == _BAGS or isinstance(self._kept[name].type, click.Path)
 
 
 def _name(param: click.Parameter) -> str:
     """Return the name of an option without dashes."""
     return param.opts[0].removeprefix("--")
+
+
+def _split(name: str, text: str) -> tuple[str, str]:
+    """Split what was typed for an option in front of its path: a recording has a topic there, `/scan=bags/scan`."""
+    topic, equals, path = text.partition("=") if name == _BAGS else ("", "", text)
+    return topic + equals, path
+
+
+def _place(name: str, text: str) -> str:
+    """Return where what was typed for an option is: the path of a built-in rubric may be its old one."""
+    path = _split(name, text)[1]
+    return str(rubric_file(Path(path))) if name == "rubrics" else path
+
+
+def _with_path(name: str, text: str, changed: Callable[[str], str]) -> str:
+    before, path = _split(name, text)
+    return before + changed(path)
 
 
 def _near(path: str) -> str:

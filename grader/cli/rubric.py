@@ -9,6 +9,7 @@ import click
 
 from grader.cli.options import (
     PATH,
+    RUBRIC,
     complain,
     inputs_options,
     interfaces_option,
@@ -20,9 +21,15 @@ from grader.cli.options import (
 )
 from grader.core.checkup import TIERS
 from grader.core.errors import ALL_MET, NOT_ALL_MET, UNUSABLE, GraderError, RubricError
+from grader.core.rubric_files import notes_on, rubric_files, rubric_of
 
 if TYPE_CHECKING:
     from grader.mutation.results import SelftestResult
+
+
+def _all_rubrics(ctx: click.Context, param: click.Parameter, named: tuple[Path, ...]) -> tuple[Path, ...]:
+    del ctx, param
+    return rubric_files(named)
 
 
 @click.group(name="rubric")
@@ -31,7 +38,7 @@ def command() -> None:
 
 
 @command.command(name="check")
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=RUBRIC, callback=_all_rubrics)
 @interfaces_option
 def _check(*, files: tuple[Path, ...], interfaces: tuple[Path, ...]) -> int:
     """Say whether rubrics can be used, with line and column of every mistake, and what is odd about them.
@@ -57,7 +64,7 @@ def _check(*, files: tuple[Path, ...], interfaces: tuple[Path, ...]) -> int:
 
 
 @command.command(name="schema")
-@click.argument("rubric", metavar="[FILE]", required=False, type=PATH)
+@click.argument("rubric", metavar="[FILE]", required=False, type=RUBRIC)
 def _schema(*, rubric: Path | None) -> int:
     """Print the JSON Schema of rubrics, with which editors complete and check them.
 
@@ -72,7 +79,7 @@ def _schema(*, rubric: Path | None) -> int:
 
 
 @command.command(name="variant")
-@click.argument("rubric", metavar="FILE", type=PATH)
+@click.argument("rubric", metavar="FILE", type=RUBRIC)
 @click.option("--variant-key", "key", type=PATH, metavar="FILE", help="The course key.")
 @click.option("--key-file", "old_key", type=PATH, hidden=True)  # its name in earlier versions
 @click.option("--student", metavar="ID", required=True, help="Whose values; the same id as on the roster.")
@@ -92,7 +99,7 @@ def _variant(*, rubric: Path, key: Path | None, old_key: Path | None, student: s
 
 
 @command.command(name="explain")
-@click.argument("files", metavar="[FILE]...", nargs=-1, type=PATH)
+@click.argument("files", metavar="[FILE]...", nargs=-1, type=RUBRIC, callback=_all_rubrics)
 @click.option("--checks", "checks", is_flag=True, help="List the checks that rubrics can use, one line each.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
@@ -143,7 +150,7 @@ def _new(  # noqa: PLR0913  one parameter an option
         raise GraderError(f"{output}: expected a new file, found one that is there", "name another, or remove it")
     with shown_progress(wanted=True) as progress:
         request = ObserveRequest(
-            files, round(duration * 1e9), None, clock, isolation, (), read_simulations(simulations), read_sent(sent)
+            files, round(duration * 1e9), (), clock, isolation, (), read_simulations(simulations), read_sent(sent)
         )
         skeleton = new_rubric(request, progress, id_=id_, beside=output.parent if output is not None else Path())
     for remark in skeleton.remarks:
@@ -163,7 +170,7 @@ def _new(  # noqa: PLR0913  one parameter an option
 
 
 @click.command(name="selftest")
-@click.argument("rubrics", metavar="RUBRIC...", nargs=-1, required=True, type=PATH)
+@click.argument("rubrics", metavar="RUBRIC...", nargs=-1, required=True, type=RUBRIC, callback=_all_rubrics)
 @click.option("--reference", type=PATH, metavar="FOLDER", help="A right solution; by default what the notes name.")
 @click.option("--template", type=PATH, metavar="FOLDER", help="What students start from; by default as above.")
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Scenarios at a time; by default one a core.")
@@ -192,7 +199,7 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
 ) -> int:
     """Test RUBRIC with mistakes planted in its reference solution, and with correct variants of it.
 
-    Notes in NAME.selftest.yaml beside NAME.yaml explain what may survive.
+    Notes in NAME.selftest.yaml beside NAME.yaml, or selftest.yaml beside rubric.yaml, explain what may survive.
 
     Exit codes: 0 every mistake was detected or explained, every criterion detected one, and no correct program lost a
     point, 1 not, 2 the command or something it was given cannot be used.
@@ -200,12 +207,12 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
     require("grade selftest", "libcst", "authors")
     from grader.mutation.running import SelftestOptions, selftest
     from grader.mutation.showing import render_results, results_to_json
-    from grader.rubrics.builtin import NOTES
 
-    # A shell pattern such as rubrics/*.yaml matches the notes as well.
-    named = [path for path in rubrics if not path.name.endswith(NOTES)]
+    # A shell pattern such as mine/*.yaml matches the notes as well.
+    named = [path for path in rubrics if rubric_of(path) is None]
     if not named:
-        raise click.BadParameter(f"expected rubrics, found notes only; name {rubrics[0].name.removesuffix(NOTES)}.yaml")
+        wanted = [rubric for path in rubrics if (rubric := rubric_of(path)) is not None]
+        raise click.BadParameter(f"expected rubrics, found notes only; name {wanted[0].name}")
     options = SelftestOptions(reference, template, jobs, only, sample, seed, clock, isolation)
     with shown_progress(wanted=not no_progress) as progress:
         results = list(selftest(named, options, progress))
@@ -223,10 +230,9 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
 
 
 def _add_notes(result: SelftestResult, reference: Path | None, template: Path | None) -> None:
-    from grader.mutation.explained import beside
     from grader.mutation.writing import noted
 
-    path = beside(Path(result.rubric))
+    path = notes_on(Path(result.rubric))
     before = path.read_text(encoding="utf-8-sig") if path.exists() else None
     text, entries = noted(result, before, reference=reference, template=template)
     if entries:

@@ -10,12 +10,14 @@ import click
 from grader.cli.completion import complete_exercise, complete_file
 from grader.cli.options import (
     PATH,
+    RUBRIC,
     complain,
     drawn_by,
     drawn_with,
     interfaces_option,
     isolation_option,
     print_result,
+    recording_options,
     shown_progress,
 )
 from grader.core.conditions import CONDITIONS, TOGETHER
@@ -49,13 +51,13 @@ _EPILOG = (
     shell_complete=complete_exercise,
     help="Record only this exercise; repeatable. By default each of which there is a file.",
 )
-@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 @click.option(
     "--evidence", type=PATH, metavar="FOLDER", help="Compare with this evidence too, and keep the result in it."
 )
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, as a report names it.")
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key and the files handed in.")
-@click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
+@recording_options
 @interfaces_option
 @isolation_option
 @click.option("--student", metavar="ID", default="", help="Use the variant of this student; see --variant-key.")
@@ -72,7 +74,7 @@ def command(  # noqa: PLR0913  one parameter an option
     evidence: Path | None,
     seed: int | None,
     seed_key: Path | None,
-    odom_bag: Path | None,
+    bags: tuple[tuple[str, Path], ...],
     interfaces: tuple[Path, ...],
     isolation: str,
     student: str,
@@ -92,7 +94,7 @@ def command(  # noqa: PLR0913  one parameter an option
         raise click.BadParameter("--quick and --condition exclude each other")
     if evidence is not None and len(submissions) != 1:
         raise click.BadParameter("--evidence is that of one submission: expected one SUBMISSION, found several")
-    if evidence is not None and (seed is not None or seed_key is not None or exercises or odom_bag or student):
+    if evidence is not None and (seed is not None or seed_key is not None or exercises or bags or student):
         raise click.BadParameter("--evidence says what was recorded, and with which seed: leave out the other options")
     key = drawn_with(seed, seed_key)
     draw = drawn_by(student, variant_key)
@@ -108,7 +110,7 @@ def command(  # noqa: PLR0913  one parameter an option
         rubrics=rubrics,
         seed=seed,
         seed_key=key or PRACTICE,
-        odom_bag=odom_bag,
+        bags=bags,
         isolation=isolation,
         student=student.strip(),
         variant_key=variant_key,

@@ -1,6 +1,18 @@
-"""The errors of the grader, grouped by who has to act, and the exit codes of the command line.
+"""The errors of the grader, by who has to act, and the exit codes of the command line.
 
-A crash of a student's program is a Fault in the trace.
+    GraderError
+      · RubricError           the author of the rubric
+      · SubmissionError       the student, or who gave the path
+      · HarnessError          nobody but the project: the grader or the machine failed during a run
+      · EnvironmentFault      the administrator of the machine, which lacks something
+      and who gave what cannot be used:
+      · RecordingError        a recording to play
+      · EvidenceError         evidence
+      · ClassError            an input of a class, or its result folder
+      · VariantError          the student whose variant is asked for
+      · KeyFileError          a key
+
+A crash of a student's program is no exception but a Fault in the trace.
 """
 
 from __future__ import annotations
@@ -50,7 +62,7 @@ class SubmissionError(GraderError):
 
 
 class RecordingError(GraderError):
-    """An /odom recording cannot be used; the user who gave it has to act."""
+    """A recording to play cannot be used; whoever gave it, the user or the author of the rubric, has to act."""
 
 
 class EvidenceError(GraderError):

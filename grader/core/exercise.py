@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field
 from enum import Enum
 from fractions import Fraction
 from numbers import Rational, Real
-from typing import Any, Protocol, TypeGuard
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, TypeGuard
 
 from grader.core.dataclass import dataclass
-from grader.core.scenario import OdometryStream, Scenario
+from grader.core.scenario import RecordedStream, Scenario
 from grader.core.trace import Trace
 
 
@@ -230,49 +230,117 @@ class Finding:
     problem: Problem | None = None  # the problem found, if the check tells several problems apart
     # The reason in a few words, without the place of a fault, for terminals; empty if the reason itself is short
     brief: str = ""
+    # What hint rules may read of it: a frozen dataclass, as in `grader/judging/facts.py`; None if there is nothing.
+    # It is not shown in reports, so that a rule and a check can change it together
+    facts: object = None
 
     def __post_init__(self) -> None:
         """Make the credit a fraction, here and not later, so that the traceback shows the author's line."""
         object.__setattr__(self, "credit", exact_share(self.credit))
 
 
+@dataclass(frozen=True, slots=True)
+class Roles:
+    """What the parameters of a check are, by their names; a name that the check does not have is ignored.
+
+    A parameter with one of the usual names, which are the defaults here, needs no declaration. `hears` and `speaks`
+    have no usual name: a check that declares them lets the general hint rules explain a silent or unheard topic.
+    """
+
+    topics: tuple[str, ...] = ("input", "topic", "output", "forward", "back", "publishes", "subscribes")
+    fields: tuple[str, ...] = ("field", "fields")  # field paths of the last topic
+    services: tuple[str, ...] = ("service",)
+    actions: tuple[str, ...] = ("action",)
+    process: str = "process"  # the file that the check is about
+    type: str = "type"  # the type of the topic
+    hears: tuple[str, ...] = ()  # topics to which a node of the student's has to subscribe
+    speaks: tuple[str, ...] = ()  # topics on which the check itself misses messages of the student's nodes
+
+
+#: The value of `drawing` of a check whose picture is the graph of nodes and topics.
+NODE_GRAPH: Final = "node graph"
+
+
 class Check(Protocol):
-    """A typed question about a trace: a frozen dataclass whose fields are the rubric's parameters."""
+    """A typed question about a trace: a frozen dataclass whose fields are the rubric's parameters.
+
+    A check needs `judge`. It may have the other members, which are all that the grader looks for; without them, the
+    values here apply. The docstring of the class is its manual, with the parameters listed under `Attributes:`.
+    """
 
     def judge(self, trace: Trace) -> Finding:
         """Judge the trace. This is a pure function, and nothing that a student does makes it raise."""
 
+    if not TYPE_CHECKING:  # for type checkers, every member of a protocol is required
+        #: What the parameters are, for charts and for hint rules.
+        roles: ClassVar[Roles] = Roles()
+
+        @property
+        def expected(self) -> str:
+            """What the check expects, in one phrase without a full stop, from its parameters; empty for none."""
+            return ""
+
+        def drawing(self, trace: Trace) -> Any:
+            """Return a `Drawing` or a `Chart` of what was judged; None for no picture.
+
+            Without this method, a check gets a chart of the topics, services and actions that its parameters name. The
+            attribute `drawing = NODE_GRAPH` in place of the method chooses the graph of nodes and topics.
+            """
+
+        def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
+            """Judge the trace and the text of the students' files, by their required names; called in place of `judge`.
+
+            It is a pure function too.
+            """
+
+        def of_beginning(self) -> Check | None:
+            """Return the check that judges the beginning of a recording; None if only a whole recording can be judged.
+
+            Spot checks judge the first seconds of a scenario, recorded again on the wall clock. Without this method,
+            a beginning is judged like a whole recording, and counts only if the same seconds in virtual time suffice.
+            """
+
+
+def has(check: object, member: str) -> bool:
+    """Return whether a check has an optional member of `Check` of its own."""
+    return getattr(type(check), member, vars(Check)[member]) is not vars(Check)[member] or member in _own(check)
+
+
+def _own(check: object) -> Mapping[str, object]:
+    """Return the attributes that an instance has without slots, such as a parameter named `expected`."""
+    return getattr(check, "__dict__", {})
+
 
 class SourceCheck(Protocol):
-    """A check that also reads the text of the students' files."""
+    """A check that has `judge_sources`."""
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
-        """Judge the trace and the files, by their required names; a pure function like `judge`."""
+        """See `Check`."""
 
 
 def reads_sources(check: object) -> TypeGuard[SourceCheck]:
     """Return whether a check also reads the students' files."""
-    return callable(getattr(check, "judge_sources", None))
-
-
-class BeginningCheck(Protocol):
-    """A check that judges the beginning of a recording in another way than a whole one.
-
-    Spot checks judge the first seconds of a scenario, recorded again on the wall clock. Any other check judges them as
-    it judges a whole recording, and counts only if the same seconds in virtual time suffice for it.
-    """
-
-    def of_beginning(self) -> Check | None:
-        """Return the check that judges a beginning; None if only a whole recording shows what this check asks."""
+    return has(check, "judge_sources")
 
 
 def of_beginning(check: Check) -> Check | None:
     """Return the check that judges the beginning of a recording on the wall clock; None if none can."""
-    declared = getattr(check, "of_beginning", None)
-    if not callable(declared):
+    if not has(check, "of_beginning"):
         return check
-    found: Check | None = declared()
+    found: Check | None = check.of_beginning()  # type: ignore[attr-defined]
     return found
+
+
+def roles_of(kind: type) -> Roles:
+    """Return the roles of a class's parameters: what it declares, else those of the usual names."""
+    declared: object = getattr(kind, "roles", None)
+    return declared if isinstance(declared, Roles) else Roles()
+
+
+def named(check: object, *parameters: str) -> tuple[str, ...]:
+    """Return the texts that a check holds under the names of parameters, without duplicates and empty ones."""
+    found = (getattr(check, name, None) for name in parameters)
+    return tuple(dict.fromkeys(text for text in found if isinstance(text, str) and text))
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,6 +360,18 @@ class Criterion:
     check_name: str = field(default="", compare=False)  # name of its check in the rubric
 
 
+class HintRule(Protocol):
+    """A rule that explains lost points: `grader/judging/diagnosis/rules.py` has the class."""
+
+    @property
+    def id(self) -> str:
+        """Its name, which reports state."""
+
+    @property
+    def priority(self) -> int:
+        """Its place among all rules: the one with the lowest number is asked first."""
+
+
 @dataclass(frozen=True, slots=True)
 class Exercise:
     """One rubric file."""
@@ -308,8 +388,9 @@ class Exercise:
     variant: Variant | None = None  # the values for this student; None if nothing varies
     interfaces: tuple[str, ...] = ()  # paths of the folders with interface packages that the rubric brings
     bonus: Fraction = Fraction(0)  # points above the maximum that an instructor may give
+    hints: Iterable[HintRule] = ()  # the rubric's own hint rules, in the order of its files
 
     @property
-    def plays_odometry(self) -> bool:
-        """Whether any scenario plays the /odom recording."""
-        return any(isinstance(stimulus, OdometryStream) for s in self.scenarios for stimulus in s.stimuli)
+    def recorded(self) -> tuple[RecordedStream, ...]:
+        """The recordings that its scenarios play."""
+        return tuple(stimulus for s in self.scenarios for stimulus in s.stimuli if isinstance(stimulus, RecordedStream))

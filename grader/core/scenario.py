@@ -144,16 +144,27 @@ class NumberStream:
     # until the end of an observation that starts with the scenario.
     hold_ns: LongTime
     start_ns: Time  # time of the first message since scenario start
+    # Name of the field that holds the number; by default `data`, or else the only number of a message
+    field: Annotated[str, Kind("field name")] = ""
+
+
+#: The type of messages that the stimulus `odometry` plays and `--odom-bag` replaces. Both are older than `recorded` and
+#: `--recording TYPE=BAG`, and aliases of them.
+ODOMETRY = "nav_msgs/msg/Odometry"
 
 
 @dataclass(frozen=True, slots=True)
-class OdometryStream:
-    """A stimulus: the recorded odometry.
+class RecordedStream:
+    """A stimulus: the recorded messages of a topic.
 
-    It is played with its original timing by a publisher that disappears afterwards.
+    They are played with their original timing by a publisher that disappears afterwards.
     """
 
     topic: Topic  # topic name, absolute
+    type: MessageType  # type of the messages, e.g. `sensor_msgs/msg/LaserScan`
+    # The rosbag2 recording beside the rubric: a folder, or a .mcap or .db3 file. If it has no messages of this type on
+    # the topic, the topic with most of them is played.
+    bag: Annotated[str, Kind("recording")]
     start_ns: Time  # when the publisher appears and the first message is sent
     duration_ns: LongTime  # how much of the recording is played; which part is drawn from the seed
 
@@ -260,7 +271,7 @@ class Simulated:
     start_ns: int = 0
 
 
-Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | ServiceCalls | ActionGoal | Simulated
+Stimulus = NumberStream | RecordedStream | MessageStream | ServiceServer | ServiceCalls | ActionGoal | Simulated
 
 
 def longest_course_ns(stimulus: Stimulus) -> int:
@@ -272,7 +283,7 @@ def longest_course_ns(stimulus: Stimulus) -> int:
         return start_ns + cases(stimulus.values)[1] * most(stimulus.repeats) * stimulus.period_ns
     if isinstance(stimulus, ServiceCalls):
         return start_ns + most(stimulus.calls) * stimulus.period_ns
-    return start_ns + longest(stimulus.duration_ns) if isinstance(stimulus, OdometryStream) else start_ns
+    return start_ns + longest(stimulus.duration_ns) if isinstance(stimulus, RecordedStream) else start_ns
 
 
 def is_open(stimulus: Stimulus) -> bool:

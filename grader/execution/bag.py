@@ -1,4 +1,4 @@
-"""Reads wheel odometry from a rosbag2 recording, the built-in one or an instructor's."""
+"""Reads the messages of one topic from a rosbag2 recording."""
 
 from __future__ import annotations
 
@@ -7,22 +7,25 @@ import math
 import os
 import stat
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import RecordingError
-from grader.core.quantities import NS_PER_S, seconds
+from grader.core.quantities import seconds
 from grader.core.releases import DEFAULT
 from grader.core.scenario import TimedMessage
 
-TYPE = "nav_msgs/msg/Odometry"
-USUAL_TOPIC = "/odom"
-LEAST_MESSAGES = 20
-LEAST_DURATION_NS = 5 * NS_PER_S
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+
+#: The most elements of an array that are kept for judging: more than a laser scan has, fewer than an image.
+MOST_ELEMENTS = 10_000
+#: A field that is not kept for judging: such matrices hold several times as many numbers as the rest of a message. No
+#: check asks for them, and all would pass through each plan and each trace.
+_NOT_KEPT = "covariance"
 
 _STORAGE = (".mcap", ".db3")
 _CDR_LITTLE_ENDIAN = b"\x00\x01"
@@ -33,57 +36,90 @@ _SQLITE_HEAD = 18  # the magic, then the page size in two bytes, where 1 means 6
 #: Characters with a meaning in an SQLite URI. rosbags puts the path into one without escaping it.
 _ADDRESS_CHARACTERS = frozenset("?#%")
 
-_HINT_SOURCE = "name a rosbag2 folder, or a .mcap or .db3 file, as `ros2 bag record /odom` writes it"
+_HINT_SOURCE = "name a rosbag2 folder, or a .mcap or .db3 file, as `ros2 bag record` writes it"
 _HINT_DAMAGED = "copy or record it again; a recorder that was killed leaves a file that `ros2 bag reindex` may fix"
 
 _Raw = tuple[int, bytes]
+_T = TypeVar("_T")
+#: Returns the definition of a message type as in .msg files, those of nested types included; None if unknown.
+Define = Callable[[str], "str | None"]
 
 
 @dataclass(frozen=True, slots=True)
-class Odometry:
-    """A recording of odometry.
+class Recording:
+    """The recorded messages of one topic.
 
     Attributes:
         topic: Absolute name of the recorded topic.
-        messages: In order of receive time, which starts at 0 and strictly increases.
+        type: Type of its messages.
+        messages: In order of receive time, which starts at 0 and strictly increases; at least one.
     """
 
     topic: str
+    type: str
     messages: tuple[TimedMessage, ...]
 
+    @property
+    def span_ns(self) -> int:
+        """Time from the first to the last message."""
+        return self.messages[-1].t_ns
 
-def read_odometry(path: Path) -> Odometry:
-    """Read the odometry in a recording, without writing any file next to it.
+
+@dataclass(frozen=True, slots=True)
+class Least:
+    """The fewest messages and the shortest time that a recording has to have."""
+
+    messages: int = 1
+    span_ns: int = 0
+
+
+def read_bag(
+    path: Path, topic: str, type_: str, *, least: Least | None = None, define: Define | None = None
+) -> Recording:
+    """Read the messages of a topic, without writing any file next to the recording.
 
     Args:
         path: A rosbag2 folder, a folder with one storage file and no metadata, or a single .mcap or .db3 file.
+        topic: The topic to read, if it has messages of the type; otherwise the one that has most of them is read.
+        type_: Type of the messages.
+        least: How long the recording has to be; by default one message suffices.
+        define: Looks up types that do not come with ROS 2.
 
     Raises:
-        RecordingError: The recording is missing, unreadable or damaged, or has too little odometry to play.
+        RecordingError: The recording is missing, unreadable, damaged or too short, or has no messages of the type.
     """
+    least = least or Least()
     source = _source(path)
     with _plainly_named(source) as plain:
-        topic, raw = _read(path, plain)
-    if len(raw) < LEAST_MESSAGES:
-        raise _unfit(path, topic, f"at least {LEAST_MESSAGES} messages, found {len(raw)}")
+        found, raw = _read(path, plain, topic, type_)
+    if len(raw) < least.messages:
+        raise _too_short(path, found, f"at least {_count(least.messages)}, found {len(raw) or 'none'}")
     raw.sort(key=lambda item: item[0])
     span_ns = raw[-1][0] - raw[0][0]
-    if span_ns < LEAST_DURATION_NS:
-        raise _unfit(path, topic, f"at least {seconds(LEAST_DURATION_NS):g} s, found {seconds(span_ns):.2f} s")
-    return Odometry(topic, tuple(_decoded(path, topic, raw)))
+    if span_ns < least.span_ns:
+        raise _too_short(path, found, f"at least {seconds(least.span_ns):g} s, found {seconds(span_ns):.2f} s")
+    return Recording(found, type_, tuple(_decoded(path, found, type_, raw, define)))
 
 
-def window(odometry: Odometry, *, duration_ns: int, seed: int) -> tuple[TimedMessage, ...]:
+def topics_in(path: Path) -> Mapping[str, str]:
+    """Return the topics of a recording with their types; raises RecordingError if it cannot be read."""
+    source = _source(path)
+    with _plainly_named(source) as plain:
+        return {topic: type_ for topic, type_, _ in _opened(path, plain, _topics)}
+
+
+def window(recording: Recording, *, duration_ns: int, seed: int) -> tuple[TimedMessage, ...]:
     """Cut a window out of a recording, with times counted from its first message.
 
     Args:
-        odometry: The recording.
+        recording: The recording.
         duration_ns: Minimum time from first to last message of the window; a shorter recording is returned whole.
         seed: Determines where the window starts.
     """
-    messages = odometry.messages
+    messages = recording.messages
     latest_ns = messages[-1].t_ns - duration_ns
     starts = max(1, sum(m.t_ns <= latest_ns for m in messages))
+    # The word stays the one that was hashed when only odometry was played: the same seed plays the same part.
     drawn = hashlib.sha256(f"odometry window {seed}".encode()).digest()
     first = int.from_bytes(drawn[:8], "big") % starts
     start_ns = messages[first].t_ns
@@ -178,45 +214,58 @@ def _plainly_named(source: Path) -> Iterator[Path]:
         yield link
 
 
-def _read(path: Path, source: Path) -> tuple[str, list[_Raw]]:
-    """Return the odometry topic of a source, and its messages as (receive time, bytes)."""
-    from rosbags.rosbag2 import Reader  # takes 60 ms, which runs without odometry save  # noqa: PLC0415
+def _opened(path: Path, source: Path, read: Callable[[Any], _T]) -> _T:
+    """Return what a function reads with the reader of rosbags; raises RecordingError if it fails."""
+    from rosbags.rosbag2 import Reader  # takes 60 ms, which runs without a recording save  # noqa: PLC0415
 
     try:
         with Reader(source) as reader:
-            topics = [(c.topic, c.msgtype, c.msgcount) for c in reader.connections]
-            topic = _odometry_topic(topics)
-            chosen = [c for c in reader.connections if c.topic == topic and c.msgtype == TYPE]
-            raw = [(t_ns, bytes(data)) for _, t_ns, data in reader.messages(chosen)] if chosen else []
+            return read(reader)
     except Exception as error:  # damaged bytes make the parsers of rosbags raise nearly anything
         problem = _line(error, source=source)
         raise RecordingError(
             f"{_line(path)}: expected a complete rosbag2 recording, found a damaged one ({problem})", _HINT_DAMAGED
         ) from error
-    if topic is None:
-        types = ", ".join(sorted({_line(msgtype) for _, msgtype, _ in topics})) or "no topics at all"
+
+
+def _topics(reader: Any) -> list[tuple[str, str, int]]:
+    return [(c.topic, c.msgtype, c.msgcount) for c in reader.connections]
+
+
+def _read(path: Path, source: Path, topic: str, type_: str) -> tuple[str, list[_Raw]]:
+    """Return the topic to play from a source, and its messages as (receive time, bytes)."""
+
+    def read(reader: Any) -> tuple[list[tuple[str, str, int]], str | None, list[_Raw]]:
+        topics = _topics(reader)
+        chosen = _chosen(topics, topic, type_)
+        connections = [c for c in reader.connections if c.topic == chosen and c.msgtype == type_]
+        raw = [(t_ns, bytes(data)) for _, t_ns, data in reader.messages(connections)] if connections else []
+        return topics, chosen, raw
+
+    topics, chosen, raw = _opened(path, source, read)
+    if chosen is None:
+        types = ", ".join(sorted({f"{_line(kind)} on {_line(name)}" for name, kind, _ in topics})) or "no topics at all"
         raise RecordingError(
-            f"{_line(path)}: expected a topic of type {TYPE}, found {types}", "record it with `ros2 bag record /odom`"
+            f"{_line(path)}: expected a topic of type {type_}, found {types}",
+            f"record it with `ros2 bag record {topic}`",
         )
-    return topic, raw
+    return chosen, raw
 
 
-def _odometry_topic(topics: Iterable[tuple[str, str, int]]) -> str | None:
-    """Choose the topic to play: /odom if it has messages, else the one with most messages, else the first by name."""
+def _chosen(topics: Iterable[tuple[str, str, int]], wanted: str, type_: str) -> str | None:
+    """Choose the topic to read: the wanted one if it has messages, else the one with most, else the first by name."""
     counts: dict[str, int] = {}
     for topic, msgtype, count in topics:
-        if msgtype == TYPE:
+        if msgtype == type_:
             counts[topic] = counts.get(topic, 0) + count
-    if counts.get(USUAL_TOPIC):
-        return USUAL_TOPIC
+    if counts.get(wanted):
+        return wanted
     return min(counts, key=lambda topic: (-counts[topic], topic), default=None)
 
 
-def _decoded(path: Path, topic: str, raw: Sequence[_Raw]) -> Iterator[TimedMessage]:
+def _decoded(path: Path, topic: str, type_: str, raw: Sequence[_Raw], define: Define | None) -> Iterator[TimedMessage]:
     """Yield the messages, with times counted from the first one; equal times are moved 1 ns apart."""
-    from rosbags.typesys import Stores, get_typestore  # as heavy as the reader  # noqa: PLC0415
-
-    store = get_typestore(Stores[DEFAULT.messages])
+    store = _types(path, type_, define)
     start_ns, last_ns = raw[0][0], -1
     for number, (received_ns, data) in enumerate(raw, start=1):
         where = f"message {number} of {len(raw)} on {_line(topic)}"
@@ -226,14 +275,14 @@ def _decoded(path: Path, topic: str, raw: Sequence[_Raw]) -> Iterator[TimedMessa
                 "name the folder that holds its metadata.yaml",
             )
         try:
-            message = store.deserialize_cdr(data, TYPE)
-            cdr = data if data.startswith(_CDR_LITTLE_ENDIAN) else bytes(store.serialize_cdr(message, TYPE))
+            message = store.deserialize_cdr(data, type_)
+            cdr = data if data.startswith(_CDR_LITTLE_ENDIAN) else bytes(store.serialize_cdr(message, type_))
+            value = _fields(message)
         except Exception as error:  # as above: a malformed message may fail anywhere in the generated decoder
             raise RecordingError(
-                f"{_line(path)}: expected {TYPE} in {where}, found other bytes ({_line(error)})", _HINT_DAMAGED
+                f"{_line(path)}: expected {type_} in {where}, found other bytes ({_line(error)})", _HINT_DAMAGED
             ) from error
-        value = _fields(message)
-        if not all(map(math.isfinite, value["pose"]["pose"]["position"].values())):
+        if not _has_finite_positions(value):
             raise RecordingError(
                 f"{_line(path)}: expected a position in {where}, found a number that is not finite",
                 "play a recording whose robot knew where it was",
@@ -242,21 +291,46 @@ def _decoded(path: Path, topic: str, raw: Sequence[_Raw]) -> Iterator[TimedMessa
         yield TimedMessage(last_ns, cdr, value)
 
 
-def _fields(message: object) -> dict[str, Any]:
-    """Return the fields of an odometry message that checks read, named as in the message definition."""
-    position = _numbers(message, "pose.pose.position", "xyz")
-    orientation = _numbers(message, "pose.pose.orientation", "xyzw")
-    linear = _numbers(message, "twist.twist.linear", "xyz")
-    angular = _numbers(message, "twist.twist.angular", "xyz")
-    return {
-        "pose": {"pose": {"position": position, "orientation": orientation}},
-        "twist": {"twist": {"linear": linear, "angular": angular}},
-    }
+def _types(path: Path, type_: str, define: Define | None) -> Typestore:
+    """Return the types of the default release, and this one if it is another."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # as heavy as the reader  # noqa: PLC0415
+
+    store = get_typestore(Stores[DEFAULT.messages])
+    if type_ not in store.types:
+        definition = define(type_) if define is not None else None
+        if definition is None:
+            raise RecordingError(
+                f"{_line(path)}: expected messages of a known type, found {type_}, whose definition is missing",
+                "bring it with `interfaces:` in the rubric or --interfaces FOLDER",
+            )
+        found = get_types_from_msg(definition, type_)
+        store.register({name: fields for name, fields in found.items() if name not in store.types})
+    return store
 
 
-def _numbers(message: object, part: str, names: str) -> Mapping[str, float]:
-    holder = attrgetter(part)(message)
-    return {name: float(getattr(holder, name)) for name in names}
+def _fields(message: Any) -> Mapping[str, Any]:
+    """Return the fields of a message as plain values, named as in its definition, without what nobody judges."""
+    plain = {name: _plain(getattr(message, name)) for name in message.__dataclass_fields__ if name != _NOT_KEPT}
+    plain.pop("__msgtype__", None)
+    return {name: value for name, value in plain.items() if not isinstance(value, list) or len(value) <= MOST_ELEMENTS}
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "__dataclass_fields__"):
+        return _fields(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
+
+
+def _has_finite_positions(value: Mapping[str, Any]) -> bool:
+    """Return whether every field `position` that is a point has finite coordinates; a distance may well be infinite."""
+    for name, inner in value.items():
+        if isinstance(inner, Mapping):
+            numbers = [number for number in inner.values() if isinstance(number, float)]
+            if (name == "position" and not all(map(math.isfinite, numbers))) or not _has_finite_positions(inner):
+                return False
+    return True
 
 
 def _ros_1(path: Path) -> RecordingError:
@@ -266,10 +340,12 @@ def _ros_1(path: Path) -> RecordingError:
     )
 
 
-def _unfit(path: Path, topic: str, what: str) -> RecordingError:
-    return RecordingError(
-        f"{_line(path)}: expected odometry on {_line(topic)} of {what}", "record a longer drive, 15 s or more"
-    )
+def _count(messages: int) -> str:
+    return "1 message" if messages == 1 else f"{messages} messages"
+
+
+def _too_short(path: Path, topic: str, what: str) -> RecordingError:
+    return RecordingError(f"{_line(path)}: expected a recording of {_line(topic)} with {what}", "record it for longer")
 
 
 def _line(text: object, *, source: Path | None = None, limit: int = 5000) -> str:

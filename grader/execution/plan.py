@@ -22,7 +22,7 @@ from grader.core.scenario import (
     MessageStream,
     NumberSpec,
     NumberStream,
-    OdometryStream,
+    RecordedStream,
     RunOptions,
     Scenario,
     ServiceCalls,
@@ -33,7 +33,7 @@ from grader.core.scenario import (
     shortest,
 )
 from grader.core.trace import Endpoint
-from grader.execution.bag import Odometry, window
+from grader.execution.bag import Recording, window
 from grader.execution.exchanges import (
     PlannedCalls,
     PlannedGoal,
@@ -71,6 +71,7 @@ class PlannedNumbers:
     period_ns: int
     repeats: int
     numbers: tuple[PlannedNumber, ...]
+    field: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +231,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
     submission: Submission,
     *,
     seed: int,
-    odometry: Odometry | None,
+    recordings: Mapping[RecordedStream, Recording],
     clock: str,
     own_hashes: bool = False,
 ) -> Plan:
@@ -241,7 +242,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         scenario: The scenario to plan.
         submission: Provides the files; every process of the scenario must have one.
         seed: Determines every drawn value, together with the exercise and the scenario.
-        odometry: The recording, if the scenario plays one.
+        recordings: The recording of each stimulus that plays one.
         clock: `virtual` or `wall`.
         own_hashes: Whether the hashes of texts in the processes are drawn too, because the order of a set may matter.
     """
@@ -253,10 +254,8 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
     until_ns = 0 if scenario.span.after_first_message_on else duration_ns
     draw = random.Random(derive(seed, *purposes))  # noqa: S311 - as above
     numbers = tuple(_numbers(s, draw, own, until_ns) for s, own in drawn if isinstance(s, NumberStream))
-    recordings = tuple(
-        _recording(s, odometry, draw.getrandbits(32), own)
-        for s, own in drawn
-        if isinstance(s, OdometryStream) and odometry is not None
+    played = tuple(
+        _recording(s, recordings[s], draw.getrandbits(32), own) for s, own in drawn if isinstance(s, RecordedStream)
     )
     return Plan(
         scenario=scenario.id,
@@ -267,7 +266,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         first_message_on=scenario.span.after_first_message_on or "",
         wait_at_most_ns=scenario.span.wait_at_most_ns,
         numbers=numbers,
-        recordings=recordings,
+        recordings=played,
         clock=clock,
         epoch_ns=EPOCH_NS + _drawn(EPOCH_SPAN_S, seed, "epoch") * NS_PER_S,
         uptime_ns=UPTIME_NS + _drawn(UPTIME_SPAN_S, seed, "uptime") * NS_PER_S,
@@ -370,7 +369,7 @@ def _numbers(stream: NumberStream, draw: random.Random, own: random.Random, unti
         # a node may switch off when messages stop, so the last number is repeated until the observation ends
         each[-1] = max(each[-1], -(-(until_ns - start_ns) // stream.period_ns) - sum(each[:-1]))
         numbers, repeats = tuple(n for n, times in zip(numbers, each, strict=True) for _ in range(times)), 1
-    return PlannedNumbers(stream.topic, stream.type, start_ns, stream.period_ns, repeats, numbers)
+    return PlannedNumbers(stream.topic, stream.type, start_ns, stream.period_ns, repeats, numbers, stream.field)
 
 
 def _number(spec: NumberSpec, draw: random.Random) -> PlannedNumber:
@@ -386,13 +385,13 @@ def _number(spec: NumberSpec, draw: random.Random) -> PlannedNumber:
     return spec, 0
 
 
-def _recording(stream: OdometryStream, odometry: Odometry, seed: int, own: random.Random) -> PlannedRecording:
+def _recording(stream: RecordedStream, recording: Recording, seed: int, own: random.Random) -> PlannedRecording:
     start_ns, duration_ns = drawn_time(stream.start_ns, own), drawn_time(stream.duration_ns, own)
-    messages = window(odometry, duration_ns=duration_ns, seed=seed)
+    messages = window(recording, duration_ns=duration_ns, seed=seed)
     kept = tuple((start_ns + m.t_ns, m.cdr, m.value) for m in messages if m.t_ns <= duration_ns)
     return PlannedRecording(
         topic=stream.topic,
-        type="nav_msgs/msg/Odometry",
+        type=stream.type,
         start_ns=start_ns,
         stop_ns=kept[-1][0] + 1 if kept else start_ns,
         messages=kept,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
+from typing import Any
 
 import msgspec
 
@@ -20,7 +21,7 @@ from grader.core.chart import (
     Stage,
     Tone,
 )
-from grader.core.exercise import Check, Criterion, Exercise, Location, reads_sources
+from grader.core.exercise import Criterion, Exercise, Location, has, reads_sources
 from grader.core.quantities import counted, seconds
 from grader.core.report import ExerciseReport
 from grader.core.scenario import Scenario
@@ -30,7 +31,7 @@ from grader.judging.authored import is_authored, mistake_of
 from grader.judging.charts import Lanes, marked_moments, time_chart
 from grader.judging.findings import fault_sentence
 from grader.judging.output import printed_lines
-from grader.judging.plots import chart_of
+from grader.judging.plots import chart_of, shows_graph
 from grader.judging.recorded_values import recorded_values
 from grader.judging.values import on_student_topic
 from grader.judging.wording import quote
@@ -61,12 +62,13 @@ def expectation(criterion: Criterion, mistakes: list[AuthorMistake]) -> str:
 
     A mistake in a check of an author's is appended to `mistakes`.
     """
+    check: Any = criterion.check
     try:
-        own = getattr(criterion.check, "expected", "")
+        own = check.expected if has(check, "expected") else ""
     except Exception as error:
-        if not is_authored(criterion.check):
+        if not is_authored(check):
             raise
-        mistakes.append(mistake_of(criterion.check, error))
+        mistakes.append(mistake_of(check, error))
         return ""
     return own if isinstance(own, str) else ""
 
@@ -81,7 +83,7 @@ def figures_of(
     drawn = [chart for c in exercise.criteria for chart in _drawn(c, traces, [] if mistakes is None else mistakes)]
     figures: list[Figure] = list(_merged(drawn))
     graph = graph_figure(exercise, traces)
-    graphs = tuple(c.id for c in exercise.criteria if _shows_graph(c.check))
+    graphs = tuple(c.id for c in exercise.criteria if shows_graph(c.check))
     if graph is not None and graphs:
         figures.append(replace(graph, criteria=graphs))
     told = {id_ for figure in figures for id_ in figure.criteria}
@@ -94,7 +96,7 @@ def _drawn(criterion: Criterion, traces: Mapping[str, Trace], mistakes: list[Aut
     if trace is None:
         return
     try:
-        chart = chart_for(criterion.check, trace)
+        chart = chart_of(criterion.check, trace)
         if chart is not None and is_authored(criterion.check):
             chart = msgspec.convert(msgspec.to_builtins(chart), Chart)  # raises for values of a wrong type
     except Exception as error:  # a failing chart must not cost the report
@@ -103,19 +105,6 @@ def _drawn(criterion: Criterion, traces: Mapping[str, Trace], mistakes: list[Aut
             mistakes.append(mistake_of(criterion.check, error))
     if isinstance(chart, Chart):
         yield replace(chart, scenario=criterion.scenario, criteria=(criterion.id,))
-
-
-def chart_for(check: Check, trace: Trace) -> Chart | None:
-    """Return the chart of a check: one of its own, or the general one; None if it shows the graph, or nothing came."""
-    own: object = getattr(check, "chart", None)
-    if callable(own):
-        chart: Chart | None = own(trace)
-        return chart
-    return None if _shows_graph(check) else chart_of(check, trace)
-
-
-def _shows_graph(check: Check) -> bool:
-    return getattr(check, "shows_graph", False) is True
 
 
 def _merged(charts: Iterable[Chart]) -> Iterable[Chart]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Location, Problem, ProblemKind, exact_share
 from grader.core.quantities import NS_PER_S, counted, seconds
 from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace
+from grader.judging.facts import OtherEnd
 from grader.judging.values import HIDDEN_TOPICS, student_endpoints
 from grader.judging.wording import listed, moment, nearest, quote, span
 
@@ -44,9 +46,11 @@ def partly(  # noqa: PLR0913  each is a field of the finding
     hint: str = "",
     problem: Problem | ProblemKind | None = None,
     brief: str = "",
+    facts: object = None,
 ) -> Finding:
     """Return a finding with half credit, or with the given share of the points, from 0 to 1."""
-    return Finding(exact_share(credit), reason, evidence or {}, hint=hint, problem=_as_problem(problem), brief=brief)
+    found = _as_problem(problem)
+    return Finding(exact_share(credit), reason, evidence or {}, hint=hint, problem=found, brief=brief, facts=facts)
 
 
 def only_printed(reason: str, evidence: Mapping[str, object] | None, hint: str) -> Finding:
@@ -63,6 +67,7 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
     blocked_by: str | None = None,
     problem: Problem | ProblemKind | None = None,
     brief: str = "",
+    facts: object = None,
 ) -> Finding:
     """Return a finding without credit.
 
@@ -74,6 +79,7 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
         blocked_by: Criterion id, or name of a check in the same scenario, that must be met first.
         problem: The problem, where a check tells several apart; a fault needs none.
         brief: The reason in a few words, if it is long; for a fault, its own text unless given.
+        facts: A record for hint rules.
     """
     known = dict(evidence or {})
     if fault is not None:
@@ -81,9 +87,7 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
     location = fault_location(fault) if fault is not None else None
     found = _as_problem(problem)
     brief = brief or (_own_words(fault) if fault is not None else "")
-    return Finding(
-        Fraction(0), reason, known, location=location, hint=hint, blocked_by=blocked_by, problem=found, brief=brief
-    )
+    return Finding(Fraction(0), reason, known, location, hint, blocked_by, found, brief, facts)
 
 
 def _as_problem(problem: Problem | ProblemKind | None) -> Problem | None:
@@ -92,7 +96,7 @@ def _as_problem(problem: Problem | ProblemKind | None) -> Problem | None:
 
 def waiting_for(needed: str, finding: Finding) -> Finding:
     """Return a finding that waits for a criterion or check, without its location."""
-    return not_met(finding.reason, finding.evidence, hint=finding.hint, blocked_by=needed, problem=finding.problem)
+    return replace(finding, credit=Fraction(0), location=None, blocked_by=needed, brief="")
 
 
 def fault_location(fault: Fault) -> Location | None:
@@ -271,7 +275,7 @@ def _explain(
     reason = f"{name}: {words.none}; {quote(end.node)} {words.instead} {quote(other)} [{quote(end.type)}]"
     evidence = {key: other, "type": end.type, "node": end.node}
     hint = f"{words.name_hint.format(name=name)} instead of {quote(other)}"
-    return not_met(reason, evidence, hint=hint, problem=ProblemKind.OTHER_NAME)
+    return not_met(reason, evidence, hint=hint, problem=ProblemKind.OTHER_NAME, facts=OtherEnd(other, end.type))
 
 
 def _most_alike(name: str, same_type: Sequence[str], others: Sequence[str]) -> str | None:

@@ -7,10 +7,12 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from itertools import islice
+from typing import Any, Protocol
 
 from grader.core.chart import Band, Case, Chart, Level, Look, Panel, Series, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
+from grader.core.exercise import NODE_GRAPH, has, named, roles_of
 from grader.core.quantities import NS_PER_MS, NS_PER_S, counted, seconds
 from grader.core.trace import Delivery, Message, Request, Response, Trace
 from grader.judging.charts import (
@@ -31,12 +33,13 @@ from grader.judging.values import (
     as_number,
     as_rule,
     delivered,
+    number_path,
     published,
     rules_text,
     shown,
     value_at,
 )
-from grader.judging.wording import listed, number, quote, unit_of
+from grader.judging.wording import in_unit, listed, number, quote
 
 #: Maximum number of panels of a chart, of panels for one topic, of lines in a panel, and of rows for texts.
 _MOST_PANELS, _MOST_GROUPS, _MOST_LINES, _MOST_WORDS = 6, 3, 6, 5
@@ -75,6 +78,8 @@ class Plot:
         bands: Accepted ranges of the first field.
         expected: What the first field should have been.
         most: Maximum number of panels.
+        number: Path of the field that goes by the name of the topic.
+        unit: Unit of that field.
     """
 
     topic: str
@@ -84,6 +89,8 @@ class Plot:
     bands: tuple[Band, ...] = ()
     expected: tuple[Reading, ...] = ()
     most: int = _MOST_GROUPS
+    number: str = "data"
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,34 +123,44 @@ class Drawing:
 _Panels = list[tuple[Panel, str]]
 
 
-def chart_of(check: object, trace: Trace) -> Chart | None:
+def chart_of(check: Any, trace: Trace) -> Chart | None:
     """Return the chart of a check: by its method `drawing`, or of what its parameters name; None if nothing happened.
 
-    A check without `drawing` may name topics (`input`, `topic`, `output`), a `field` or `fields` of the last of them, a
-    `service`, an `action`, and the `process` whose output is shown below.
+    A check that shows the graph of nodes and topics has no chart.
+
+    Raises:
+        TypeError: The method returned something else.
     """
-    own = getattr(check, "drawing", None)
+    if shows_graph(check):
+        return None
     try:
-        drawing = own(trace) if callable(own) else _named(check)
+        found = check.drawing(trace) if has(check, "drawing") else _named(check)
     except HarnessError:  # what the check asks is not in the recording
         return None
-    return drawn(drawing, trace) if isinstance(drawing, Drawing) else None
+    if not isinstance(found, (Drawing, Chart, type(None))):
+        raise TypeError(f"drawing returned a {type(found).__name__}, expected a Drawing, a Chart or None")
+    return drawn(found, trace) if isinstance(found, Drawing) else found
+
+
+def shows_graph(check: object) -> bool:
+    """Return whether the picture of a check is the graph of nodes and topics."""
+    return getattr(check, "drawing", None) == NODE_GRAPH
 
 
 def _named(check: object) -> Drawing:
-    def names(*attributes: str) -> tuple[str, ...]:
-        found = (getattr(check, name, None) for name in attributes)
-        return tuple(dict.fromkeys(name for name in found if isinstance(name, str) and name))
-
-    topics, fields = names("input", "topic", "output"), names("field")
-    several = getattr(check, "fields", None)
-    if isinstance(several, Mapping):
-        fields = tuple(map(str, several))
-    plots = [Plot(topic) for topic in topics]
+    """Return a drawing of the topics, services, actions and output that the parameters of a check name."""
+    roles = roles_of(type(check))
+    plots = [Plot(topic) for topic in named(check, *roles.topics)]
+    fields = list(named(check, *roles.fields))
+    fields += [str(path) for name in roles.fields for path in _keys(getattr(check, name, None))]
     if plots and fields:
-        plots[-1] = replace(plots[-1], fields=fields)
-    action = "".join(names("action"))
-    return Drawing(tuple(plots), names("service"), action=action, processes=names("process"))
+        plots[-1] = replace(plots[-1], fields=tuple(fields))
+    services, action = named(check, *roles.services), "".join(named(check, *roles.actions)[:1])
+    return Drawing(tuple(plots), services, action=action, processes=named(check, roles.process))
+
+
+def _keys(value: object) -> Iterable[object]:
+    return value if isinstance(value, Mapping) else ()
 
 
 def drawn(drawing: Drawing, trace: Trace) -> Chart | None:
@@ -221,6 +238,7 @@ def _topic_panels(plot: Plot, items: Sequence[Item], verb: str, *, several: bool
     timed = [(item.t_ns, item.value) for item in items]
     how = {"came": "received on", "published": "published on"}[verb]
     head = f"{counted(len(items), 'message')} {how} {plot.topic}"
+    plot = replace(plot, number=number_path(items[0].value) or plot.number) if items else plot
     return value_panels(plot, timed, head, plot.topic if several else "", steps=verb == "came")
 
 
@@ -331,7 +349,7 @@ def _label(path: str) -> str:
 
 def _name(plot: Plot, path: str) -> str:
     """Return the name of a field in a legend: a topic with a single field goes by its own name."""
-    return plot.topic if path in ("data", "temperature") else _label(path)
+    return plot.topic if path == plot.number else _label(path)
 
 
 def _values(path: str, timed: Sequence[_Timed]) -> list[tuple[int, object]]:
@@ -361,9 +379,9 @@ def _lines(plot: Plot, readings: Mapping[str, Sequence[Reading]], *, steps: bool
 def _panel(  # noqa: PLR0913
     plot: Plot, group: str, paths: Sequence[str], lines: Sequence[Series], prefix: str, *, first: bool
 ) -> Panel:
-    alone = paths in (["data"], ["temperature"])
+    alone = list(paths) == [plot.number]
     title = plot.topic if alone else f"{prefix} {_label(group)}".strip() or "value"
-    unit = unit_of(plot.topic).strip() if alone else _UNITS.get(group.rpartition(".")[2], "")
+    unit = plot.unit if alone else _UNITS.get(group.rpartition(".")[2], "")
     levels, bands = _ruled({path: plot.rules[path] for path in paths if path in plot.rules})
     if first:
         levels, bands = [*plot.levels, *levels], [*plot.bands, *bands]
@@ -561,7 +579,28 @@ def said_of(value: Mapping[str, object]) -> str:
     return ", ".join(f"{quote(str(name), 40)} = {shown(inner)}" for name, inner in islice(value.items(), 12))
 
 
-def threshold_drawing(input_: str, output: str, threshold: float, expected: Sequence[Reading]) -> Drawing:
+class Switching(Protocol):
+    """A check on a controller that switches at a threshold."""
+
+    @property
+    def input(self) -> str:
+        """Topic of the numbers."""
+
+    @property
+    def output(self) -> str:
+        """Topic of the answers."""
+
+    @property
+    def threshold(self) -> float:
+        """Where the answer changes."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of the input."""
+
+
+def threshold_drawing(check: Switching, expected: Sequence[Reading]) -> Drawing:
     """Return the inputs of a controller with its threshold, above its answers with the expected ones."""
-    level = Level(threshold, f"{number(threshold)}{unit_of(input_)}", name="threshold")
-    return Drawing((Plot(input_, levels=(level,)), Plot(output, expected=tuple(expected))))
+    level = Level(check.threshold, f"{number(check.threshold)}{in_unit(check.unit)}", name="threshold")
+    heard = Plot(check.input, levels=(level,), unit=check.unit)
+    return Drawing((heard, Plot(check.output, expected=tuple(expected))))

@@ -212,7 +212,7 @@ def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> 
         consequence = "the file cannot run"
     elif fault.kind is FaultKind.EXITED and fault.t_ns >= AT_ONCE_NS:
         consequence = "the node had sent and received nothing by then"
-    return faulted(fault, consequence, finding.evidence)
+    return replace(faulted(fault, consequence, finding.evidence), facts=finding.facts)
 
 
 def start_failure(scenario: Scenario, trace: Trace) -> Fault | None:

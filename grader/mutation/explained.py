@@ -14,7 +14,6 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
-from grader.rubrics.builtin import NOTES
 from grader.rubrics.mistakes import mistakes_of, nearest
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
 from grader.submissions.collected import listed, shown
@@ -85,11 +84,6 @@ class _File(_Shape):
     expected: tuple[_Expected, ...] = ()
     variants: tuple[_Variant, ...] = ()
     criteria: tuple[_Criterion, ...] = ()
-
-
-def beside(rubric: Path) -> Path:
-    """Return the path of the notes on a rubric: `NAME.selftest.yaml` beside `NAME.yaml`."""
-    return rubric.with_suffix(NOTES)
 
 
 def read_explained(path: Path, exercise: Exercise) -> Explained:

@@ -14,20 +14,21 @@ from pathlib import Path
 
 from libcst import ParserSyntaxError
 
-from grader.app.grade import Progress, plan_jobs, read_exercises, read_recording
+from grader.app.bags import Recordings, read_recordings
+from grader.app.grade import Progress, plan_jobs, read_exercises
 from grader.app.interface_packages import provide
 from grader.app.request import GradeRequest
 from grader.app.seeds import PRACTICE
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
+from grader.core.rubric_files import notes_on, rubric_file
 from grader.core.submission import Submission
 from grader.core.trace import Trace
-from grader.execution.bag import Odometry
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.supervisor import Job
 from grader.judging.judge_run import judge_exercise
-from grader.mutation.explained import Explained, Explanation, beside, read_explained
+from grader.mutation.explained import Explained, Explanation, read_explained
 from grader.mutation.operators import mutants_of
 from grader.mutation.operators.program import Candidate, Program
 from grader.mutation.operators.variants import variants_of
@@ -48,7 +49,7 @@ class TrialRunner:
     workers: int
     request: GradeRequest
     exercise: Exercise
-    odometry: Odometry | None
+    bags: Recordings
     seed: int
     reference: Submission
     sources: Mapping[str, str]
@@ -59,7 +60,7 @@ class TrialRunner:
 
     def grade(self, submission: Submission) -> tuple[TrialResult, dict[str, Trace]]:
         """Grade a complete submission; the traces are those of its scenarios."""
-        jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed, self.interfaces)
+        jobs = plan_jobs(self.request, [self.exercise], submission, self.bags, self.seed, self.interfaces)
         recorded = self.session.record(jobs, self.request.clock, self.progress)
         self.recordings += len(recorded)
         traces = {scenario: trace for (_, scenario), trace in recorded.items()}
@@ -86,7 +87,7 @@ class TrialRunner:
             done += len(chunk)
 
     def _jobs(self, candidate: Candidate, submission: Submission) -> Mapping[tuple[str, str], Job]:
-        jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed, self.interfaces)
+        jobs = plan_jobs(self.request, [self.exercise], submission, self.bags, self.seed, self.interfaces)
         concerned = {s.id for s in self.exercise.scenarios if candidate.file in s.processes}
         return {key: job for key, job in jobs.items() if key[1] in concerned}
 
@@ -132,13 +133,14 @@ def selftest(rubrics: Sequence[Path], options: SelftestOptions, progress: Progre
 
 
 def _prepared(path: Path, options: SelftestOptions) -> tuple[Path, Exercise, Explained]:
+    path = rubric_file(path)
     (exercise,) = read_exercises(GradeRequest("", rubrics=(path,)))
-    known = read_explained(beside(path), exercise)
+    known = read_explained(notes_on(path), exercise)
     explained = replace(
         known, reference=options.reference or known.reference, template=options.template or known.template
     )
     if explained.reference is None:
-        hint = f"name it with --reference FOLDER, or as `reference:` in {beside(path).name}"
+        hint = f"name it with --reference FOLDER, or as `reference:` in {notes_on(path).name}"
         raise RubricError(f"{path}: expected a reference solution to test it with, found none", hint)
     return path, exercise, explained
 
@@ -159,7 +161,7 @@ def _bench(  # noqa: PLR0913  each comes from a different stage
         session=session,
         request=request,
         exercise=exercise,
-        odometry=read_recording(request, [exercise]),
+        bags=read_recordings(request, [exercise]),
         seed=PRACTICE.seed(reference.digest) if options.seed is None else options.seed,
         reference=reference,
         sources=_sources(reference, exercise),

@@ -10,7 +10,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from grader.core.errors import GraderError
-from grader.mutation.explained import SCHEMA, beside
+from grader.core.rubric_files import notes_on
+from grader.mutation.explained import SCHEMA
 from grader.mutation.results import SelftestResult, Trial
 from grader.submissions.collected import shown
 
@@ -33,7 +34,7 @@ def noted(
     Raises:
         GraderError: A list of the notes is written in one line, so that nothing can be added to it.
     """
-    path = beside(Path(result.rubric))
+    path = notes_on(Path(result.rubric))
     if text is None:
         text = "\n".join(_head(path.parent, reference, template)) + "\n"
     entries = {

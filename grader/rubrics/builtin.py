@@ -13,16 +13,14 @@ from grader.compiled import compiled, state_of, state_of_package
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
+from grader.core.rubric_files import rubrics_in
 from grader.core.shipped import shipped
 from grader.submissions.collected import shown
 
-#: Suffix of files beside rubrics that are not rubrics: notes on their self-tests.
-NOTES = ".selftest.yaml"
 
-
-def builtin_odometry() -> Path:
-    """Return the project's own /odom recording."""
-    return shipped("rubrics") / "odometry"
+def builtin_recording() -> Path:
+    """Return the recording that the stimulus `odometry` plays, which names none."""
+    return shipped("rubrics") / "exercise_2" / "odometry"
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +36,8 @@ class Header:
 @cache
 def builtin_exercises() -> tuple[Exercise, ...]:
     """Return the built-in exercises, ordered by number; raises RubricError without any."""
-    return compiled("rubrics", state_of(_paths()) + state_of_package(), _read_exercises)
+    beside = sorted(shipped("rubrics").rglob("*.py"))  # checks and hint rules that a rubric names
+    return compiled("rubrics", state_of([*_paths(), *_recorded(), *beside]) + state_of_package(), _read_exercises)
 
 
 def _read_exercises() -> tuple[Exercise, ...]:
@@ -62,7 +61,12 @@ def builtin_headers() -> tuple[Header, ...]:
 
 
 def _paths() -> list[Path]:
-    return [path for path in sorted(shipped("rubrics").glob("*.yaml")) if not path.name.endswith(NOTES)]
+    return rubrics_in(shipped("rubrics"))
+
+
+def _recorded() -> list[Path]:
+    """Return the files of the recordings beside the rubrics, which the digests of exercises cover."""
+    return sorted(builtin_recording().iterdir())
 
 
 def _header(path: Path) -> Header:

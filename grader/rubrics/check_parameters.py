@@ -14,6 +14,7 @@ from pydantic import AfterValidator, Field, create_model
 from pydantic.config import JsonDict
 
 from grader.core.dataclass import dataclass
+from grader.core.exercise import roles_of
 from grader.core.quantities import DurationNs, FieldOf, Hertz, Kind, Least, Unit
 from grader.core.scenario import Simulated
 from grader.rubrics.drawing import (
@@ -25,6 +26,7 @@ from grader.rubrics.drawing import (
     DrawnWhole,
     DrawnYesNo,
     Either,
+    FieldName,
     Fields,
     MessageCases,
     MessageCasesOrNone,
@@ -47,6 +49,7 @@ from grader.rubrics.types import (
     ProgramName,
     Quantity,
     Real,
+    RecordingPath,
     ServiceType,
     Shape,
     Text,
@@ -62,15 +65,6 @@ T = TypeVar("T")
 
 #: Prefix of dynamic fields, so that a check may have a parameter `copy` or `json` without hiding pydantic's own.
 _PREFIX = "p_"
-
-#: Required form of parameters by their name, beyond being text.
-_BY_NAME: Mapping[str, object] = {
-    **dict.fromkeys(
-        ("topic", "input", "output", "forward", "back", "service", "action", "publishes", "subscribes"), Topic
-    ),
-    "type": MessageType,
-    "process": ProgramName,
-}
 
 _BY_ANNOTATION: tuple[tuple[object, object], ...] = (
     (DurationNs, Duration),
@@ -89,6 +83,8 @@ _BY_KIND: Mapping[str, object] = {
     "formula": FormulaText,
     "formula of fields": FieldFormulaText,
     "pattern": PatternText,
+    "recording": RecordingPath,
+    "field name": FieldName,
     "time": SomeTime,
     "time above 0": SomeLongTime,
     "fixed time above 0": LongDuration,
@@ -132,12 +128,20 @@ def choice_model(name: str, summary: str, options: Mapping[str, Any]) -> type[Ch
 def _parameters(cls: type) -> type[Shape]:
     """Return the model of a check; its fields have the same names in rubrics as in Python."""
     hints = get_type_hints(cls, include_extras=True)
+    forms = _forms(cls)
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(cls):
         default = ... if _is_required(field) else None
-        accepted = _accepted(hints[field.name], field.name)
+        accepted = _accepted(hints[field.name], forms.get(field.name, Text))
         fields[f"{_PREFIX}{field.name}"] = (accepted, Field(default, alias=field.name))
     return _model(cls, cls.__name__, fields)
+
+
+def _forms(kind: type) -> dict[str, object]:
+    """Return the required form of text parameters by their name, beyond being text."""
+    roles = roles_of(kind)
+    names = dict.fromkeys((*roles.topics, *roles.hears, *roles.speaks, *roles.services, *roles.actions), Topic)
+    return {**names, roles.type: MessageType, roles.process: ProgramName}
 
 
 class _SimulationParameters(Shape):
@@ -168,14 +172,14 @@ def simulation_shape(name: str, kind: type, path: str = "", content: bytes = b""
     Raises:
         TypeError: A parameter has a type for which there is no rubric syntax.
     """
-    hints = get_type_hints(kind, include_extras=True)
+    hints, forms = get_type_hints(kind, include_extras=True), _forms(kind)
     fields: dict[str, Any] = {}
     # a parameter is explained where it is written, which may be a base class
     meanings = {k: words for base in reversed(kind.__mro__) for k, words in manual_of(base).parameters.items()}
     for field in dataclasses.fields(kind):
         if field.init:
             default = ... if _is_required(field) else None
-            accepted = _drawable(hints[field.name], field.name)
+            accepted = _drawable(hints[field.name], forms.get(field.name, Text))
             description = meanings.get(field.name)
             fields[f"{_PREFIX}{field.name}"] = (accepted, Field(default, alias=field.name, description=description))
     summary = " ".join((kind.__doc__ or "").strip().split("\n\n")[0].split())
@@ -184,11 +188,11 @@ def simulation_shape(name: str, kind: type, path: str = "", content: bytes = b""
     return model
 
 
-def _drawable(annotation: object, name: str) -> object:
+def _drawable(annotation: object, form: object) -> object:
     """Return the type that a rubric may hold for a parameter; a number, truth value or text may be drawn."""
     if isinstance(annotation, type) and dataclasses.is_dataclass(annotation):
         raise TypeError(f"no rubric syntax for a parameter annotated {annotation!r}")
-    accepted = _accepted(annotation, name)
+    accepted = _accepted(annotation, form)
     drawn = {float: DrawnNumber, int: DrawnWhole, bool: DrawnYesNo, str: DrawnText}
     known = next((shape for kind, shape in drawn.items() if annotation is kind), None)
     return accepted if known is None else Either[accepted, known]  # type: ignore[misc, valid-type]
@@ -223,14 +227,17 @@ def _is_required(field: dataclasses.Field[object]) -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
-def _accepted(annotation: object, name: str = "") -> object:
-    """Return the type that a rubric may hold for a dataclass field: its annotation, made strict and given units."""
+def _accepted(annotation: object, form: object = Text) -> object:
+    """Return the type that a rubric may hold for a dataclass field: its annotation, made strict and given units.
+
+    A text has to have the form.
+    """
     if kind := _mark(annotation, Kind):
         return _BY_KIND[kind.name]
     if _mark(annotation, FieldOf):
         annotation = get_args(annotation)[0]
     if annotation is str:
-        return _BY_NAME.get(name, Text)
+        return form
     for known, accepted in _BY_ANNOTATION:
         if annotation == known:
             return accepted
@@ -240,15 +247,15 @@ def _accepted(annotation: object, name: str = "") -> object:
         return Annotated[number, AfterValidator(partial(_at_least, least.value, unit))]
     if isinstance(annotation, type) and dataclasses.is_dataclass(annotation):
         return _parameters(annotation)
-    return _accepted_generic(annotation, name)
+    return _accepted_generic(annotation, form)
 
 
-def _accepted_generic(annotation: object, name: str) -> object:
+def _accepted_generic(annotation: object, form: object) -> object:
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin in (Union, types.UnionType):
-        return Union[tuple(_accepted(a, name) for a in arguments)]  # noqa: UP007
+        return Union[tuple(_accepted(a, form) for a in arguments)]  # noqa: UP007
     if origin is tuple:
-        return tuple[tuple(a if a is ... else _accepted(a, name) for a in arguments)]  # type: ignore[misc]
+        return tuple[tuple(a if a is ... else _accepted(a, form) for a in arguments)]  # type: ignore[misc]
     if isinstance(origin, type) and issubclass(origin, Mapping):
         return dict[str, _accepted(arguments[1])]  # type: ignore[misc]
     if origin is Literal or annotation is type(None):

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Stri
 from typing_extensions import Self, TypeAliasType
 
 from grader.core.scenario import (
+    ODOMETRY,
     AnyOrder,
     Between,
     Choose,
@@ -19,6 +20,7 @@ from grader.core.scenario import (
     InOrder,
     JustAbove,
     JustBelow,
+    RecordedStream,
     ServiceCalls,
     SomeOf,
     TimeBetween,
@@ -304,6 +306,18 @@ DrawnYesNo = _drawn_as(lambda drawn: drawn.between is None and _options(drawn, b
 DrawnText = _drawn_as(
     lambda drawn: (drawn.between is None or drawn.text is not None) and _options(drawn, str), "texts to draw from"
 )
+
+
+class OdometryShape(Shape):
+    """A stimulus: `recorded` with the type nav_msgs/msg/Odometry and a recording that ships with the grader."""
+
+    topic: Topic
+    start: SomeTime = 0
+    duration: SomeLongTime
+
+    def built(self) -> RecordedStream:
+        """Return the equivalent recording."""
+        return RecordedStream(self.topic, ODOMETRY, "", build(self.start), build(self.duration))
 
 
 class ParameterShape(Shape):

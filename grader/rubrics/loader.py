@@ -15,11 +15,13 @@ from pydantic import BaseModel, ValidationError
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
-from grader.core.exercise import Check, Criterion, Exercise, Variant
+from grader.core.exercise import Check, Criterion, Exercise, HintRule, Variant
 from grader.core.limits import Limits
 from grader.core.quantities import duration
+from grader.core.rubric_files import rubric_file
 from grader.core.scenario import (
     NumberStream,
+    RecordedStream,
     RunOptions,
     Scenario,
     Span,
@@ -40,16 +42,19 @@ from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, fee
 from grader.rubrics.own_checks import (
     OwnFile,
     OwnSimulation,
+    bag_files,
     definition_files,
     digest_of,
     load,
+    load_hints,
     load_simulations,
+    named_bags,
     named_files,
     own_files,
 )
 from grader.rubrics.run_options import RunShape
 from grader.rubrics.simulations import simulation_mistakes
-from grader.rubrics.types import CHECK_FILE, INTERFACE_FOLDER, PROVIDED_FILE, PROVIDED_WORDS, build
+from grader.rubrics.types import BESIDE, CHECK_FILE, PROVIDED_FILE, PROVIDED_WORDS, build
 from grader.rubrics.variants import (
     VariantOptions,
     Variants,
@@ -228,11 +233,15 @@ class RubricMistakes(RubricError):  # noqa: N818  named after what it holds
 
 @dataclass(frozen=True, slots=True)
 class _Brought:
-    """What a rubric may use, by name: checks, the grader's among them, its own simulations, texts of provided files."""
+    """What a rubric may use, by name: checks, the grader's among them, its own simulations, texts of provided files.
+
+    Its hint rules are in the order of their files.
+    """
 
     checks: Mapping[str, type]
     simulations: Mapping[str, OwnSimulation]
     provided: Mapping[str, str]
+    hints: Iterable[HintRule]
 
 
 def read_rubric(
@@ -243,10 +252,10 @@ def read_rubric(
     draw: Draw | None = None,
     interfaces: Interfaces | None = None,
 ) -> Exercise:
-    """Read a rubric file; its own checks, if any, are run.
+    """Read a rubric file; its own checks and hint rules, if any, are run.
 
     Args:
-        path: The file; messages show it as given.
+        path: The file, or another name for it (`rubric_file`); messages show it as given.
         checks: Checks that the rubric may use, besides its own.
         submissions: Folders that students write to: checks are never loaded from there.
         draw: Chooses the values of variants; without it, a rubric with variants is rejected.
@@ -255,16 +264,19 @@ def read_rubric(
     Raises:
         RubricError: The file cannot be read, or has mistakes; one line each, in the order of the file.
     """
+    path = rubric_file(path)
     content = _content(path)
     tree = _tree(path, content)
     files = own_files(path, _own_names(path, tree, "checks"), submissions)
+    hints = own_files(path, _own_names(path, tree, "hints"), submissions, key="hints")
     simulated = own_files(path, _own_names(path, tree, "simulations"), submissions, key="simulations")
     others = own_files(path, _own_names(path, tree, "provided"), submissions, key="provided")
-    brought = _Brought(
-        {**checks, **load(files, checks)}, load_simulations(simulated), {one.name: _provided(one) for one in others}
-    )
+    usable = {**checks, **load(files, checks)}
+    provided = {one.name: _provided(one) for one in others}
+    brought = _Brought(usable, load_simulations(simulated), provided, load_hints(hints, usable))
     definitions = definition_files(path, folders := _own_names(path, tree, "interfaces"), submissions)
-    digest = digest_of(content, tuple(dict.fromkeys((*files, *others, *simulated, *definitions))))
+    bags = bag_files(path, named_bags(tree.data), submissions)
+    digest = digest_of(content, tuple(dict.fromkeys((*files, *hints, *others, *simulated, *definitions, *bags))))
     if interfaces is not None and folders:
         interfaces = interfaces.including([path.parent / folder for folder in folders])
     if not has_variants(tree):
@@ -343,24 +355,28 @@ def _exercise(
         title=rubric.exercise.title,
         required=rubric.exercise.required,
         files=rubric.files,
-        scenarios=tuple(_scenario(shape, limits, brought.provided) for shape in rubric.scenarios),
+        scenarios=tuple(_scenario(path, shape, limits, brought.provided) for shape in rubric.scenarios),
         criteria=criteria,
         digest=digest,
         by_request=rubric.exercise.by_request,
         bonus=rubric.exercise.bonus or Fraction(0),
         interfaces=tuple(str(path.parent / folder) for folder in rubric.interfaces),
+        hints=brought.hints,
     )
 
 
 def side_files(path: Path) -> tuple[OwnFile, ...]:
     """Return every file that a rubric names beside it, without running any; raises RubricError like `read_rubric`."""
+    path = rubric_file(path)
     tree = _tree(path, _content(path))
-    files = (name for key in ("checks", "simulations", "provided") for name in _own_names(path, tree, key))
-    return (*own_files(path, tuple(files)), *definition_files(path, _own_names(path, tree, "interfaces")))
+    files = (name for key in ("checks", "hints", "simulations", "provided") for name in _own_names(path, tree, key))
+    definitions = definition_files(path, _own_names(path, tree, "interfaces"))
+    return (*own_files(path, tuple(files)), *definitions, *bag_files(path, named_bags(tree.data)))
 
 
 def own_checks(path: Path) -> Mapping[str, type]:
     """Return a rubric's own checks by name, used or not; raises RubricError like `read_rubric`."""
+    path = rubric_file(path)
     return load(own_files(path, _own_names(path, _tree(path, _content(path)), "checks")), CHECKS)
 
 
@@ -377,9 +393,10 @@ _PYTHON = (CHECK_FILE, "a Python file in the rubric's folder such as my_checks.p
 #: What a rubric may bring, by key: the pattern of a name, and what is expected.
 _OWN = {
     "checks": _PYTHON,
+    "hints": _PYTHON,
     "simulations": _PYTHON,
     "provided": (PROVIDED_FILE, PROVIDED_WORDS),
-    "interfaces": (INTERFACE_FOLDER, "a folder beside the rubric such as interfaces"),
+    "interfaces": (BESIDE, "a folder beside the rubric such as interfaces"),
 }
 
 
@@ -459,7 +476,7 @@ def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> I
         )
 
 
-def _scenario(shape: ScenarioShape, limits: Limits, provided: Mapping[str, str]) -> Scenario:
+def _scenario(path: Path, shape: ScenarioShape, limits: Limits, provided: Mapping[str, str]) -> Scenario:
     run: tuple[tuple[str, RunOptions], ...] = tuple(
         (name, build(shape.run[name])) for name in shape.processes if name in shape.run
     )
@@ -470,7 +487,7 @@ def _scenario(shape: ScenarioShape, limits: Limits, provided: Mapping[str, str])
         id=shape.id,
         processes=shape.processes,
         span=build(shape.observe),
-        stimuli=build(shape.stimuli),
+        stimuli=tuple(_with_bag(path, build(stimulus)) for stimulus in shape.stimuli),
         limits=limits,
         starts_ns=tuple((name, build(shape.start[name])) for name in shape.processes if name in shape.start),
         may_exit=shape.may_exit,
@@ -478,3 +495,10 @@ def _scenario(shape: ScenarioShape, limits: Limits, provided: Mapping[str, str])
         run=run,
         provided=tuple(sorted(used.items())),
     )
+
+
+def _with_bag(path: Path, stimulus: Stimulus) -> Stimulus:
+    """Return a stimulus with the path of its recording, if it plays one, which a rubric names relative to itself."""
+    if not isinstance(stimulus, RecordedStream) or not stimulus.bag:
+        return stimulus
+    return replace(stimulus, bag=str(path.parent / stimulus.bag))

@@ -17,13 +17,13 @@ from grader.core.scenario import (
     ActionGoal,
     MessageStream,
     NumberStream,
-    OdometryStream,
+    RecordedStream,
     ServiceCalls,
     ServiceServer,
     Span,
 )
 from grader.rubrics.check_parameters import choice_model, part_model, simulation_shape
-from grader.rubrics.drawing import ParameterShape, SomeLongTime, StateShape, TransitionShape, list_of
+from grader.rubrics.drawing import OdometryShape, ParameterShape, SomeLongTime, StateShape, TransitionShape, list_of
 from grader.rubrics.mistakes import nearest
 from grader.rubrics.own_checks import OwnSimulation
 from grader.rubrics.run_options import RunShape
@@ -58,8 +58,9 @@ _LIMITS = {
     "message_bytes": "message_size",
 }
 _STIMULI: Mapping[str, type[Shape]] = {
-    "numbers": part_model(NumberStream, "NumbersShape", start=0),
-    "odometry": part_model(OdometryStream, "OdometryShape", start=0),
+    "numbers": part_model(NumberStream, "NumbersShape", start=0, field=None),
+    "recorded": part_model(RecordedStream, "RecordedShape", start=0),
+    "odometry": OdometryShape,
     "messages": part_model(MessageStream, "MessagesShape", period=NS_PER_S, stop=None),
     "server": part_model(ServiceServer, "ServerShape", stop=None, answers=None),
     "calls": part_model(ServiceCalls, "CallsShape", requests=({},)),
@@ -211,6 +212,9 @@ class RubricShape(Shape):
         default=(), description="launch files and parameter files of the rubric's own, beside it"
     )
     checks: tuple[CheckFile, ...] = Field(default=(), description="files with your own checks, beside the rubric")
+    hints: tuple[CheckFile, ...] = Field(
+        default=(), description="Python files with your own rules for hints, beside the rubric"
+    )
     simulations: tuple[CheckFile, ...] = Field(
         default=(), description="Python files with your own simulations, beside the rubric"
     )

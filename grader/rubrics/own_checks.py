@@ -1,6 +1,7 @@
-"""Reads what a rubric brings in files beside it: checks, simulations, and definitions of messages.
+"""Reads what a rubric brings in files beside it: checks, hint rules, simulations, and definitions of messages.
 
-Checks run in the judging process. Simulations run in the worker, which gets the text of their file with each plan.
+Checks and hint rules run in the judging process. Simulations run in the worker, which gets the text of their file with
+each plan.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import hashlib
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,8 +21,11 @@ from typing import Any
 from grader.core.author_files import line_of, run, words_of
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
+from grader.core.exercise import HintRule, Outcome, ProblemKind
 from grader.interfaces.definitions import files_in
 from grader.rubrics.check_parameters import choice_model, simulation_shape
+from grader.rubrics.mistakes import nearest
+from grader.rubrics.types import BESIDE
 from grader.simulation import loading
 from grader.simulation.participant import Simulation
 from grader.simulation.robots import SIMULATIONS
@@ -32,11 +36,15 @@ MAX_BYTES = 256 * 1024
 #: Name of the table in such a file.
 TABLE = "CHECKS"
 _ID = re.compile(r"[a-z][a-z0-9_]*")
-_ALONE = "such a file may import the standard library, grader and what is installed, but no file beside it"
+_ALONE = "such a file may import the standard library, grader.api and what is installed, but no file beside it"
 
 
 #: Most files of interface packages that a rubric may bring.
 MOST_DEFINITIONS = 400
+#: Most files in a recording, and the largest one in bytes: all travel to each machine of a cluster, and minutes of
+#: laser scans take a few megabytes.
+MOST_BAG_FILES = 20
+MOST_BAG_BYTES = 64 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +101,37 @@ def definition_files(rubric: Path, folders: Sequence[str], never_in: Sequence[Pa
     return tuple(found)
 
 
+def bag_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ()) -> tuple[OwnFile, ...]:
+    """Return the files of the recordings that a rubric names, sorted by name.
+
+    Raises:
+        RubricError: A recording is missing, or has too many files or a file that cannot be used; see `own_files`.
+    """
+    found: list[OwnFile] = []
+    for name in dict.fromkeys(names):
+        path, where = rubric.parent / name, f"{shown(str(rubric), 500)}: recorded: {shown(name)}"
+        files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
+        if not 0 < len(files) <= MOST_BAG_FILES:
+            text = f"{where}: expected a recording of 1 to {MOST_BAG_FILES} files, found {len(files) or 'none'}"
+            raise RubricError(text, "name a rosbag2 folder, or a .mcap or .db3 file")
+        parts = [file.relative_to(rubric.parent).as_posix() for file in files]
+        found += [_own_file(rubric, part, never_in, f"{where}", least=0, most=MOST_BAG_BYTES) for part in parts]
+    return tuple(found)
+
+
+def named_bags(data: object) -> tuple[str, ...]:
+    """Return the recordings named by the stimuli in a rubric's data; the rubric's shape reports anything else."""
+    scenarios = data.get("scenarios") if isinstance(data, Mapping) else None
+    stimuli = [one.get("stimuli") for one in _mappings(scenarios)]
+    played = [one.get("recorded") for several in stimuli for one in _mappings(several)]
+    names = [one.get("bag") for one in _mappings(played)]
+    return tuple(dict.fromkeys(name for name in names if isinstance(name, str) and re.fullmatch(BESIDE, name)))
+
+
+def _mappings(value: object) -> list[Mapping[str, Any]]:
+    return [one for one in value if isinstance(one, Mapping)] if isinstance(value, list) else []
+
+
 def named_files(data: object, key: str) -> tuple[str, ...]:
     """Return the files or folders named under a key of a rubric's data; the rubric's shape reports anything else."""
     names = data.get(key) if isinstance(data, Mapping) else None
@@ -123,6 +162,84 @@ def load_simulations(files: Sequence[OwnFile]) -> dict[str, OwnSimulation]:
     return found
 
 
+@dataclass(frozen=True, slots=True)
+class OwnHints:
+    """The hint rules of a rubric, by the files that hold them.
+
+    A file runs when its rules are first asked for: they need all of diagnosis, which takes 50 ms to import.
+    """
+
+    files: tuple[OwnFile, ...]
+
+    def __iter__(self) -> Iterator[HintRule]:
+        """Yield the rules in the order of the files and of their text."""
+        for file in self.files:
+            yield from _rules(file)
+
+
+def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> Iterable[HintRule]:
+    """Run files with hint rules, and return their rules.
+
+    Args:
+        files: The files; one may hold checks too.
+        known: The checks that the rubric may use, by name.
+
+    Raises:
+        RubricError: A file cannot be run, or has no rule; or a rule has the name of another one, names a check that
+            does not exist, or cannot be asked.
+    """
+    if not files:
+        return ()
+    from grader.judging.diagnosis import RULES  # noqa: PLC0415  most rubrics have no rules
+
+    taken = {rule.id for rule in RULES}
+    problems: list[str] = []
+    for file in files:
+        rules, where = _ran(file, _rules), shown(str(file.path), 500)
+        if not rules:
+            text = f"{where}:1: expected hint rules, which are functions with @hint_rule(...) above them, found none"
+            raise RubricError(text)
+        for rule in rules:
+            wrong = "expected a new name, found one that is taken" if rule.id in taken else _no_rule(rule, known)
+            line = getattr(getattr(rule.function, "__code__", None), "co_firstlineno", 1)
+            problems += [f"{where}:{line}: `{shown(rule.id)}`: {wrong}"] if wrong else []
+            taken.add(rule.id)
+    if problems:
+        raise RubricError("\n".join(problems))
+    return OwnHints(tuple(files))
+
+
+def _rules(file: OwnFile) -> tuple[Any, ...]:
+    """Run a file and return its rules."""
+    from grader.judging.diagnosis.rules import Rule  # noqa: PLC0415  as above
+
+    path = str(file.path.resolve())
+    rules = (value for value in vars(_module(path, file.content)).values() if isinstance(value, Rule))
+    return tuple(dataclasses.replace(rule, file=path) for rule in dict.fromkeys(rules))
+
+
+def _no_rule(rule: Any, known: Mapping[str, type]) -> str:
+    """Return why a rule cannot be asked; empty if it can."""
+    unknown = next((name for name in rule.checks if isinstance(name, str) and name not in known), None)
+    if unknown is not None:
+        near = nearest(unknown, known)
+        return f"expected the name of a check, found `{shown(unknown)}`{f'; {near}' if near else ''}"
+    parts = (
+        ("priority", isinstance(rule.priority, int) and not isinstance(rule.priority, bool), "a whole number"),
+        ("problem", isinstance(rule.problem, (ProblemKind, type(None))), "a ProblemKind"),
+        ("outcome", isinstance(rule.outcome, (Outcome, type(None))), "an Outcome"),
+        ("fault", isinstance(rule.fault, (bool, type(None))), "True, False or None"),
+    )
+    for name, right, expected in parts:
+        if not right:
+            return f"expected {expected} as {name}, found {shown(repr(getattr(rule, name)))}"
+    try:
+        inspect.signature(rule.function).bind(None)
+    except (TypeError, ValueError):
+        return "expected a function of one argument, the case, found another one"
+    return ""
+
+
 def digest_of(rubric: bytes, files: Sequence[OwnFile]) -> str:
     """Return the `sha256:` digest of a rubric and the files it brings; without such files, that of the rubric alone."""
     digest = hashlib.sha256(rubric)
@@ -131,12 +248,14 @@ def digest_of(rubric: bytes, files: Sequence[OwnFile]) -> str:
     return f"sha256:{digest.hexdigest()}"
 
 
-def _own_file(rubric: Path, name: str, never_in: Sequence[Path], where: str, least: int = 1) -> OwnFile:
+def _own_file(  # noqa: PLR0913  what to read, and its limits
+    rubric: Path, name: str, never_in: Sequence[Path], where: str, least: int = 1, most: int = MAX_BYTES
+) -> OwnFile:
     path = rubric.parent / name
     try:
         real = path.resolve(strict=True)
         inside = real.is_relative_to(rubric.parent.resolve()) and real.is_file()
-        content = real.read_bytes() if inside and real.stat().st_size <= MAX_BYTES else b""
+        content = real.read_bytes() if inside and real.stat().st_size <= most else b""
         theirs = [folder for folder in never_in if folder.is_dir() and real.is_relative_to(folder.resolve())]
     except FileNotFoundError:
         raise RubricError(f"{where}: expected a file beside the rubric, found nothing there") from None
@@ -148,20 +267,24 @@ def _own_file(rubric: Path, name: str, never_in: Sequence[Path], where: str, lea
         text = f"{where}: expected a file that students cannot write, found one in {shown(str(theirs[0]))}"
         raise RubricError(text, "keep rubrics and what they bring apart from submissions")
     if not least <= len(content) or (not content and real.stat().st_size):
-        raise RubricError(f"{where}: expected {least} byte to {MAX_BYTES // 1024} KiB, found none or more")
+        raise RubricError(f"{where}: expected {least} byte to {most // 1024} KiB, found none or more")
     return OwnFile(name, path, content)
+
+
+def _ran(file: OwnFile, run_: Callable[[OwnFile], Any]) -> Any:
+    """Run a file and return what it gives; raises RubricError with the line that failed."""
+    try:
+        return run_(file)
+    except (Exception, SystemExit) as error:  # whatever the author's file raises, the author has to fix
+        line = max(line_of(error, str(file.path.resolve())), line_of(error, file.name))
+        text = f"{shown(str(file.path), 500)}:{line}: expected a file that can be imported, found "
+        text += f"{type(error).__name__}: {shown(words_of(error), 200)}"
+        raise RubricError(text, _ALONE if isinstance(error, ImportError) else "") from None
 
 
 def _table(file: OwnFile, name: str, ran: Callable[[OwnFile], object]) -> dict[str, Any]:
     """Run a file and return its table; raises RubricError with the line that failed."""
-    where = shown(str(file.path), 500)
-    try:
-        table = ran(file)
-    except (Exception, SystemExit) as error:  # whatever the author's file raises, the author has to fix
-        line = max(line_of(error, str(file.path.resolve())), line_of(error, file.name))
-        text = f"{where}:{line}: expected a file that can be imported, found "
-        text += f"{type(error).__name__}: {shown(words_of(error), 200)}"
-        raise RubricError(text, _ALONE if isinstance(error, ImportError) else "") from None
+    where, table = shown(str(file.path), 500), _ran(file, ran)
     if not isinstance(table, dict) or not table:
         found = "none" if table is None else "an empty one" if table == {} else f"a {type(table).__name__}"
         raise RubricError(f'{where}:1: expected a table {name} = {{"name": Class}}, found {found}')

@@ -173,17 +173,15 @@ ActionType = Annotated[
 ]
 PythonFile = Annotated[
     str,
-    MatchingText(
-        r"[^/\\\x00-\x1f]+\.py", "a file name such as fan_controller.py, without folders", "fan_controller.py"
-    ),
+    MatchingText(r"[^/\\\x00-\x1f]+\.py", "a file name such as my_node.py, without folders", "my_node.py"),
 ]
 #: A program that the student hands in: a file, or an executable that the entry points of a package name.
 ProgramName = Annotated[
     str,
     MatchingText(
         r"[^/\\\x00-\x1f]+\.py|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-][A-Za-z0-9_.-]*",
-        "a file name such as fan_controller.py, without folders, or an executable such as my_package/talker",
-        "fan_controller.py",
+        "a file name such as my_node.py, without folders, or an executable such as my_package/talker",
+        "my_node.py",
     ),
 ]
 #: What the student hands in: programs and parameter files.
@@ -191,8 +189,8 @@ HandedIn = Annotated[
     str,
     MatchingText(
         r"[^/\\\x00-\x1f]+\.(?:py|ya?ml)|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-][A-Za-z0-9_.-]*",
-        "a file name such as fan_controller.py, without folders, or an executable such as my_package/talker",
-        "fan_controller.py",
+        "a file name such as my_node.py, without folders, or an executable such as my_package/talker",
+        "my_node.py",
     ),
 ]
 #: A launch file or parameter file of the rubric's own, beside it.
@@ -204,11 +202,10 @@ CHECK_FILE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*\.py"
 CheckFile = Annotated[
     str, MatchingText(CHECK_FILE, "a Python file in the rubric's folder such as my_checks.py", "my_checks.py")
 ]
-#: A folder of interface packages, under the same rules.
-INTERFACE_FOLDER = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*/?"
-InterfaceFolder = Annotated[
-    str, MatchingText(INTERFACE_FOLDER, "a folder beside the rubric such as interfaces", "interfaces")
-]
+#: A folder of interface packages, or a recording, under the same rules.
+BESIDE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*/?"
+InterfaceFolder = Annotated[str, MatchingText(BESIDE, "a folder beside the rubric such as interfaces", "interfaces")]
+RecordingPath = Annotated[str, MatchingText(BESIDE, "a recording beside the rubric such as bags/scan", "bags/scan")]
 Number = Annotated[Text, BeforeValidator(_as_text)]
 Real = Annotated[float, Strict(), AllowInfNan(allow_inf_nan=False)]
 #: Unlike other numbers, a field may be `.nan` or `.inf`: sensors send them.

@@ -94,8 +94,9 @@ def _objection(content: bytes, left: int) -> str:
 #: written programs and disguised copies of them; the documentation for instructors has the figures. Two obvious
 #: solutions for the gaps of the first exercise's template have 134 characters in common.
 THRESHOLD, LEAST_SHARE, LEAST_OVERLAP = 0.65, 0.4, 140
-#: Code is common if more than this share of the class, and more than this number of students, have it.
-COMMON_SHARE, COMMON_LEAST = 0.1, 4
+#: Code is common if more than this share of the class, and more than this number of students, have it. In a large class
+#: what more than a hundred have is common too: no group that copied is larger, and pairs grow with the square of it.
+COMMON_SHARE, COMMON_LEAST, COMMON_MOST = 0.1, 4, 100
 
 
 @dataclass(slots=True)
@@ -112,7 +113,7 @@ def find_similar(handed: Sequence[Handed], given: Sequence[ComparedProgram]) -> 
     as_given = {program.digest for program in given}
     kept = [replace(h, programs=tuple(p for p in h.programs if p.digest not in as_given)) for h in handed]
     files, kept = _prints(kept)
-    common_from = max(COMMON_LEAST, int(COMMON_SHARE * len(handed)))
+    common_from = min(COMMON_MOST, max(COMMON_LEAST, int(COMMON_SHARE * len(handed))))
     _remove_common_pieces(files, given, common_from)
     return Similar(
         handed=tuple(kept),

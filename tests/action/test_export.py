@@ -59,10 +59,11 @@ def test_a_seed_key_goes_into_the_zip_for_its_owner_alone(tmp_path: Path) -> Non
 
 def test_rubrics_travel_under_names_of_ours() -> None:
     """The settings say where; a name of the course's own could be anything."""
-    archive = opened(gradescope(Chosen(exercises=("odom_subscriber",), rubrics=(ROOT / "rubrics/exercise_2.yaml",))))
+    rubric = ROOT / "rubrics" / "exercise_2" / "rubric.yaml"
+    archive = opened(gradescope(Chosen(exercises=("odom_subscriber",), rubrics=(rubric,))))
     chosen = json.loads(archive.read("settings.json"))
     assert chosen == {"exercises": ["odom_subscriber"], "rubrics": ["rubrics/1/rubric.yaml"], "isolation": "auto"}
-    assert archive.read("rubrics/1/rubric.yaml") == (ROOT / "rubrics/exercise_2.yaml").read_bytes()
+    assert archive.read("rubrics/1/rubric.yaml") == rubric.read_bytes()
 
 
 def test_an_exercise_that_no_rubric_has_is_refused_at_once() -> None:
@@ -79,8 +80,8 @@ def test_the_wheel_holds_what_an_installation_needs_and_no_solution() -> None:
     assert re.fullmatch(r"rclpy_grader-[\w.]+-py3-none-any\.whl", name)
     needed = {
         "grader/cli/main.py",
-        "grader/shipped/rubrics/exercise_1.yaml",
-        "grader/shipped/rubrics/odometry/odometry.mcap",
+        "grader/shipped/rubrics/exercise_1/rubric.yaml",
+        "grader/shipped/rubrics/exercise_2/odometry/odometry.mcap",
     }
     assert needed | {"grader/shipped/integrations/prepare", "grader/reporting/report.schema.json"} <= names
     assert not [n for n in names if "__pycache__" in n or "reference" in n or "template/" in n]

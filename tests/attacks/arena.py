@@ -100,7 +100,7 @@ class Arena:
     def planted(self) -> str:
         """Return the module from which attacks learn where to look and where to send; the secret is not in it."""
         addresses = ["127.0.0.1", *_own_addresses()]
-        ours = [ROOT / "reference_solutions" / "velocity_publisher.py", ROOT / "rubrics" / "exercise_1.yaml"]
+        ours = [ROOT / "reference_solutions" / "velocity_publisher.py", ROOT / "rubrics" / "exercise_1" / "rubric.yaml"]
         hidden = [self._hidden, *ours, self.base / "rubric.yaml", "/etc/resolv.conf", "/etc/shadow"]
         values = {
             "HIDDEN": [str(path) for path in hidden],

@@ -165,11 +165,11 @@ def test_a_simulation_that_fails_is_the_authors_mistake_too(tmp_path: Path) -> N
     [
         ("    expected = property(lambda self: 1 / 0)\n", "pump_checks.py:36: ZeroDivisionError"),
         (
-            "    def chart(self, trace):\n        return 1 / 0\n",
+            "    def drawing(self, trace):\n        return 1 / 0\n",
             "pump_checks.py:37: ZeroDivisionError",
         ),
         (
-            "    def chart(self, trace):\n        from grader.core import chart\n        return chart.Chart(5)\n",
+            "    def drawing(self, trace):\n        from grader.core import chart\n        return chart.Chart(5)\n",
             "pump_checks.py:38: TypeError: Chart.__init__() ",
         ),
     ],

@@ -241,7 +241,7 @@ def test_it_travels_to_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     checks = tuple(checks_of([rubric]))
     assert checks == ((b"course/pump_checks.py", CHECKS_FILE.encode()),)
     conditions = Conditions("0", (), "", None, "auto", "auto")
-    terms = Terms(conditions, (), ((b"course/pump.yaml", RUBRIC.encode()),), b"", (), False, 1.0, checks)
+    terms = Terms(conditions, (), ((b"course/pump.yaml", RUBRIC.encode()),), (), False, 1.0, checks)
     task = write_task(terms, GradingJob("ada", b"ada", b"class/ada", b""), tmp_path / "there")
     (found,) = (tmp_path / "there").rglob("pump.yaml")
     assert (task.rubrics, read_rubric(found).digest) == ((rubric,), before)
@@ -254,7 +254,7 @@ def test_the_examples_on_the_page_about_own_checks_work() -> None:
     (proportional,) = (block for block in blocks if block.startswith("@dataclass(frozen=True)\nclass MeanError"))
     (sources,) = (block for block in blocks if block.startswith("    def judge_sources"))
     names = "from collections.abc import Mapping\nfrom dataclasses import replace\n"
-    names += "from grader.core.exercise import Location\nfrom grader.testing import partly\n"
+    names += "from grader.api import Location, partly\n"
     own = run("_example", "own-check.md", f"{blocks[0]}\n{names}\n\n{proportional}\n{sources}".encode())
     check = vars(own)["MeanError"]("/goal", full=1.0, none=3.0)
 

@@ -30,7 +30,7 @@ def task(folder: Path, name: str = "ada", **changes: Any) -> Task:
         "into": folder / f"{name} result",
         "exercises": ("velocity_publisher",),
         "rubrics": (),
-        "odom_bag": None,
+        "bags": (),
         "conditions": CONDITIONS,
         "workers": 2,
         "standalone": False,

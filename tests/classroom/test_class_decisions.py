@@ -315,7 +315,7 @@ def test_a_plain_number_is_read(tmp_path: Path) -> None:
 
 def allowing(tmp_path: Path, bonus: str) -> GradeRequest:
     """Return a request with a rubric of 10 points that allows a bonus; empty for none."""
-    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
+    text = (RUBRICS / "exercise_1" / "rubric.yaml").read_text(encoding="utf-8")
     text = text.replace("  required: true", f"  required: true\n{bonus}")
     assert bonus in text
     (tmp_path / "rubric.yaml").write_text(text, encoding="utf-8")

@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from sample_folders import TESTS, folder_of
 
 pytestmark = pytest.mark.ros
-SUBMISSIONS = Path(__file__).resolve().parent.parent / "submissions"
 #: Without spot checks, which tests of their own are about.
 ONE = ("--exercise", "velocity_publisher", "--jobs", "1", "--spot-checks", "0%")
 GRADE = (sys.executable, "-c", "from grader.cli.main import main; main()")
@@ -22,7 +22,7 @@ CLASS = {"ada": "correct/velocity_class", "bob": "wrong/velocity_10_hz", "cleo":
 def class_(tmp_path: Path) -> Path:
     """Return a folder of three submissions and one that is none."""
     for name, source in CLASS.items():
-        shutil.copytree(SUBMISSIONS / source, tmp_path / "class" / name)
+        shutil.copytree(folder_of(source), tmp_path / "class" / name)
     (tmp_path / "class" / "dan").mkdir()
     return tmp_path / "class"
 
@@ -116,7 +116,7 @@ def test_project_files_that_do_harm_cost_a_class_nothing(tmp_path: Path) -> None
     """Each submission gets its score, with a note about the file; the process that grades them all stays small."""
     for name, bomb in (("honest", None), *BOMBS.items()):
         folder = tmp_path / "class" / name
-        shutil.copytree(SUBMISSIONS / "correct/velocity_package", folder)
+        shutil.copytree(folder_of("correct/velocity_package"), folder)
         if bomb is not None:
             (folder / "src/my_robot" / bomb[0]).write_text(bomb[1])
     code = r"""
@@ -142,8 +142,8 @@ finally:
 
 def test_every_submission_of_a_class_is_checked(tmp_path: Path) -> None:
     """Without asking for it: one that is right in virtual time only is found among honest ones, and only that one."""
-    honest = (SUBMISSIONS / "correct" / "velocity_class" / "velocity_publisher.py").read_text(encoding="utf-8")
-    cheat = SUBMISSIONS.parent / "spot_checks" / "cheats" / "drawn_fraction.py"
+    honest = (folder_of("correct/velocity_class") / "velocity_publisher.py").read_text(encoding="utf-8")
+    cheat = TESTS / "spot_checks" / "cheats" / "drawn_fraction.py"
     for name, text in {
         "ada": f"{honest}\n# ada\n",
         "bob": f"{honest}\n# bob\n",

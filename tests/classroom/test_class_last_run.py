@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shutil
 from pathlib import Path
 
 import click
@@ -17,6 +18,7 @@ from grader.cli import batch
 from grader.cli.main import app
 from grader.cli.remembered import KEPT
 from grader.core.errors import ClassError
+from grader.rubrics.builtin import builtin_recording
 
 #: Parameters that concern one run only: what it is given, where it runs, how much it says.
 OF_ONE_RUN = {
@@ -69,6 +71,27 @@ def test_what_is_left_out_applies_again(scheduler: FakeScheduler, tmp_path: Path
     other = CliRunner().invoke(app, ["batch", str(tmp_path / "in"), "-o", str(tmp_path / "out")], prog_name="grade")
     assert (other.exit_code, marks()) == (0, before)
     assert json.loads(Path("out/batch.json").read_text(encoding="utf-8"))["moved"] == []
+
+
+def test_a_recording_is_found_again_from_another_folder(
+    scheduler: FakeScheduler, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The path behind the topic is kept whole; one that is gone is asked for; both forms of one option are refused."""
+    shutil.copytree(builtin_recording(), tmp_path / "drive")
+    options = ("--exercise", "odom_subscriber", "--recording", "/odom=drive")
+    run(*options)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    command = ["batch", str(tmp_path / "in"), "-o", str(tmp_path / "out"), "--no-progress"]
+    again = CliRunner().invoke(app, command, prog_name="grade")
+    assert again.exit_code == 0, again.output
+    assert f"--recording /odom={tmp_path}/drive" in again.stderr
+    assert scheduler.graded == ["ada", "bob"], "nobody is graded again by the same recording"
+    shutil.rmtree(tmp_path / "drive")
+    gone = CliRunner().invoke(app, command, prog_name="grade")
+    assert f"--recording: expected {tmp_path}/drive, which the last run used, found nothing there" in gone.output
+    both = [*command, "--no-recording", "--odom-bag", "a", "--recording", "nav_msgs/msg/Odometry=b"]
+    assert "exclude each other" in CliRunner().invoke(app, both, prog_name="grade").output
 
 
 def test_an_option_is_left_out_by_name(scheduler: FakeScheduler) -> None:

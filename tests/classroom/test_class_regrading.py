@@ -69,7 +69,7 @@ class RecordingScheduler:
             made,
             submission=replace(made.submission, digest=digest, path=request.submission),
             seed=request.seed,
-            reproduce=reproduction(request, exercises, None, request.seed),
+            reproduce=reproduction(request, exercises, "", request.seed),
         )
         on_recorded(run, exercises)
         return judge_run(exercises, run)
@@ -87,7 +87,7 @@ def folder(tmp_path: Path) -> Path:
 
 def rubric(folder: Path, *changes: tuple[str, str]) -> None:
     """Write the rubric of the class, with other texts in place of some."""
-    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
+    text = (RUBRICS / "exercise_1" / "rubric.yaml").read_text(encoding="utf-8")
     for old, new in changes:
         assert old in text
         text = text.replace(old, new)
@@ -268,7 +268,7 @@ def test_only_the_same_recording_is_used(folder: Path) -> None:
     assert recorded_alike(evidence, [same], PlannedRun(digest, seed + 1, "")) == ()
     assert recorded_alike(evidence, [same], PlannedRun("sha256:" + "0" * 64, seed, "")) == ()
     assert recorded_alike(evidence, [exercise(LONGER, folder=folder)], PlannedRun(digest, seed, "")) == ()
-    other = read_rubric(RUBRICS / "exercise_2.yaml")
+    other = read_rubric(RUBRICS / "exercise_2" / "rubric.yaml")
     assert recorded_alike(evidence, [other], PlannedRun(digest, seed, "")) == ()
 
 
@@ -277,7 +277,7 @@ def test_only_the_same_recording_is_used(folder: Path) -> None:
 def test_only_the_changed_exercise_of_a_submission_runs(tmp_path: Path) -> None:
     """Its other recordings are used as they are, and the report is that of a whole run."""
     for number in (1, 2):
-        text = (RUBRICS / f"exercise_{number}.yaml").read_text(encoding="utf-8")
+        text = (RUBRICS / f"exercise_{number}" / "rubric.yaml").read_text(encoding="utf-8")
         (tmp_path / f"{number}.yaml").write_text(text, encoding="utf-8")
     (tmp_path / "in" / "ada").mkdir(parents=True)
     for path in (RUBRICS.parent / "reference_solutions").rglob("*.py"):

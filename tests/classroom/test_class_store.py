@@ -147,3 +147,19 @@ def test_a_standing_of_another_version_is_none() -> None:
     """It is not guessed at."""
     assert load(dump(status())) == status()
     assert load(dump(status()).replace(b"batch-result/v1", b"batch-result/v2")) is None
+
+
+@pytest.mark.parametrize("cut", [b"", b'"bo', b"\xff\n", b"[1]\n"])
+def test_what_is_pending_shrinks_by_a_line_for_each_submission(tmp_path: Path, cut: bytes) -> None:
+    """A line that a stopped run could not write whole leaves its submission to be graded once more."""
+    with open_store(tmp_path) as store:
+        store.note_pending("all", ["ada", "bob", "cleo"])
+        size = (tmp_path / ".pending.json").stat().st_size
+        store.note_done("cleo", last=False)
+        assert (tmp_path / ".pending.json").stat().st_size == size + len('"cleo"\n')
+        with (tmp_path / ".pending.json").open("ab") as note:
+            note.write(cut)
+        assert store.pending("all") == {"ada", "bob"}
+        assert store.pending("failed") is None
+        store.note_done("ada", last=True)
+        assert store.pending("all") is None

@@ -93,7 +93,7 @@ def test_the_process_that_grades_gets_the_values_and_not_the_key(tmp_path: Path)
 
     own = Drawn("17", {"velocity_publisher": {"rate": "7 Hz"}})
     conditions = Conditions("0", (), "", None, "auto", "auto", variants=own)
-    task = Task("x", "x", tmp_path, tmp_path / "into", (), (), None, conditions, 1, False, 60.0)
+    task = Task("x", "x", tmp_path, tmp_path / "into", (), (), (), conditions, 1, False, 60.0)
     status = worker.attempt(replace(task, variant_key=tmp_path / "course.key"), lambda step: None, refuse)
     (request,) = heard
     assert isinstance(request.draw, Recorded)

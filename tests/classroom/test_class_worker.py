@@ -29,7 +29,7 @@ def attempt(tmp_path: Path, error: Any) -> ResultStatus:
         raise error
 
     into = tmp_path / f"into {len(list(tmp_path.iterdir()))}"
-    task = Task("x", "label", tmp_path, into, (), (), None, CONDITIONS, 1, False, 60.0)
+    task = Task("x", "label", tmp_path, into, (), (), (), CONDITIONS, 1, False, 60.0)
     return worker.attempt(task, lambda step: None, grade)
 
 
@@ -71,7 +71,7 @@ def test_a_result_of_some_exercises_has_the_key_that_is_looked_for(tmp_path: Pat
     digest = "sha256:" + "0" * 64
     given = Reproduction(rubrics=rubrics[1:])
     report = Report("x", "x", digest, environment, 1, (exercise,), 0.1, reproduce=given)
-    task = Task("x", "x", tmp_path, tmp_path / "into", (), (), None, every, 1, False, 60.0)
+    task = Task("x", "x", tmp_path, tmp_path / "into", (), (), (), every, 1, False, 60.0)
     assert worker.attempt(task, lambda step: None, lambda *_: report).key == every.key(digest)
     changed = dataclasses.replace(report, reproduce=Reproduction(rubrics=(("e", "sha256:3"),)))
     task = dataclasses.replace(task, into=tmp_path / "again")
@@ -87,7 +87,7 @@ def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path: Path) ->
     environment = Environment("0", "jazzy", "7", "rmw", "3.11", "none")
     report = Report("x", "x", "sha256:" + "0" * 64, environment, 1, (exercise,), 0.1)
     into = tmp_path / "into"
-    task = Task("x", "x", tmp_path, into, (), (), None, CONDITIONS, 1, False, 60.0)
+    task = Task("x", "x", tmp_path, into, (), (), (), CONDITIONS, 1, False, 60.0)
     worker.attempt(task, lambda step: None, lambda *_: report)
     found = {path.name for path in into.iterdir() if "hushhush" in path.read_text(encoding="utf-8")}
     assert found == {REPORT, worker.PAGE}

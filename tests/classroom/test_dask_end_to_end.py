@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sample_folders import folder_of
 
 pytestmark = pytest.mark.ros
-SUBMISSIONS = Path(__file__).resolve().parent.parent / "submissions"
 GRADE = (sys.executable, "-c", "from grader.cli.main import main; main()", "batch", "class")
 DASK = (sys.executable, "-m", "dask")
 CLASS = {
@@ -32,8 +32,8 @@ def class_(tmp_path: Path) -> Path:
     """Return a class of eight: folders, an archive, a large file, a link, no such file, nothing at all."""
     folder = tmp_path / "class"
     for name, source in CLASS.items():
-        shutil.copytree(SUBMISSIONS / source, folder / name)
-    shutil.make_archive(str(folder / "bob"), "zip", SUBMISSIONS / "correct" / "velocity_class")
+        shutil.copytree(folder_of(source), folder / name)
+    shutil.make_archive(str(folder / "bob"), "zip", folder_of("correct/velocity_class"))
     (folder / "dan").mkdir()
     (folder / "fay").mkdir()
     (folder / "fay" / "other.py").write_text("print()\n", encoding="utf-8")

@@ -12,7 +12,7 @@ from dask_samples import CONDITIONS, graded, task
 from grader.classroom.cluster.jobs import write_task
 from grader.classroom.cluster.sending import job_for, store_result, terms_of
 from grader.classroom.local import Attempt, Task, failed
-from grader.classroom.messages import GradingJob, JobResult, Terms, pack, read_collected, unpack, write_answer
+from grader.classroom.messages import GradingJob, JobResult, SentBag, Terms, pack, read_collected, unpack, write_answer
 from grader.classroom.store import State
 from grader.core.errors import HarnessError, RecordingError, RubricError
 from grader.submissions.submission import stage_collected, stage_submission
@@ -48,10 +48,10 @@ def test_no_place_of_this_machine_travels(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "rubric.yaml").write_text("id: velocity_publisher\n", encoding="utf-8")
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag" / "metadata.yaml").write_text("x", encoding="utf-8")
-    one = task(tmp_path, rubrics=(tmp_path / "rubric.yaml",), odom_bag=tmp_path / "bag")
+    one = task(tmp_path, rubrics=(tmp_path / "rubric.yaml",), bags=(("/scan", tmp_path / "bag"),))
     terms, errand = sent(one)
     assert str(tmp_path).encode() not in pack(terms) + pack(errand)
-    assert (terms.rubrics[0][0], terms.odom_bag, errand.path) == (b"rubric.yaml", b"bag", b"ada")
+    assert (terms.rubrics[0][0], terms.bags[0].path, errand.path) == (b"rubric.yaml", b"bag", b"ada")
 
 
 @pytest.mark.parametrize("place", ["rubrics/mine.yaml", "../mine.yaml", "../../a/mine.yaml"])
@@ -77,7 +77,8 @@ def test_files_lie_where_reports_say_they_do(tmp_path: Path, monkeypatch: pytest
 )
 def test_nothing_is_laid_out_elsewhere(tmp_path: Path, rubric: bytes, bag: bytes, part: bytes) -> None:
     """A path that leads out is refused before it is written."""
-    terms = Terms(CONDITIONS, (), ((rubric, b"x"),), bag, ((part, b"x"),), standalone=False, deadline_s=1.0)
+    bags = (SentBag("/scan", bag, ((part, b"x"),)),)
+    terms = Terms(CONDITIONS, (), ((rubric, b"x"),), bags, standalone=False, deadline_s=1.0)
     with pytest.raises(HarnessError, match="expected paths that stay inside"):
         write_task(terms, GradingJob("a", b"a", b"a", b""), tmp_path)
 
@@ -88,10 +89,10 @@ def test_a_recording_travels_with_its_files(tmp_path: Path, monkeypatch: pytest.
     Path("bag").mkdir()
     Path("bag/b.mcap").write_bytes(b"b")
     Path("one.mcap").write_bytes(b"one")
-    assert terms_of(task(tmp_path, odom_bag=Path("bag"))).recording == ((b"b.mcap", b"b"),)
-    assert terms_of(task(tmp_path, odom_bag=Path("one.mcap"))).recording == ((b"", b"one"),)
+    assert terms_of(task(tmp_path, bags=(("/scan", Path("bag")),))).bags[0].files == ((b"b.mcap", b"b"),)
+    assert terms_of(task(tmp_path, bags=(("/scan", Path("one.mcap")),))).bags[0].files == ((b"", b"one"),)
     with pytest.raises(RecordingError, match=r"no\.mcap: cannot be read"):
-        terms_of(task(tmp_path, odom_bag=Path("no.mcap")))
+        terms_of(task(tmp_path, bags=(("/scan", Path("no.mcap")),)))
     with pytest.raises(RubricError, match=r"no\.yaml: cannot be read"):
         terms_of(task(tmp_path, rubrics=(Path("no.yaml"),)))
 

@@ -11,18 +11,17 @@ import copies
 import pytest
 from class_samples import FakeScheduler, course, grade, hand_in, scores
 from click.testing import CliRunner
+from sample_folders import folder_of
 
 from grader.classroom.outputs import Graded
 from grader.cli.main import app
-
-CORRECT = Path(__file__).resolve().parent.parent / "submissions" / "correct"
 
 
 @pytest.fixture
 def source(tmp_path: Path) -> Path:
     """Return a class of three; one took from another and changed all names."""
-    text = (CORRECT / "odom_csv" / "odom_subscriber.py").read_text(encoding="utf-8")
-    other = (CORRECT / "odom_json" / "odom_subscriber.py").read_text(encoding="utf-8")
+    text = (folder_of("correct/odom_csv") / "odom_subscriber.py").read_text(encoding="utf-8")
+    other = (folder_of("correct/odom_json") / "odom_subscriber.py").read_text(encoding="utf-8")
     folder = hand_in(tmp_path / "in", ada=10, bob=7, cleo=5)
     for name, program in {"ada": text, "bob": copies.renamed(text, 1), "cleo": other}.items():
         (folder / name / "odom_subscriber.py").write_text(program, encoding="utf-8")

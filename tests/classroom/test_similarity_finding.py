@@ -10,14 +10,14 @@ from pathlib import Path
 import copies
 import pytest
 from copies import FILE, handed
+from sample_folders import TESTS, folder_of
 
 from grader.core.errors import ClassError
 from grader.similarity import library
-from grader.similarity.finding import COMMON_LEAST, MAX_BYTES, find_similar, read_given, read_programs
+from grader.similarity.finding import COMMON_LEAST, COMMON_MOST, MAX_BYTES, find_similar, read_given, read_programs
 from grader.similarity.library import Handed, Similar
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-CORRECT = ROOT / "tests" / "submissions" / "correct"
 #: Programs of people who do not know each other.
 STRANGERS = ("odom_chinese", "odom_csv", "odom_distance", "odom_globals_spin_once", "odom_json", "odom_namedtuple",
              "odom_history_path", "odom_loop_with_deadline", "odom_watchdog", "odom_yaml_lines")  # fmt: skip
@@ -25,12 +25,12 @@ STRANGERS = ("odom_chinese", "odom_csv", "odom_distance", "odom_globals_spin_onc
 
 def strangers() -> list[Handed]:
     """Return a class in which everybody worked alone."""
-    return [Handed(name, name, *read_programs(CORRECT / name)) for name in STRANGERS]
+    return [Handed(name, name, *read_programs(folder_of(f"correct/{name}"))) for name in STRANGERS]
 
 
 def text_of(name: str) -> str:
     """Return the program of a stranger."""
-    return (CORRECT / name / FILE).read_text(encoding="utf-8")
+    return (folder_of(f"correct/{name}") / FILE).read_text(encoding="utf-8")
 
 
 def pairs(similar: Similar) -> list[tuple[str, str]]:
@@ -65,13 +65,13 @@ def test_the_order_of_the_class_changes_nothing() -> None:
 def test_the_process_changes_nothing() -> None:
     """The library's digests differ from process to process; what is found does not."""
     program = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import sys; sys.path[:0] = sys.argv[1:]\n"
         "import test_similarity_finding as t, copies\n"
         "from grader.similarity.pages import render_table\n"
         "copied = t.handed('z', copies.logged(t.text_of('odom_csv'), 1))\n"
         "print(render_table(t.find_similar([*t.strangers(), copied], ())))"
     )
-    command = [sys.executable, "-c", program, str(Path(__file__).parent)]
+    command = [sys.executable, "-c", program, str(Path(__file__).parent), str(TESTS)]
     said = [
         subprocess.run(
             command, env={**os.environ, "PYTHONHASHSEED": seed}, check=True, capture_output=True, text=True
@@ -121,6 +121,12 @@ def test_what_many_write_does_not_count() -> None:
     found = find_similar([*strangers(), *few], ())
     assert found.pairs == ()
     assert [(same.file, len(same.holders), same.whole) for same in found.same] == [(FILE, COMMON_LEAST + 1, True)]
+
+
+@pytest.mark.parametrize(("size", "common_from"), [(10, COMMON_LEAST), (300, 30), (1_000, 100), (3_000, COMMON_MOST)])
+def test_what_counts_as_common_grows_with_the_class_up_to_a_limit(size: int, common_from: int) -> None:
+    """Without the limit, pairs would grow with the square of a class of thousands."""
+    assert find_similar([Handed(str(number), str(number), ()) for number in range(size)], ()).common_from == common_from
 
 
 def test_a_file_handed_in_as_it_was_handed_out_is_told_and_not_compared() -> None:

@@ -116,7 +116,7 @@ TRACES = st.builds(
 
 @cache
 def velocity_exercise() -> Exercise:
-    return read_rubric(RUBRICS / "exercise_1.yaml")
+    return read_rubric(RUBRICS / "exercise_1" / "rubric.yaml")
 
 
 def twist_message(t_ns: int, forward: float = 0.5) -> Message:

@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from rosbags.highlevel import AnyReader
+from sample_folders import folder_of
 
 from grader.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
-CRASHES = ROOT / "tests/submissions/broken/raises_in_callback"
+CRASHES = folder_of("broken/raises_in_callback")
 FORMATS = {"json": "r.json", "text": "r.txt", "html": "r.html", "markdown": "r.md", "junit": "r.xml"}
 
 

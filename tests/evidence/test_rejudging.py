@@ -25,7 +25,7 @@ def grade(*words: str | Path | int) -> Result:
 
 
 def changed_rubric(folder: Path, *changes: tuple[str, str]) -> Path:
-    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
+    text = (RUBRICS / "exercise_1" / "rubric.yaml").read_text(encoding="utf-8")
     for old, new in changes:
         assert old in text
         text = text.replace(old, new)
@@ -148,7 +148,7 @@ def test_changes_can_be_opened_in_a_spreadsheet(tmp_path: Path) -> None:
 def test_added_and_removed_criteria_are_changes(tmp_path: Path) -> None:
     """A criterion that is no longer asked took its points along."""
     kept_run(tmp_path / "e", velocity_run(velocity_trace()))
-    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
+    text = (RUBRICS / "exercise_1" / "rubric.yaml").read_text(encoding="utf-8")
     (tmp_path / "less.yaml").write_text(text[: text.index("  - id: logging")], encoding="utf-8")
     (tmp_path / "other.yaml").write_text(text.replace("id: logging", "id: logs"), encoding="utf-8")
     less = grade("--diff", tmp_path / "e", "--rubric", tmp_path / "less.yaml").output
@@ -194,7 +194,7 @@ def test_equal_names_are_told_apart(tmp_path: Path) -> None:
     [
         ((), "expected kept evidence, found none"),
         (("--exercise", "odom_subscriber"), "expected the exercise odom_subscriber, found velocity_publisher"),
-        (("--rubric", RUBRICS / "exercise_2.yaml"), "expected a rubric for velocity_publisher, found one for odom_sub"),
+        (("--rubric", RUBRICS / "exercise_2"), "expected a rubric for velocity_publisher, found one for odom_sub"),
         (("--exercise", "velocity"), "expected one of velocity_publisher"),
         (("-o", "evidence=x"), "evidence is kept while grading"),
     ],

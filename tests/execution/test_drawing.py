@@ -16,11 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.core.scenario import (
+    ODOMETRY,
     AnyOrder,
     Between,
     CountBetween,
     InOrder,
     NumberStream,
+    RecordedStream,
     Scenario,
     SomeOf,
     Span,
@@ -29,7 +31,7 @@ from grader.core.scenario import (
     cases,
 )
 from grader.core.submission import StudentFile, Submission
-from grader.execution.bag import Odometry
+from grader.execution.bag import Recording
 from grader.execution.codec import to_json
 from grader.execution.evidence.manifest import scenario_digest
 from grader.execution.plan import Plan, PlannedNumbers, plan_scenario
@@ -39,13 +41,14 @@ from grader.rubrics.loader import read_rubric
 MS, S = 1_000_000, 1_000_000_000
 SEEDS = st.integers(0, 2**48 - 1)
 EXERCISES = {id_: read_rubric(path) for id_, path in builtin_rubrics().items()}
-ODOMETRY = Odometry("/odom", tuple(TimedMessage(n * 100 * MS, b"cdr%d" % n, {"n": n}) for n in range(600)))
+DRIVE = Recording("/odom", ODOMETRY, tuple(TimedMessage(n * 100 * MS, b"cdr%d" % n, {"n": n}) for n in range(600)))
 
 
 def plan(exercise: str, scenario: Scenario, seed: int) -> Plan:
     files = {name: StudentFile(name, name) for name in scenario.processes}
     submission = Submission("ada", "./ada", Path("/staged"), "sha256:aa", files)
-    return plan_scenario(exercise, scenario, submission, seed=seed, odometry=ODOMETRY, clock="virtual")
+    recordings = {stimulus: DRIVE for stimulus in scenario.stimuli if isinstance(stimulus, RecordedStream)}
+    return plan_scenario(exercise, scenario, submission, seed=seed, recordings=recordings, clock="virtual")
 
 
 def planned(exercise: str, scenario: str, seed: int) -> Plan:

@@ -12,18 +12,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.core.scenario import (
+    ODOMETRY,
     Between,
     JustAbove,
     JustBelow,
     NumberStream,
-    OdometryStream,
+    RecordedStream,
     Scenario,
     Span,
     Stimulus,
     TimedMessage,
 )
 from grader.core.submission import StudentFile, Submission
-from grader.execution.bag import Odometry
+from grader.execution.bag import Recording
 from grader.execution.codec import from_json, to_json
 from grader.execution.plan import Plan, derive, plan_scenario
 from grader.student_host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
@@ -52,12 +53,13 @@ def plan(
     seed: int = 1,
     name: str = "alone",
     exercise: str = "velocity_publisher",
-    odometry: Odometry | None = None,
+    recording: Recording | None = None,
     **span: Any,
 ) -> Plan:
     """Return the plan of a scenario with some stimuli."""
     asked = scenario(*stimuli, name=name, **span)
-    return plan_scenario(exercise, asked, SUBMISSION, seed=seed, odometry=odometry, clock="virtual")
+    recordings = {} if recording is None else {s: recording for s in stimuli if isinstance(s, RecordedStream)}
+    return plan_scenario(exercise, asked, SUBMISSION, seed=seed, recordings=recordings, clock="virtual")
 
 
 DRAWN = stream(Between(20.5, 24), Between(0, 10**9), Between(27.25, 30))
@@ -151,15 +153,17 @@ def test_processes_run_the_files_that_were_found() -> None:
     assert plan().first_message_on == ""
 
 
-def drive(count: int = 600, period_ms: int = 33) -> Odometry:
+def drive(count: int = 600, period_ms: int = 33) -> Recording:
     """Return a recording of about 20 s."""
-    return Odometry("/odom", tuple(TimedMessage(n * period_ms * MS, bytes([n % 256]), {"n": n}) for n in range(count)))
+    return Recording(
+        "/odom", ODOMETRY, tuple(TimedMessage(n * period_ms * MS, bytes([n % 256]), {"n": n}) for n in range(count))
+    )
 
 
 def test_a_recording_is_played_from_its_start_time() -> None:
     """With its own pace, no longer than asked for, and the publisher goes just after the last message."""
-    asked = OdometryStream("/odom", 5000 * MS, 12_000 * MS)
-    (recording,) = plan(asked, odometry=drive()).recordings
+    asked = RecordedStream("/odom", ODOMETRY, "drive", 5000 * MS, 12_000 * MS)
+    (recording,) = plan(asked, recording=drive()).recordings
     times = [t for t, _, _ in recording.messages]
     assert (recording.topic, recording.type, recording.start_ns) == ("/odom", "nav_msgs/msg/Odometry", 5000 * MS)
     assert times[0] == 5000 * MS
@@ -170,15 +174,16 @@ def test_a_recording_is_played_from_its_start_time() -> None:
 
 def test_which_part_of_a_recording_is_played_is_drawn() -> None:
     """A position that was written into the code does not help."""
-    asked = OdometryStream("/odom", 0, 5000 * MS)
-    starts = {plan(asked, seed=seed, odometry=drive()).recordings[0].messages[0][2]["n"] for seed in range(20)}
+    asked = RecordedStream("/odom", ODOMETRY, "drive", 0, 5000 * MS)
+    starts = {plan(asked, seed=seed, recording=drive()).recordings[0].messages[0][2]["n"] for seed in range(20)}
     assert len(starts) > 5
 
 
 @pytest.mark.parametrize(
-    "stimuli", [(), (DRAWN,), (DRAWN, OdometryStream("/odom", 5, 5000 * MS), stream(25, JustAbove(25)))]
+    "stimuli",
+    [(), (DRAWN,), (DRAWN, RecordedStream("/odom", ODOMETRY, "drive", 5, 5000 * MS), stream(25, JustAbove(25)))],
 )
 def test_a_plan_comes_back_as_it_was(stimuli: tuple[Stimulus, ...]) -> None:
     """Over the line to the worker, as JSON."""
-    planned = plan(*stimuli, odometry=drive())
+    planned = plan(*stimuli, recording=drive())
     assert from_json(Plan, json.loads(json.dumps(to_json(planned)))) == planned

@@ -42,7 +42,7 @@ def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
         (tmp_path / "s").mkdir()
         submission = stage_submission(str(NODES), files, tmp_path / "s")
         asked = Scenario("alone", files, Span(seconds * NS_PER_S), stimuli, **fields)
-        plan = plan_scenario("services", asked, submission, seed=1, odometry=None, clock=clock)
+        plan = plan_scenario("services", asked, submission, seed=1, recordings={}, clock=clock)
         traces = [studio.record({"t": Job("t", plan)}, clock, lambda _: None)["t"] for _ in range(times)]
         assert [trace.harness_problem for trace in traces] == [""] * times
         assert len({json.dumps(trace_to_json(trace)) for trace in traces}) == 1

@@ -34,7 +34,7 @@ from grader.judging.recorded_values import MOST_SAMPLES, recorded_values
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 
-EXERCISES = {path.stem: read_rubric(path) for path in builtin_rubrics().values()}
+EXERCISES = {path.parent.name: read_rubric(path) for path in builtin_rubrics().values()}
 ONE, TWO, THREE = (EXERCISES[f"exercise_{n}"] for n in (1, 2, 3))
 
 
@@ -233,7 +233,7 @@ def test_a_picture_that_fails_costs_only_itself(monkeypatch: pytest.MonkeyPatch)
     def broken(check: TopicRate, trace: Trace) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(CHECKS["topic_rate"], "chart", broken)
+    monkeypatch.setattr(CHECKS["topic_rate"], "drawing", broken)
     titles = [f.title for f in figures_of(ONE, {"alone": velocity().trace()})]
     assert not any(t.startswith("Rate of") for t in titles)
     assert len(titles) == 4

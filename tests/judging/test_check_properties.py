@@ -51,7 +51,7 @@ from grader.core.trace import (
 )
 from grader.judging.charts import MOST_CASES
 from grader.judging.checks import CHECKS
-from grader.judging.figures import chart_for
+from grader.judging.plots import chart_of
 from grader.reporting.html.render import Columns, figure_values
 
 TRACES = {
@@ -191,7 +191,7 @@ def test_every_recording_gives_every_check_a_chart_that_a_page_can_hold_or_none(
     """Whatever was observed: as JSON without NaN, of bounded size, with words for those who do not see it."""
     trace = Trace("alone", ClockKind.VIRTUAL, stop_ns, tuple(sorted(observations, key=lambda o: o.t_ns)))
     for check in INSTANCES.values():
-        chart = chart_for(check, trace)
+        chart = chart_of(check, trace)
         if chart is not None:
             columns = Columns()
             json.dumps([figure_values(chart, columns), columns.lists], allow_nan=False)
@@ -199,14 +199,14 @@ def test_every_recording_gives_every_check_a_chart_that_a_page_can_hold_or_none(
             assert chart.about.endswith(".")
             assert 1 <= len(chart.panels) <= 9
             assert len(chart.cases) <= MOST_CASES
-            assert chart == chart_for(check, trace)
+            assert chart == chart_of(check, trace)
 
 
 @pytest.mark.parametrize("check", INSTANCES.values(), ids=INSTANCES)
 @pytest.mark.parametrize("rec", TRACES.values(), ids=TRACES)
 def test_charts_are_drawn_of_what_nodes_did(check: Check, rec: Recording) -> None:
     """Each point lies in the recording, each row exists, and each series has one text for a point or none."""
-    chart = chart_for(check, rec.trace())
+    chart = chart_of(check, rec.trace())
     for panel in chart.panels if chart else ():
         for series in panel.series:
             assert len(series.texts) in (0, len(series.points))

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from archive import read_archive
+from archive import recordings
 from diagnosis_samples import (
     RECORDINGS,
     RIGHT,
@@ -22,15 +22,18 @@ from diagnosis_samples import (
     rows,
     spoilt,
 )
+from sample_folders import folders_in
 
 from grader.core.exercise import Outcome
 from grader.core.report import ExerciseReport, Verdict
 from grader.core.trace import Start, StartWay, Trace
 from grader.judging import judge_run
-from grader.judging.diagnosis import CAUSE_KEY, RULES, diagnose
-from grader.judging.diagnosis.rules import Case, Rule
+from grader.judging.diagnosis import CAUSE_KEY, RULES
+from grader.judging.diagnosis.rules import FIRST, Case, Rule, in_order
+from grader.rubrics.builtin import builtin_exercises
 from grader.submissions.sources import source_text
 
+HERE = Path(__file__).parent
 Row = Mapping[str, Any]
 CRASHES = rows("crashes.yaml")
 BEHAVIOURS = rows("behaviours.yaml")
@@ -116,11 +119,13 @@ def test_no_cause_is_found_in_the_words_of_a_reason(row: Row, monkeypatch: pytes
     """Without any reason the hints and places are the same."""
     traces = crash_traces(row) if "fault" in row else behaviour_traces(row)
     known = [replace(v, reason="") for v in explained(row, traces).verdicts]
+    build = judge_run._verdicts
 
-    def without_reasons(verdicts: tuple[Verdict, ...], *others: Any) -> tuple[Verdict, ...]:
-        return diagnose(tuple(replace(v, reason="") for v in verdicts), *others)
+    def without_reasons(*given: Any) -> tuple[tuple[Verdict, ...], Mapping[str, object]]:
+        verdicts, facts = build(*given)
+        return tuple(replace(v, reason="") for v in verdicts), facts
 
-    monkeypatch.setattr(judge_run, "diagnose", without_reasons)
+    monkeypatch.setattr(judge_run, "_verdicts", without_reasons)
     assert list(explained(row, traces).verdicts) == known
 
 
@@ -141,10 +146,22 @@ def test_a_rule_that_fails_is_logged_and_passed_over(
 
 def test_every_rule_is_shown_to_work() -> None:
     """By a row of a table, or by a recorded submission, whose hints are compared too."""
-    recorded = [json.loads(one.report)["exercises"] for one in read_archive().values()]
+    recorded = [json.loads(one.report)["exercises"] for one in recordings().values()]
     verdicts = [verdict for exercises in recorded for exercise in exercises for verdict in exercise["criteria"]]
     shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS, *SLIPS)} | {v["evidence"].get(CAUSE_KEY) for v in verdicts}
+    # it only names another criterion, so that reports do not name it
+    shown |= {"follows" for v in verdicts if v.get("same_cause_as") and CAUSE_KEY not in v["evidence"]}
     assert {rule.id for rule in RULES} - shown == set()
+
+
+def test_the_rules_are_asked_in_the_order_that_is_written_down() -> None:
+    """Wherever a rule is defined: its priority alone decides."""
+    order = (HERE / "diagnosis" / "order.txt").read_text("utf-8").split()
+    rules: list[Any] = [*RULES, *(rule for exercise in builtin_exercises() for rule in exercise.hints)]
+    assert [rule.id for rule in in_order(rules)] == [*order, "follows"]
+    priorities = [rule.priority for rule in rules]
+    assert len(set(priorities)) == len(priorities)
+    assert min(priorities) >= 1000 > FIRST
 
 
 def test_the_ids_of_rules_are_unique() -> None:
@@ -345,8 +362,7 @@ OTHERWISE = [
 
 def right_programs(file: str) -> dict[str, str]:
     """The graded files of that name among the correct submissions."""
-    folders = Path(__file__).parents[1] / "submissions"
-    found = sorted([*folders.glob(f"correct/**/{file}"), *folders.glob(f"threads/**/{file}")])
+    found = sorted(path for folder in folders_in("correct", "threads") for path in folder.rglob(file))
     return {p.parent.name: text for p in found if (text := source_text(p)) is not None}
 
 

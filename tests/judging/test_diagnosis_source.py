@@ -71,7 +71,7 @@ def strict() -> Iterator[None]:
     """Let exceptions of causes through, which diagnosis otherwise keeps from the report."""
     looked = diagnosis.clue_for
 
-    def clue_for(case: Case) -> tuple[str, Clue] | None:
+    def clue_for(case: Case, *_: object) -> tuple[str, Clue] | None:
         try:
             return looked(case)
         except Exception as error:

@@ -14,8 +14,8 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
 from grader.judging.checks.fan import ThresholdResponse
 
-ON = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "above")
-OFF = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "at_or_below")
+ON = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "above", unit="°C")
+OFF = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "at_or_below", unit="°C")
 
 
 def both(rec: Recording) -> tuple[Finding, Finding]:

@@ -17,16 +17,16 @@ from grader.core.trace import Trace
 from grader.judging.charts import MOST_POINTS
 from grader.judging.checks import CHECKS
 from grader.judging.checks.timing import ReactionCase
-from grader.judging.figures import chart_for, figures_of
+from grader.judging.figures import figures_of
 from grader.judging.findings import met
-from grader.judging.plots import Plot, value_panels
+from grader.judging.plots import Plot, chart_of, value_panels
 from grader.judging.values import FieldRule
 
 OTHER = "course_msgs/msg/State"
 
 
 def made(check: Check, rec: Recording) -> Chart:
-    chart = chart_for(check, rec.trace())
+    chart = chart_of(check, rec.trace())
     assert chart is not None
     return chart
 

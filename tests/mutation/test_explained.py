@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from grader.core.errors import RubricError
-from grader.mutation.explained import Explained, beside, read_explained
-from grader.rubrics.builtin import NOTES, builtin_rubrics
+from grader.core.rubric_files import notes_on, rubric_of
+from grader.mutation.explained import Explained, read_explained
+from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 
 EXERCISE = read_rubric(builtin_rubrics()["velocity_publisher"])
@@ -42,9 +43,21 @@ def read(tmp_path: Path, text: str) -> Explained:
 
 
 def test_notes_lie_beside_their_rubric() -> None:
-    """Their name ends as that of no rubric does."""
-    assert beside(Path("x/a.yaml")) == Path("x/a.selftest.yaml")
-    assert beside(Path("a.yaml")).name.endswith(NOTES)
+    """Their name tells them from rubrics, and says which rubric they are about."""
+    assert notes_on(Path("x/a.yaml")) == Path("x/a.selftest.yaml")
+    assert rubric_of(Path("x/a.selftest.yaml")) == Path("x/a.yaml")
+    assert rubric_of(Path("x/a.yaml")) is None
+
+
+def test_notes_on_a_rubric_in_the_folder_of_its_exercise(tmp_path: Path) -> None:
+    """They need no name of their own, unless they have had one; a rubric of that name alone is none of them."""
+    rubric, notes = tmp_path / "rubric.yaml", tmp_path / "selftest.yaml"
+    assert rubric_of(notes) is None
+    rubric.touch()
+    assert (notes_on(rubric), rubric_of(notes)) == (notes, rubric)
+    earlier = tmp_path / "rubric.selftest.yaml"
+    earlier.touch()
+    assert (notes_on(rubric), rubric_of(earlier)) == (earlier, rubric)
 
 
 def test_what_notes_say(tmp_path: Path) -> None:
@@ -102,10 +115,10 @@ def test_notes_that_cannot_be_read_are_refused(tmp_path: Path) -> None:
         read_explained(tmp_path, EXERCISE)
 
 
-@pytest.mark.parametrize("rubric", builtin_rubrics().values(), ids=lambda path: path.stem)
+@pytest.mark.parametrize("rubric", builtin_rubrics().values(), ids=builtin_rubrics())
 def test_our_own_notes_can_be_read(rubric: Path) -> None:
     """Each rubric that comes with the grader has notes that name its reference and its template."""
-    said = read_explained(beside(rubric), read_rubric(rubric))
+    said = read_explained(notes_on(rubric), read_rubric(rubric))
     assert said.reference is not None
     assert said.template is not None
     assert said.reference.is_dir()

@@ -19,7 +19,7 @@ from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 from grader.submissions.submission import stage_submission
 
-#: Mutants of each of our rubrics in this test; `grade selftest rubrics/*.yaml` by hand runs them all. Of a rubric with
+#: Mutants of each of our rubrics in this test; `grade selftest rubrics/*/` by hand runs them all. Of a rubric with
 #: many scenarios fewer are tried, for each is recorded in most of them.
 SAMPLE, SAMPLE_OF_MANY, MANY = 4, 3, 4
 #: The rubric that is not left to the nightly run.
@@ -84,10 +84,10 @@ def test_without_libcst_the_command_says_what_to_install(monkeypatch: pytest.Mon
 
 def test_notes_are_no_rubrics() -> None:
     """A pattern of the shell may name them beside their rubric, but not alone."""
-    notes = builtin_rubrics()["velocity_publisher"].with_name("exercise_1.selftest.yaml")
+    notes = builtin_rubrics()["velocity_publisher"].with_name("selftest.yaml")
     code, said = graded(notes)
     assert code == 2
-    assert "name exercise_1.yaml" in said
+    assert "name rubric.yaml" in said
 
 
 @pytest.mark.ros
@@ -130,7 +130,7 @@ def test_a_hole_in_a_rubric_is_found(tmp_path: Path) -> None:
     """A rubric that asks for a publisher only lets ten times the period survive, and notices a misspelt topic."""
     rubric = tmp_path / "holed.yaml"
     rubric.write_text(HOLED, encoding="utf-8")
-    reference = builtin_rubrics()["velocity_publisher"].parent.parent / "reference_solutions"
+    reference = builtin_rubrics()["velocity_publisher"].parents[2] / "reference_solutions"
     code, data = graded(rubric, "--reference", reference, "--only", "*:period:*[*] 10")
     (tested,) = data["rubrics"]
     assert [(m["fate"], m["change"].split("=>")[1].strip()) for m in tested["mutants"]] == [

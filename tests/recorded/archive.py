@@ -1,4 +1,4 @@
-"""The recordings of all test submissions in one archive: what judging needs of each, and the report that it gave."""
+"""The recordings of the test submissions, an archive a collection: what judging needs of each, and its report."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
+from sample_folders import ARCHIVE, collections
 
 from grader.app.request import command_words, request_of
 from grader.core.chart import Chart, Panel, Series
@@ -24,8 +24,6 @@ from grader.judging.judge_run import judge_run
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 
-ARCHIVE = Path(__file__).with_name("recorded.tar.xz")
-SUBMISSIONS = Path(__file__).resolve().parents[1] / "submissions"
 #: The seed of all recordings and golden texts.
 SEED = 1
 MANIFEST, REPORT, TRACE_ENDING = "evidence.json", "report.json", ".trace.json"
@@ -47,8 +45,20 @@ class Recorded:
 
 
 @cache
-def read_archive(path: Path = ARCHIVE) -> dict[str, Recorded]:
-    """Return what was recorded, by folder."""
+def recordings() -> dict[str, Recorded]:
+    """Return what was recorded of all test submissions, by name."""
+    return {name: one for collection in collections() for name, one in recorded_of(collection).items()}
+
+
+@cache
+def recorded_of(collection: Path) -> dict[str, Recorded]:
+    """Return what was recorded of a collection, by name; empty before it ever was."""
+    path = collection / ARCHIVE
+    return read_archive(path) if path.exists() else {}
+
+
+def read_archive(path: Path) -> dict[str, Recorded]:
+    """Return what an archive holds, by folder."""
     files: dict[str, dict[str, bytes]] = {}
     with tarfile.open(path, "r:xz") as archive:
         for member in archive:
@@ -72,7 +82,7 @@ def recorded_in(folder: Path) -> Recorded:
     return _recorded(files)
 
 
-def write_archive(recorded: Mapping[str, Recorded], path: Path = ARCHIVE) -> None:
+def write_archive(recorded: Mapping[str, Recorded], path: Path) -> None:
     """Write what was recorded; the same recordings give the same bytes, and like ones are packed side by side."""
     with tarfile.open(path, "w:xz", preset=9, format=tarfile.PAX_FORMAT) as archive:
         members: list[tuple[tuple[str, ...], str, str, bytes]] = [
@@ -86,22 +96,6 @@ def write_archive(recorded: Mapping[str, Recorded], path: Path = ARCHIVE) -> Non
             member = tarfile.TarInfo(f"{folder}/{name}")
             member.size = len(data)
             archive.addfile(member, io.BytesIO(data))
-
-
-@cache
-def expected() -> dict[str, Any]:
-    """Return what each submission is graded for, and the outcome of every criterion that it does not meet."""
-    return _table("expected.yaml")
-
-
-@cache
-def golden() -> dict[str, Any]:
-    """Return the reasons, hints and places that students read, by folder."""
-    return _table("golden.yaml")
-
-
-def _table(name: str) -> dict[str, Any]:
-    return dict(YAML(typ="safe").load((SUBMISSIONS / name).read_text(encoding="utf-8")))
 
 
 @cache
@@ -122,10 +116,10 @@ def outdated(recorded: Recorded) -> list[str]:
     ]
 
 
-def judged(recorded: Recorded) -> Report:
-    """Judge a recording as `grade rejudge` does, by the built-in rubrics."""
+def judged(recorded: Recorded, known: Mapping[str, Exercise] | None = None) -> Report:
+    """Judge a recording as `grade rejudge` does, by the built-in exercises or by others, by id."""
     manifest = kept.parse(recorded.manifest)
-    exercises = [builtin_exercises()[exercise.id] for exercise in manifest.exercises]
+    exercises = [(known or builtin_exercises())[exercise.id] for exercise in manifest.exercises]
     traces = {
         (exercise.id, recording.scenario): unpack(recorded.traces[f"{exercise.id}.{recording.scenario}"])
         for exercise in manifest.exercises
@@ -142,29 +136,6 @@ def outcomes(report: Report) -> dict[str, str]:
     """Return the outcome of every criterion that is not met."""
     verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
     return {v.id: v.outcome.value for v in verdicts if v.outcome.value != "met"}
-
-
-#: Submissions whose charts are compared: one right and one wrong for each exercise.
-CHARTED = (
-    "correct/velocity_class",
-    "wrong/velocity_swapped_fields",
-    "correct/odom_throttle",
-    "wrong/odom_swapped_xy",
-    "correct/fan_float32",
-    "wrong/fan_on_at_25",
-    "correct/joint_class",
-    "wrong/joint_amplitude",
-    "correct/angle_degrees_first",
-    "wrong/angle_pi_is_3",
-    "correct/battery_callbacks",
-    "wrong/battery_client_limit_30",
-)
-
-
-@cache
-def golden_charts() -> dict[str, Any]:
-    """Return what the charts of some submissions show, by folder."""
-    return _table("charts.yaml")
 
 
 def charted(report: Report) -> list[dict[str, Any]]:

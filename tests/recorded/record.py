@@ -1,6 +1,6 @@
 """Records the test submissions again, and writes what they are told. Run by hand; read what changed in golden.yaml.
 
-Usage: python tests/recorded/record.py [PREFIX...]      grade them, or only folders such as wrong/joint
+Usage: python tests/recorded/record.py [PREFIX...]      grade them, or only folders such as wrong/joint, or exercise_3
        python tests/recorded/record.py --judge          judge what is recorded, after a change of judging or of texts
 """
 
@@ -10,69 +10,80 @@ import argparse
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 
-from archive import (
-    ARCHIVE,
-    CHARTED,
-    SEED,
-    SUBMISSIONS,
-    Recorded,
-    charted,
-    expected,
-    judged,
-    read_archive,
-    recorded_in,
-    told,
-    write_archive,
-)
+sys.path.append(str(Path(__file__).resolve().parent.parent))
+from archive import SEED, Recorded, charted, judged, recorded_in, recorded_of, told, write_archive
 from ruamel.yaml import YAML
+from sample_folders import ARCHIVE, CHARTS, GOLDEN, collection_of, collections, expected, expected_in, table
 
 from grader.reporting.json_report import dumps
 
-GOLDEN, CHARTS = SUBMISSIONS / "golden.yaml", SUBMISSIONS / "charts.yaml"
 GRADE = str(Path(sys.executable).with_name("grade"))
 
 
-def graded(folder: str, exercises: list[str]) -> Recorded:
-    """Grade one folder and return what was recorded."""
+def graded(name: str, exercises: list[str]) -> Recorded:
+    """Grade one submission and return what was recorded."""
     with tempfile.TemporaryDirectory() as kept:
-        words = [GRADE, folder, "--seed", str(SEED), "--no-progress", "-o", f"evidence={kept}"]
+        words = [GRADE, name, "--seed", str(SEED), "--no-progress", "-o", f"evidence={kept}"]
         chosen = [word for exercise in exercises for word in ("--exercise", exercise)]
-        subprocess.run([*words, *chosen], cwd=SUBMISSIONS, check=False, stdout=subprocess.DEVNULL)
+        subprocess.run([*words, *chosen], cwd=collection_of(name), check=False, stdout=subprocess.DEVNULL)
         return recorded_in(Path(kept))
 
 
+def recorded_again(names: Sequence[str]) -> dict[str, Recorded]:
+    """Grade submissions, two at a time, and return what was recorded of each."""
+    made = {}
+    with ThreadPoolExecutor(2) as pool:
+        futures = {pool.submit(graded, name, expected()[name]["graded"]): name for name in names}
+        for number, future in enumerate(as_completed(futures), 1):
+            made[futures[future]] = future.result()
+            print(f"{number}/{len(names)} {futures[future]}", flush=True)
+    return made
+
+
+def keep(collection: Path, before: Mapping[str, Recorded], made: Mapping[str, Recorded]) -> None:
+    """Write the archive of a collection if it changed, and the golden texts and charts."""
+    made = {name: made[name] for name in expected_in(collection) if name in made}
+    if made != before:
+        write_archive(made, collection / ARCHIVE)
+    reports = {name: judged(one) for name, one in made.items()}
+    _write(collection / GOLDEN, {name: text for name, report in reports.items() if (text := told(report))})
+    charts = collection / CHARTS
+    if charts.exists():
+        _write(charts, {name: charted(reports[name]) for name in table(charts) if name in reports})
+
+
+def _write(path: Path, texts: Mapping[str, object]) -> None:
+    yaml = YAML()
+    yaml.width = 1000
+    with path.open("w", encoding="utf-8") as out:
+        yaml.dump(texts, out)
+
+
 def main() -> None:
-    """Record or judge, and write the archive and the golden texts."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Record or judge, and write the archives and the golden texts."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("prefixes", nargs="*", metavar="PREFIX")
     parser.add_argument("--judge", action="store_true")
     arguments = parser.parse_args()
-    wanted = expected()
-    before = read_archive() if ARCHIVE.exists() else {}
-    if arguments.judge:
-        made = {folder: replace(one, report=dumps(judged(one)).encode()) for folder, one in before.items()}
-    else:
-        folders = [folder for folder in wanted if folder.startswith(tuple(arguments.prefixes) or ("",))]
-        made = {folder: one for folder, one in before.items() if folder in wanted}
-        with ThreadPoolExecutor(2) as pool:
-            futures = {pool.submit(graded, folder, wanted[folder]["graded"]): folder for folder in folders}
-            for number, future in enumerate(as_completed(futures), 1):
-                made[futures[future]] = future.result()
-                print(f"{number}/{len(folders)} {futures[future]}", flush=True)
-    write_archive({folder: made[folder] for folder in wanted if folder in made})
-    texts = {folder: told(judged(made[folder])) for folder in wanted if folder in made}
-    yaml = YAML()
-    yaml.width = 1000
-    with GOLDEN.open("w", encoding="utf-8") as out:
-        yaml.dump({folder: text for folder, text in texts.items() if text}, out)
-    with CHARTS.open("w", encoding="utf-8") as out:
-        yaml.dump({folder: charted(judged(made[folder])) for folder in CHARTED if folder in made}, out)
-    changed = [folder for folder, one in made.items() if folder not in before or one.report != before[folder].report]
-    print(f"{len(made)} recordings, {len(changed)} reports changed: {' '.join(changed[:20])}")
+    begin = tuple(arguments.prefixes) or ("",)
+    wanted = [n for n in expected() if n.startswith(begin) or collection_of(n).name in arguments.prefixes]
+    new = {} if arguments.judge else recorded_again(wanted)
+    changed, count = [], 0
+    for collection in collections():
+        before = recorded_of(collection)
+        made = {name: new.get(name, one) for name, one in before.items()}
+        made |= {name: one for name, one in new.items() if collection_of(name) == collection}
+        if arguments.judge:
+            made = {name: replace(one, report=dumps(judged(one)).encode()) for name, one in made.items()}
+        keep(collection, before, made)
+        count += len(made)
+        changed += [n for n, one in made.items() if n not in before or one.report != before[n].report]
+    print(f"{count} recordings, {len(changed)} reports changed: {' '.join(changed[:20])}")
 
 
 if __name__ == "__main__":

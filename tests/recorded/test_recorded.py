@@ -5,19 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from archive import (
-    CHARTED,
-    charted,
-    expected,
-    golden,
-    golden_charts,
-    judged,
-    outcomes,
-    outdated,
-    read_archive,
-    told,
-    write_archive,
-)
+from archive import charted, judged, outcomes, outdated, read_archive, recordings, told, write_archive
+from sample_folders import expected, golden, golden_charts
 
 from grader.reporting.html.render import render_html
 from grader.reporting.json_report import dumps
@@ -27,15 +16,15 @@ AGAIN = "python tests/recorded/record.py"
 
 def test_every_submission_is_recorded() -> None:
     """A new folder is recorded before it can be compared with anything."""
-    missing = set(expected()) - set(read_archive())
+    missing = set(expected()) - set(recordings())
     assert not missing, f"{AGAIN} {' '.join(sorted(missing))}"
-    assert set(read_archive()) == set(expected())
+    assert set(recordings()) == set(expected())
 
 
 @pytest.mark.parametrize("folder", expected())
 def test_a_recording_is_judged_as_ever(folder: str) -> None:
     """The outcome of every criterion, what the student reads, and the whole report."""
-    recorded = read_archive()[folder]
+    recorded = recordings()[folder]
     assert not outdated(recorded), f"{AGAIN} {folder}"
     report = judged(recorded)
     assert outcomes(report) == expected()[folder]["expected"]
@@ -43,17 +32,17 @@ def test_a_recording_is_judged_as_ever(folder: str) -> None:
     assert dumps(report) == recorded.report.decode(), f"if the new report is the better one: {AGAIN} --judge"
 
 
-@pytest.mark.parametrize("folder", CHARTED)
+@pytest.mark.parametrize("folder", golden_charts())
 def test_a_recording_is_drawn_as_ever(folder: str) -> None:
     """What each chart shows, and twice the same page, byte for byte."""
-    report = judged(read_archive()[folder])
+    report = judged(recordings()[folder])
     assert charted(report) == golden_charts()[folder], f"if the new charts are the better ones: {AGAIN} --judge"
-    assert render_html(report) == render_html(judged(read_archive()[folder]))
+    assert render_html(report) == render_html(judged(recordings()[folder]))
 
 
 def test_the_archive_is_written_as_it_was_read(tmp_path: Path) -> None:
     """The same recordings, the same bytes."""
-    some = {folder: one for folder, one in read_archive().items() if folder.startswith("broken/")}
+    some = {folder: one for folder, one in recordings().items() if folder.startswith("broken/")}
     for name in ("one", "two"):
         write_archive(some, tmp_path / name)
     assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()

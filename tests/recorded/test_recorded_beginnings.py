@@ -7,7 +7,8 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 
-from archive import Recorded, builtin_exercises, expected, read_archive
+from archive import Recorded, builtin_exercises, recordings
+from sample_folders import expected
 
 from grader.core.quantities import NS_PER_MS
 from grader.core.trace import ClockKind, LogRecord, Message, Observation, OutputLine, Request, Response, Trace
@@ -73,7 +74,7 @@ def test_no_correct_submission_loses_a_criterion_to_a_real_clock() -> None:
     lost: list[str] = []
     criteria: Counter[str] = Counter()
     for folder in (folder for folder in expected() if folder.startswith("correct/")):
-        for name, judge, trace, first_message_on in scenarios(read_archive()[folder]):
+        for name, judge, trace, first_message_on in scenarios(recordings()[folder]):
             length_ns = judge.length_ns(trace, begins_ns(trace, first_message_on))
             begin_ns = begins_ns(trace, first_message_on)
             for seed in range(2):

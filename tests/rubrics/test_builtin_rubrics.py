@@ -15,9 +15,10 @@ from ruamel.yaml import YAML
 
 from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S
-from grader.core.scenario import OdometryStream, longest_course_ns, shortest
+from grader.core.rubric_files import rubrics_in
+from grader.core.scenario import RecordedStream, longest_course_ns, shortest
 from grader.judging.checks import CHECKS
-from grader.rubrics.builtin import NOTES, builtin_headers, builtin_rubrics
+from grader.rubrics.builtin import builtin_headers, builtin_rubrics
 from grader.rubrics.loader import read_rubric
 from grader.rubrics.schema import rubric_schema, schema_text
 
@@ -105,7 +106,7 @@ def test_odometry_comes_late_and_goes_early() -> None:
     """
     (scenario,) = exercise("odom_subscriber").scenarios
     (stream,) = scenario.stimuli
-    assert isinstance(stream, OdometryStream)
+    assert isinstance(stream, RecordedStream)
     assert shortest(stream.start_ns) == 5 * NS_PER_S
     assert shortest(stream.duration_ns) == 15 * NS_PER_S
     assert isinstance(scenario.span.duration_ns, int)
@@ -124,13 +125,11 @@ def test_the_shipped_schema_is_up_to_date() -> None:
     assert (RUBRICS / "rubric.schema.json").read_text(encoding="utf-8") == schema_text()
 
 
-@pytest.mark.parametrize(
-    "path", [p for p in sorted(RUBRICS.glob("*.yaml")) if not p.name.endswith(NOTES)], ids=lambda path: path.name
-)
+@pytest.mark.parametrize("path", rubrics_in(RUBRICS), ids=lambda path: path.parent.name)
 def test_each_rubric_names_the_schema_and_fits_it(path: Path, schema: Mapping[str, Any]) -> None:
     """An editor that knows JSON Schema finds nothing wrong."""
     text = path.read_text(encoding="utf-8")
-    assert text.startswith("# yaml-language-server: $schema=rubric.schema.json\n")
+    assert text.startswith("# yaml-language-server: $schema=../rubric.schema.json\n")
     jsonschema.Draft202012Validator(schema).validate(YAML(typ="safe", pure=True).load(text))
 
 
@@ -157,7 +156,7 @@ def test_the_schema_knows_every_check_and_parameter(schema: Mapping[str, Any]) -
 )
 def test_the_schema_refuses_what_the_reader_refuses(old: str, new: str, schema: Mapping[str, Any]) -> None:
     """An editor marks a missing unit, points of 0, an unknown check and an unknown key."""
-    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8").replace(old, new, 1)
+    text = (RUBRICS / "exercise_1" / "rubric.yaml").read_text(encoding="utf-8").replace(old, new, 1)
     data = YAML(typ="safe", pure=True).load(text)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.Draft202012Validator(schema).validate(data)
@@ -191,12 +190,13 @@ def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path: Path, monk
     """Beside the package's code, exercise 2 before exercise 10."""
     rubrics = tmp_path / "grader" / "shipped" / "rubrics"
     rubrics.mkdir(parents=True)
-    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
+    text = (RUBRICS / "exercise_1" / "rubric.yaml").read_text(encoding="utf-8")
     for number, name in (("10", "a"), ("2", "c"), ("P1", "b")):
         changed = text.replace('number: "1"', f'number: "{number}"').replace("id: velocity_publisher", f"id: {name}")
-        (rubrics / f"{name}.yaml").write_text(changed, encoding="utf-8")
+        (rubrics / name).mkdir()
+        (rubrics / name / "rubric.yaml").write_text(changed, encoding="utf-8")
     monkeypatch.setattr("grader.core.shipped.PACKAGE", tmp_path / "grader")
-    assert builtin_rubrics() == {"c": rubrics / "c.yaml", "a": rubrics / "a.yaml", "b": rubrics / "b.yaml"}
+    assert builtin_rubrics() == {name: rubrics / name / "rubric.yaml" for name in "cab"}
     assert list(builtin_rubrics()) == ["c", "a", "b"]
 
 
@@ -207,3 +207,32 @@ def test_every_criterion_says_which_part_of_the_chapter_asks_for_it() -> None:
         task = rf"Exercise {exercise.number}, (acceptance criterion|task) \d"
         begin = rf"Part 2, {exercise.number}, \w" if exercise.id in PROJECTS else task
         assert [c.id for c in exercise.criteria if not re.match(begin, c.chapter)] == []
+
+
+_ROW = re.compile(r"^\| `(\w+)` \| ([0-9.]+) \|", re.MULTILINE)
+
+
+@pytest.mark.parametrize("path", rubrics_in(RUBRICS), ids=lambda path: path.parent.name)
+def test_each_exercise_is_described(path: Path) -> None:
+    """Its README has its number, its files, and the criteria with their points, in order."""
+    text, described = path.with_name("README.md").read_text(encoding="utf-8"), read_rubric(path)
+    assert [(id_, float(points)) for id_, points in _ROW.findall(text)] == [
+        (c.id, float(c.points)) for c in described.criteria
+    ]
+    assert f"{sum(c.points for c in described.criteria)} points" in text
+    assert all(f"`{file}`" in text for file in described.files)
+
+
+def test_what_students_read_is_described_in_other_words() -> None:
+    """No six words in a row of a README are those of the chapter."""
+    chapter = RUBRICS.parents[1] / "shared" / "chapter_1_2.txt"
+    if not chapter.exists():
+        pytest.skip("the text of the chapter is not here")
+    theirs = _runs(chapter.read_text(encoding="utf-8"))
+    ours = {path.parent.name: _runs(path.read_text(encoding="utf-8")) & theirs for path in RUBRICS.glob("*/README.md")}
+    assert {name: shared for name, shared in ours.items() if shared} == {}
+
+
+def _runs(text: str) -> set[tuple[str, ...]]:
+    words = re.findall(r"\w+", text.casefold())
+    return {tuple(words[n : n + 6]) for n in range(len(words) - 5)}

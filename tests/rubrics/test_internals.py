@@ -7,6 +7,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from sample_folders import folders_in
 
 from grader.submissions.sources import LONG, UNREADABLE, reaching, read_reaches
 
@@ -161,8 +162,8 @@ def test_what_students_write_is_not(text: str) -> None:
 
 def test_few_right_programs_are_suspected() -> None:
     """Of the programs with full marks, at most one in twenty is recorded twice."""
-    folders = [f for group in ("correct", "threads") for f in (ROOT / "tests/submissions" / group).iterdir()]
-    suspected = [f.name for f in folders if f.is_dir() and read_reaches(f)]
+    folders = folders_in("correct", "threads")
+    suspected = [folder.name for folder in folders if read_reaches(folder)]
     assert len(suspected) <= len(folders) / 20
 
 

@@ -15,7 +15,7 @@ from stand_in_checks import CHECKS, Everything, FieldValues, Point, Publishes, T
 
 from grader.core.errors import RubricError
 from grader.core.exercise import Criterion, Exercise
-from grader.core.scenario import Between, JustAbove, JustBelow, NumberStream, OdometryStream, Scenario, Span
+from grader.core.scenario import ODOMETRY, Between, JustAbove, JustBelow, NumberStream, RecordedStream, Scenario, Span
 from grader.rubrics.loader import MAX_BYTES, MAX_MISTAKES, RubricMistakes, read_rubric
 
 GOOD = """\
@@ -103,7 +103,7 @@ def test_a_rubric_becomes_an_exercise(rubric: Callable[..., Any]) -> None:
         hold_ns=2_000_000_000,
         start_ns=500_000_000,
     )
-    odometry = OdometryStream("/odom", 5_000_000_000, 16_000_000_000)
+    odometry = RecordedStream("/odom", ODOMETRY, "", 5_000_000_000, 16_000_000_000)
     rate = TopicRate("/flow", 5.0, 0.25, 1_500_000_000)
     assert exercise == Exercise(
         id="pump",

@@ -23,7 +23,9 @@ INSTALLS: dict[str, tuple[str, Sequence[tuple[str, str]]]] = {
     "quoted": ('install(PROGRAMS "scripts/a.py" DESTINATION "lib/${PROJECT_NAME}/")', [A]),
     "the name itself": ("install(PROGRAMS scripts/a.py DESTINATION lib/talk)", [A]),
     "absolute": (
-        f"install(PROGRAMS ${{CMAKE_CURRENT_SOURCE_DIR}}/scripts/a.py {DEST.replace('lib', '${CMAKE_INSTALL_PREFIX}/lib')})",
+        "install(PROGRAMS ${CMAKE_CURRENT_SOURCE_DIR}/scripts/a.py "
+        + DEST.replace("lib", "${CMAKE_INSTALL_PREFIX}/lib")
+        + ")",
         [A],
     ),
     "renamed": (f"install(PROGRAMS scripts/a.py {DEST} RENAME a)", [("a", "scripts/a.py")]),
@@ -162,7 +164,7 @@ endif()
 @pytest.mark.parametrize("text", ["install(PROGRAMS", "install PROGRAMS)", 'set(A "x)', ")", "foreach(a b)\nset(C d)"])
 def test_what_is_not_cmake_is_an_error(text: str) -> None:
     """CMake would refuse it too."""
-    with pytest.raises(ValueError, match="not CMake|without an end"):
+    with pytest.raises(ValueError, match=r"not CMake|without an end"):
         contents_of(text, "talk", NAMES)
 
 

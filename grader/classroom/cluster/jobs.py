@@ -19,7 +19,6 @@ from grader.classroom import store as kept
 from grader.classroom.local import AGAIN, Attempt, LocalScheduler, Task
 from grader.classroom.messages import (
     MAX_ANSWER_BYTES,
-    Files,
     Fitness,
     GradingJob,
     JobResult,
@@ -100,9 +99,9 @@ def write_task(terms: Terms, job: GradingJob, scratch: Path) -> Task:
     start.mkdir(parents=True)
     for name, content in (*terms.rubrics, *terms.checks):
         _write(start, os.fsdecode(name), content, scratch)
-    bag = os.fsdecode(terms.odom_bag)
-    for name, content in terms.recording:
-        _write(start, str(PurePosixPath(bag, os.fsdecode(name))), content, scratch)
+    for bag in terms.bags:
+        for name, content in bag.files:
+            _write(start, str(PurePosixPath(os.fsdecode(bag.path), os.fsdecode(name))), content, scratch)
     collected = scratch / "collected"
     collected.write_bytes(job.collected)
     return Task(
@@ -112,7 +111,7 @@ def write_task(terms: Terms, job: GradingJob, scratch: Path) -> Task:
         into=scratch / "result",
         exercises=terms.exercises,
         rubrics=tuple(Path(os.fsdecode(name)) for name, _ in terms.rubrics),
-        odom_bag=Path(bag) if bag else None,
+        bags=tuple((bag.name, Path(os.fsdecode(bag.path))) for bag in terms.bags),
         conditions=replace(terms.conditions, variants=job.variants, seed=job.seed),
         # The parallelism of a cluster is one submission per thread.
         workers=1,
@@ -125,8 +124,8 @@ def write_task(terms: Terms, job: GradingJob, scratch: Path) -> Task:
 
 def _start(terms: Terms, scratch: Path) -> Path:
     """Return where relative paths start from: so deep that those which lead up stay inside."""
-    names: Files = (*terms.rubrics, *terms.checks, (terms.odom_bag, b""))
-    up = max(name.split(b"/").count(b"..") for name, _ in names)
+    names = (*(name for name, _ in (*terms.rubrics, *terms.checks)), *(bag.path for bag in terms.bags))
+    up = max((name.split(b"/").count(b"..") for name in names), default=0)
     return scratch.joinpath("files", *["up"] * up)
 
 

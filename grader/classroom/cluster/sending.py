@@ -16,6 +16,7 @@ from grader.classroom.messages import (
     Files,
     GradingJob,
     JobResult,
+    SentBag,
     Terms,
     files_below,
     pack_collected,
@@ -42,8 +43,7 @@ def terms_of(task: Task) -> Terms:
         rubrics=tuple((travelling_name(path), _content(path)) for path in task.rubrics),
         checks=(*checks_of(task.rubrics), *_definitions(task.interfaces)),
         interfaces=tuple(map(travelling_name, task.interfaces)),
-        odom_bag=b"" if task.odom_bag is None else travelling_name(task.odom_bag),
-        recording=() if task.odom_bag is None else _recording(task.odom_bag),
+        bags=tuple(SentBag(name, travelling_name(path), _recording(path)) for name, path in task.bags),
         standalone=task.standalone,
         deadline_s=task.deadline_s,
     )

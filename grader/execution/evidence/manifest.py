@@ -21,7 +21,7 @@ import msgspec
 
 from grader.core.errors import EvidenceError
 from grader.core.report import BroughtPackage, Environment
-from grader.core.scenario import Scenario
+from grader.core.scenario import ODOMETRY, RecordedStream, Scenario
 from grader.core.submission import Definition, StudentFile
 
 #: Describes the run and lists its recordings; written last.
@@ -233,6 +233,8 @@ def sha256(data: bytes) -> str:
 
 
 def _plainly(value: Any) -> Any:
+    if isinstance(value, RecordedStream):
+        return _recorded(value)
     if is_dataclass(value):
         kept = {f.name: getattr(value, f.name) for f in fields(value)}
         defaults = {f.name: f.default for f in fields(value) if f.default is not MISSING}
@@ -245,3 +247,13 @@ def _plainly(value: Any) -> Any:
     if isinstance(value, bytes):  # the text of an author's simulation
         return sha256(value)
     return value.value if isinstance(value, Enum) else value
+
+
+def _recorded(stream: RecordedStream) -> Mapping[str, Any]:
+    """Return what determines a stimulus that plays a recording, apart from its messages, which have their own digest.
+
+    The names are those of evidence that was kept when only odometry was played, so it can still be judged again.
+    """
+    kept = {"topic": stream.topic, "start_ns": stream.start_ns, "duration_ns": stream.duration_ns}
+    others = {} if stream.type == ODOMETRY else {"type": stream.type}
+    return {"OdometryStream": _plainly({**kept, **others})}

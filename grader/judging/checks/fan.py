@@ -6,13 +6,14 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Literal
+from typing import Annotated, ClassVar, Literal
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_MS, counted, seconds, within
+from grader.core.exercise import Finding, Problem, ProblemKind, Roles
+from grader.core.quantities import NS_PER_MS, FieldOf, counted, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Trace
+from grader.judging.facts import AnswerFacts, AnswerRow
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
 from grader.judging.plots import Drawing, threshold_drawing
 from grader.judging.series import lag_ns
@@ -28,7 +29,7 @@ from grader.judging.values import (
     published_numbers,
     student_endpoints,
 )
-from grader.judging.wording import moment, number, numbers, quote, span, unit_of
+from grader.judging.wording import in_unit, moment, number, numbers, quote, span
 
 #: How long after a new input the answer to the previous one is still accepted.
 _GRACE_NS = 300 * NS_PER_MS
@@ -64,47 +65,57 @@ class ThresholdResponse:
         above: Answer expected above the threshold.
         otherwise: Answer expected at or below it.
         side: The side that this criterion judges.
+        input_field: Path of the number in the input; by default `data`, or else its only number.
+        output_field: The same in the answers.
+        unit: Unit of the input, for reasons and charts, e.g. `m`.
     """
 
+    roles: ClassVar[Roles] = Roles(hears=("input",), speaks=("output",))
     input: str
     output: str
     threshold: float
     above: float
     otherwise: float
     side: Literal["above", "at_or_below"]
+    input_field: Annotated[str, FieldOf("input")] = ""
+    output_field: Annotated[str, FieldOf("output")] = ""
+    unit: str = ""
 
     @property
     def expected(self) -> str:
-        limit = f"{number(self.threshold)}{unit_of(self.input)}"
+        limit = f"{number(self.threshold)}{in_unit(self.unit)}"
         side, answer = ("above", self.above) if self.side == "above" else ("at or below", self.otherwise)
         return f"{number(answer)} on {self.output} for every {self.input} {side} {limit}"
 
     def judge(self, trace: Trace) -> Finding:
-        inputs = held(trace, self.input, heard_from_ns=heard_from_ns(trace, self.input))
+        inputs = held(trace, self.input, self.input_field, heard_from_ns=heard_from_ns(trace, self.input))
         messages = published(trace, self.output)
         if not messages:
             return self._once(self._silent(trace))
         mine = [h for h in inputs if (h.value > self.threshold) == (self.side == "above")]
         if not mine:
             return self._nothing_asked(trace)
-        every = published_numbers(trace, self.output)
+        every = published_numbers(trace, self.output, self.output_field)
         answers = last_of_instant(every)
         if not answers:
             type_ = messages[0].type
             reason, problem = f"{self.output}: {quote(type_)} carries no number", ProblemKind.NO_NUMBER
             return self._once(not_met(reason, {"type": type_}, problem=problem))
         grace_ns = _grace(answers)
-        prompt = answers if _answers_at_once(trace, self.input, answers) else ()
+        prompt = (
+            answers if _answers_at_once(delivered_numbers(trace, self.input, self.input_field), trace, answers) else ()
+        )
         found = [self._violation(h, every, trace, grace_ns) or self._behind(h, prompt) for h in mine]
         violations = [v for v in found if v is not None]
         evidence = self._evidence(inputs, answers)
         if violations:
-            return self._violated(trace, violations, inputs, every, evidence)
+            wrong = self._violated(trace, violations, inputs, every, evidence)
+            return replace(wrong, facts=self._facts(inputs, answers, wrong.problem))
         side = "above" if self.side == "above" else "at or below"
         reason = (
             f"{self.output}: {number(self._expected(mine[0].value))} for each of {counted(len(mine), 'value')} {side} "
         )
-        reason += f"{number(self.threshold)}{unit_of(self.input)} ({numbers(h.value for h in mine)})"
+        reason += f"{number(self.threshold)}{in_unit(self.unit)} ({numbers(h.value for h in mine)})"
         return met(reason, evidence)
 
     def _once(self, finding: Finding) -> Finding:
@@ -156,6 +167,10 @@ class ThresholdResponse:
         rows = [[seconds(h.start_ns), h.value, _state(h, answers), self._expected(h.value)] for h in inputs]
         return {"columns": ["t_s", "input", "answer", "expected"], "rows": rows, "answers": len(answers)}
 
+    def _facts(self, inputs: Sequence[Held], answers: Sequence[Reading], problem: Problem | None) -> AnswerFacts:
+        rows = (AnswerRow(h.value, _state(h, answers), self._expected(h.value)) for h in inputs)
+        return AnswerFacts(tuple(rows), late=problem is not None and problem.kind is ProblemKind.BEHIND)
+
     def _violated(
         self,
         trace: Trace,
@@ -166,7 +181,7 @@ class ThresholdResponse:
     ) -> Finding:
         first = violations[0]
         answers = last_of_instant(every)
-        unit = unit_of(self.input)
+        unit = in_unit(self.unit)
         wanted = number(self._expected(first.held.value))
         found = "no answer" if first.got is None else number(first.got)
         brief = f"{self.output}: {found} for {number(first.held.value)}{unit} on {self.input}, expected {wanted}"
@@ -193,7 +208,7 @@ class ThresholdResponse:
         self, violations: Sequence[_Violation], inputs: Sequence[Held], answers: Sequence[Reading]
     ) -> tuple[str, str]:
         """Return an addition to the reason, and a hint; both may be empty."""
-        limit = f"{number(self.threshold)}{unit_of(self.input)}"
+        limit = f"{number(self.threshold)}{in_unit(self.unit)}"
         rule = f"publish {number(self.above)} above {limit} and {number(self.otherwise)} at or below it"
         logic = self._logic(inputs, answers)
         if logic:
@@ -250,9 +265,9 @@ class ThresholdResponse:
 
     def drawing(self, trace: Trace) -> Drawing:
         """Return the inputs of the controller with its threshold, and its answers with the expected ones."""
-        expected = [Reading(h.start_ns, self._expected(h.value)) for h in held(trace, self.input)]
+        expected = [Reading(h.start_ns, self._expected(h.value)) for h in held(trace, self.input, self.input_field)]
         expected += [Reading(trace.stop_ns, r.value) for r in expected[-1:]]
-        return threshold_drawing(self.input, self.output, self.threshold, expected)
+        return threshold_drawing(self, expected)
 
 
 def _deaf(subscriptions: Sequence[Endpoint]) -> str:
@@ -260,9 +275,9 @@ def _deaf(subscriptions: Sequence[Endpoint]) -> str:
     return " with transient_local durability, which a volatile publisher does not offer" if latched else ""
 
 
-def _answers_at_once(trace: Trace, topic: str, answers: Sequence[Reading]) -> bool:
+def _answers_at_once(sent: Sequence[Reading], trace: Trace, answers: Sequence[Reading]) -> bool:
     """Return whether a controller answers each input at its own instant, which only virtual time can tell."""
-    asked = {r.t_ns for r in delivered_numbers(trace, topic)}
+    asked = {r.t_ns for r in sent}
     prompt = sum(a.t_ns in asked for a in answers)
     enough = trace.clock is ClockKind.VIRTUAL and prompt >= _FEWEST_AT_ONCE and 2 * prompt >= len(asked)
     return enough and prompt >= _SHARE_AT_ONCE * len(answers)

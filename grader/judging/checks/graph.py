@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.exercise import NODE_GRAPH, Finding, Problem, ProblemKind
 from grader.core.quantities import DurationNs, counted, seconds
 from grader.core.trace import Endpoint, GraphSnapshot, Trace
 from grader.judging.findings import explain_fault, explain_no_subscription, faulted, first_fault, met, not_met
@@ -26,7 +26,7 @@ class BidirectionalGraph:
         back: Topic of the other direction, e.g. `/fan_speed`.
     """
 
-    shows_graph: ClassVar[bool] = True
+    drawing: ClassVar[str] = NODE_GRAPH
     forward: str
     back: str
 
@@ -128,7 +128,7 @@ class Qos:
         depth: Smallest history depth; free if left out.
     """
 
-    shows_graph: ClassVar[bool] = True
+    drawing: ClassVar[str] = NODE_GRAPH
     topic: str
     kind: Literal["publisher", "subscription"]
     reliability: Literal["reliable", "best_effort"] | None = None
@@ -193,7 +193,7 @@ class NodeName:
         name: Fully qualified, e.g. `/velocity_publisher`.
     """
 
-    shows_graph: ClassVar[bool] = True
+    drawing: ClassVar[str] = NODE_GRAPH
     name: str
 
     @property
@@ -228,7 +228,7 @@ class TopicNames:
         node: Fully qualified name of the node; all nodes if left out.
     """
 
-    shows_graph: ClassVar[bool] = True
+    drawing: ClassVar[str] = NODE_GRAPH
     publishes: tuple[str, ...] = ()
     subscribes: tuple[str, ...] = ()
     exactly: bool = False
@@ -291,7 +291,7 @@ class GraphEdges:
         between_processes: Whether the two nodes must belong to different processes.
     """
 
-    shows_graph: ClassVar[bool] = True
+    drawing: ClassVar[str] = NODE_GRAPH
     edges: tuple[GraphEdge, ...]
     at_once: bool = False
     between_processes: bool = False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 from grader.core.chart import Band, Case, Chart, Look, Panel, Point, Series, Tone
@@ -14,6 +15,7 @@ from grader.core.quantities import NS_PER_S, DurationNs, counted, seconds, withi
 from grader.core.trace import Fault, Trace
 from grader.judging.charts import gaps_panel, series, time_chart
 from grader.judging.checks.logs import complained
+from grader.judging.facts import LogPaceFacts, PositionFacts
 from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, only_printed
 from grader.judging.output import printed_lines, student_records, written
 from grader.judging.plots import Drawing, Plot
@@ -104,17 +106,18 @@ class LogsPosition:
         if fault is not None and fault.t_ns < track.times_ns[0]:
             return _ended_early(fault)
         cause = cause_of(found, track)
-        evidence = _evidence(found) | {"cause": cause.name}
+        evidence, facts = _evidence(found) | {"cause": cause.name}, PositionFacts(cause.name, len(found.right))
         if fault is not None and cause.name in ("no_pair", "few"):
             return faulted(fault, cause.sentence if found.right else "no position was logged before it", evidence)
         if not found.groups and not any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process)):
             during = span(track.stop_ns - track.start_ns)
             reason = f"{self.process}: nothing was logged while {self.topic} was played for {during}"
-            return not_met(reason, evidence | {"cause": "nothing"}, problem=ProblemKind.NOT_LOGGED)
+            silent = replace(facts, cause="nothing")
+            return not_met(reason, evidence | {"cause": "nothing"}, problem=ProblemKind.NOT_LOGGED, facts=silent)
         problem = Problem(ProblemKind.WRONG_VALUE, detail=cause.name)
-        return not_met(f"{self.process}: {cause.sentence}", evidence, hint=cause.hint, problem=problem)
+        return not_met(f"{self.process}: {cause.sentence}", evidence, hint=cause.hint, problem=problem, facts=facts)
 
-    def chart(self, trace: Trace) -> Chart | None:
+    def drawing(self, trace: Trace) -> Chart | None:
         """Return the driven path with the logged positions on it, or None without odometry."""
         track = track_of(trace, self.topic)
         if track is None:
@@ -189,7 +192,8 @@ class LogPeriod:
             "times_s": [seconds(t) for t in times[:_MOST_IN_EVIDENCE]],
             "stream_s": [seconds(track.start_ns), seconds(track.stop_ns)],
         }
-        return self._judged(trace, track, times, average_ns, evidence)
+        found = self._judged(trace, track, times, average_ns, evidence)
+        return replace(found, facts=LogPaceFacts(len(times), average_ns / 1e9))
 
     def _judged(
         self, trace: Trace, track: Track, times: Sequence[int], average_ns: float, evidence: dict[str, object]
@@ -243,7 +247,7 @@ class LogPeriod:
                 return tuple(dict.fromkeys(e.t_ns for e in commonest.entries))
         return ()
 
-    def chart(self, trace: Trace) -> Chart | None:
+    def drawing(self, trace: Trace) -> Chart | None:
         """Return when positions were logged, on the grid of the period; None if there was nothing to log."""
         track = track_of(trace, self.topic)
         if track is None:

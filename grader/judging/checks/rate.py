@@ -5,14 +5,17 @@ from __future__ import annotations
 import statistics
 from bisect import bisect_left
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
+from typing import ClassVar
 
 from grader.core.chart import Band, Chart, Level, Panel, Point, Tone
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, counted, seconds, within
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
 from grader.judging.charts import gaps_panel, series, time_chart
+from grader.judging.facts import RateFacts
 from grader.judging.findings import explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met, partly
 from grader.judging.values import published
 from grader.judging.wording import moment, number, quote, span
@@ -69,6 +72,7 @@ class TopicRate:
             can have discovered it.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     topic: str
     rate: Hertz
     tolerance: Hertz
@@ -95,7 +99,8 @@ class TopicRate:
         found = _measure(inside, stop_ns)
         evidence = self._evidence(found)
         graded = self._flaw(trace, found, evidence) or self._grade(found, evidence)
-        return (self._slack(found, evidence) if graded.credit else None) or graded
+        finding = (self._slack(found, evidence) if graded.credit else None) or graded
+        return replace(finding, facts=RateFacts(len(inside), seconds(inside[0]), found.rate_hz, found.max_s))
 
     @property
     def _period_ns(self) -> float:
@@ -186,11 +191,13 @@ class TopicRate:
         else:
             found = f"{counted(len(times), 'message')}, all at {moment(times[0])}"
         evidence = {"topic": self.topic, "window": len(times), "first_s": seconds(times[0]), "expected_hz": self.rate}
-        fault = first_fault(trace)
+        fault, facts = first_fault(trace), RateFacts(len(times), seconds(times[0]))
         if fault is not None:
-            return not_met(f"{self.topic}: {found}; {fault_sentence(fault)}; {self._wanted}", evidence, fault=fault)
+            reason = f"{self.topic}: {found}; {fault_sentence(fault)}; {self._wanted}"
+            return not_met(reason, evidence, fault=fault, facts=facts)
         hint = f"publish from a timer: create_timer({self._period_s}, ...) takes the period in seconds"
-        return not_met(f"{self.topic}: {found}; {self._wanted}", evidence, hint=hint, problem=ProblemKind.TOO_FEW)
+        reason, problem = f"{self.topic}: {found}; {self._wanted}", ProblemKind.TOO_FEW
+        return not_met(reason, evidence, hint=hint, problem=problem, facts=facts)
 
     def _hint(self, rate_hz: float) -> str:
         period = self._period_s
@@ -201,7 +208,7 @@ class TopicRate:
             return f"a loop with sleep adds the time of its own work to each period; use {rule}"
         return rule
 
-    def chart(self, trace: Trace) -> Chart | None:
+    def drawing(self, trace: Trace) -> Chart | None:
         """Return the chart of a rate, or None with fewer than two messages."""
         times = sorted(m.t_ns for m in published(trace, self.topic, self.after_discovery))
         if len(times) < 2 or times[0] == times[-1]:

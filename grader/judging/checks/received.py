@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field as dataclass_field
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from grader.core.chart import Look, Panel, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import NS_PER_MS, NS_PER_S, FieldOf, counted, seconds
 from grader.core.trace import ClockKind, Endpoint, LogRecord, Message, Trace
 from grader.judging.charts import expected_series, series
 from grader.judging.checks.logs import LOGGER_HINT
+from grader.judging.facts import LogFacts
 from grader.judging.findings import (
     explain_fault,
     explain_no_subscription,
@@ -328,6 +330,8 @@ def _shows(value: float, largest: float, printed: Printed) -> bool:
 _SHORTEST_NS = 1_200 * NS_PER_MS
 #: Fewest numbers whose changes show that a process is always one message behind.
 _CHANGES = 3
+#: Fewest values between the smallest and the largest that are never logged, while only these two are.
+_BETWEEN = 2
 #: Largest share of the messages at whose instants a process that logs from its callback may publish, or not log.
 _IN_STEP = 0.1
 _PRINT_HINT = "write the received values through the node's logger: self.get_logger().info(...)"
@@ -343,10 +347,13 @@ class LogsReceived:
     Attributes:
         process: File name of the student process.
         topic: Topic of the numbers.
+        field: Path of the number; by default `data`, or else the only number of a message.
     """
 
+    roles: ClassVar[Roles] = Roles(hears=("topic",))
     process: str
     topic: str
+    field: Annotated[str, FieldOf("topic")] = ""
 
     @property
     def expected(self) -> str:
@@ -354,11 +361,11 @@ class LogsReceived:
 
     def judge(self, trace: Trace) -> Finding:
         fault = first_fault(trace, self.process)
-        values = held(trace, self.topic, heard_from_ns=heard_from_ns(trace, self.topic))
+        values = held(trace, self.topic, self.field, heard_from_ns=heard_from_ns(trace, self.topic))
         subscriptions = student_endpoints(trace, "subscription", self.topic)
         if not subscriptions and fault is None:
             return explain_no_subscription(trace, self.topic)
-        if not values or (subscriptions and not any(carries_number(e.type) for e in subscriptions)):
+        if not values or (subscriptions and not (self.field or any(carries_number(e.type) for e in subscriptions))):
             return self._no_values(trace, subscriptions)
         return self._judged(trace, values, subscriptions)
 
@@ -368,6 +375,7 @@ class LogsReceived:
         sought = self._sought(values, trace)
         unlogged = _missing(values, followed(records, sought), trace)
         evidence: dict[str, object] = {"values": [v.value for v in values], "missing": [v.value for v in unlogged]}
+        facts = LogFacts(len(values), len(unlogged))
         if not unlogged:
             if behind := self._behind(trace, values, records):
                 return not_met(
@@ -377,24 +385,26 @@ class LogsReceived:
             return met(f"{reason} ({numbers(v.value for v in values)})", evidence)
         if not _missing(values, followed([*records, *printed_lines(trace, self.process)], sought), trace):
             reason = f"{self.process}: all {len(values)} values of {self.topic} are printed, not all of them are logged"
-            return only_printed(reason, evidence, _PRINT_HINT)
+            return replace(only_printed(reason, evidence, _PRINT_HINT), facts=facts)
         absent = _missing(values, standing(records, sought), trace)
         evidence["missing"] = [v.value for v in absent or unlogged]
+        facts = LogFacts(len(values), len(absent or unlogged))
         if fault is not None:
             lost = f"{len(absent or unlogged)} of {len(values)} values of {self.topic} were not logged"
-            return faulted(fault, lost, evidence)
+            return replace(faulted(fault, lost, evidence), facts=facts)
         if absent:
-            return self._unlogged(subscriptions, values, absent, evidence)
+            return replace(self._unlogged(subscriptions, values, absent, evidence), facts=facts)
         among = surroundings(records, sought[values.index(unlogged[0])])
         share = f"{len(unlogged)} of {len(values)} values"
-        return _hidden(self, share, (unlogged[0].value, unlogged[0].start_ns), among, evidence)
+        hidden = _hidden(self, share, (unlogged[0].value, unlogged[0].start_ns), among, evidence)
+        return replace(hidden, facts=facts)
 
     def _behind(self, trace: Trace, values: Sequence[Held], records: Sequence[Output]) -> str:
         """Return that a process logs at each message, but the number of the message before; empty if it does not.
 
         Only virtual time tells a log in the callback of the subscription from one in a timer's.
         """
-        sent = {r.t_ns for r in delivered_numbers(trace, self.topic) if r.t_ns >= values[0].start_ns}
+        sent = {r.t_ns for r in delivered_numbers(trace, self.topic, self.field) if r.t_ns >= values[0].start_ns}
         ticks = {m.t_ns for m in trace.of(Message)}
         if trace.clock is not ClockKind.VIRTUAL or len(values) < _CHANGES or len(sent & ticks) > _IN_STEP * len(sent):
             return ""
@@ -419,7 +429,7 @@ class LogsReceived:
 
     def _no_values(self, trace: Trace, subscriptions: Sequence[Endpoint]) -> Finding:
         types = [e.type for e in subscriptions]
-        if types and not any(carries_number(t) for t in types):
+        if types and not self.field and not any(carries_number(t) for t in types):
             reason = f"{self.topic}: the subscription takes {quote(types[0])}, which carries no number"
             hint = "use a numeric message type, e.g. std_msgs/msg/Float32"
             return not_met(reason, {"type": types[0]}, hint=hint, problem=ProblemKind.NO_NUMBER)
@@ -443,9 +453,10 @@ class LogsReceived:
         first = unlogged[0]
         reason = f"{self.process}: {len(unlogged)} of {len(values)} values of {self.topic} are never logged, "
         reason += f"the first is {number(first.value)} at {moment(first.start_ns)}"
-        logged = {v.value for v in values} - {v.value for v in unlogged}
-        if logged and logged <= {0.0, 100.0}:
-            reason += "; only 0 and 100 are, so what is logged is not what was received"
+        sent, logged = {v.value for v in values}, {v.value for v in values} - {v.value for v in unlogged}
+        if logged and logged <= (ends := {min(sent), max(sent)}) and len(sent - ends) >= _BETWEEN:
+            only = f"{' and '.join(map(number, sorted(logged)))} {'is' if len(logged) == 1 else 'are'}"
+            reason += f"; only {only}, so what is logged is not what was received"
         if all(e.durability == "transient_local" for e in subscriptions):
             reason += (
                 "; the subscription asks for transient_local durability, which a volatile publisher does not offer"

@@ -8,12 +8,12 @@ from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from grader.core.chart import Band, Case, Level, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, counted, seconds, within
 from grader.core.trace import Delivery, Message, Trace
 from grader.judging.charts import Lanes, gaps_panel
@@ -149,6 +149,7 @@ class Latency:
         share: Share of the inputs that must be followed in time.
     """
 
+    roles: ClassVar[Roles] = Roles(hears=("input",))
     input: str
     output: str
     within: DurationNs
@@ -374,6 +375,7 @@ class Reaction:
         tolerance: Largest difference of a number without a tolerance of its own.
     """
 
+    roles: ClassVar[Roles] = Roles(hears=("input",))
     input: str
     output: str
     cases: tuple[ReactionCase, ...]

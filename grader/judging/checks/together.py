@@ -8,11 +8,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Annotated, ClassVar
 
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Finding, Problem, ProblemKind
-from grader.core.quantities import NS_PER_MS, counted, seconds, within
+from grader.core.exercise import Finding, Problem, ProblemKind, Roles
+from grader.core.quantities import NS_PER_MS, FieldOf, counted, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace, unmet_policy
+from grader.judging.facts import AnswerFacts
 from grader.judging.findings import FAULT_KEY, explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met
 from grader.judging.plots import Drawing, threshold_drawing
 from grader.judging.series import steps_behind
@@ -25,7 +27,7 @@ from grader.judging.values import (
     published_numbers,
     student_endpoints,
 )
-from grader.judging.wording import moment, number, quote, span, unit_of
+from grader.judging.wording import in_unit, moment, number, quote, span
 
 #: An answer may belong to any input that was current within this time before it.
 _CURRENT_NS = 250 * NS_PER_MS
@@ -65,30 +67,40 @@ class AnswersTogether:
         threshold: Where the answer changes; the threshold itself is not above.
         above: Answer expected above the threshold.
         otherwise: Answer expected at or below it.
+        input_field: Path of the number in the input; by default `data`, or else its only number.
+        output_field: The same in the answers.
+        unit: Unit of the input, for reasons and charts, e.g. `m`.
     """
 
+    roles: ClassVar[Roles] = Roles(hears=("input",), speaks=("input", "output"))
     input: str
     output: str
     threshold: float
     above: float
     otherwise: float
+    input_field: Annotated[str, FieldOf("input")] = ""
+    output_field: Annotated[str, FieldOf("output")] = ""
+    unit: str = ""
 
     @property
     def expected(self) -> str:
-        limit = f"{number(self.threshold)}{unit_of(self.input)}"
+        limit = f"{number(self.threshold)}{in_unit(self.unit)}"
         answers = f"{number(self.above)} above {limit}, {number(self.otherwise)} otherwise"
         return f"every {self.input} of the one node answered by the other on {self.output}: {answers}"
 
     def judge(self, trace: Trace) -> Finding:
         sent, answered = published(trace, self.input), published(trace, self.output)
-        for topic, messages in ((self.input, sent), (self.output, answered)):
+        for topic, field, messages in (
+            (self.input, self.input_field, sent),
+            (self.output, self.output_field, answered),
+        ):
             if not messages:
                 return self._silent(trace, topic)
-            if len(published_numbers(trace, topic)) < len(messages):
+            if len(published_numbers(trace, topic, field)) < len(messages):
                 type_, problem = messages[0].type, Problem(ProblemKind.NO_NUMBER, (topic,))
                 return not_met(f"{topic}: {quote(type_)} carries no number", {"type": type_}, problem=problem)
-        inputs = published_numbers(trace, self.input)
-        answers = last_of_instant(published_numbers(trace, self.output))
+        inputs = published_numbers(trace, self.input, self.input_field)
+        answers = last_of_instant(published_numbers(trace, self.output, self.output_field))
         evidence = self._evidence(inputs, answers)
         return (
             self._contradictory(trace, inputs, evidence)
@@ -129,7 +141,7 @@ class AnswersTogether:
     def _contradictory(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, int]) -> Finding | None:
         """Return a finding if different answers of one instant fit no current input."""
         times, jitter_ns = [r.t_ns for r in inputs], JITTER_NS[trace.clock]
-        for one, following in pairwise(published_numbers(trace, self.output)):
+        for one, following in pairwise(published_numbers(trace, self.output, self.output_field)):
             recent = _recent(inputs, times, one.t_ns, jitter_ns)
             # at the instant of the first input, a timer may have fired before it
             if one.t_ns != following.t_ns or one.value == following.value or not recent or one.t_ns == times[0]:
@@ -138,7 +150,7 @@ class AnswersTogether:
                 continue
             both = " and ".join(map(number, sorted((one.value, following.value))))
             reason = f"{moment(one.t_ns)}, {self.output}: {both} at one instant for {number(recent[-1].value)}"
-            reason += f"{unit_of(self.input)} on {self.input}, expected {number(self._expected(recent[-1].value))} only"
+            reason += f"{in_unit(self.unit)} on {self.input}, expected {number(self._expected(recent[-1].value))} only"
             hint = f"publish one answer to each number on {self.input}"
             known = evidence | {"first_wrong_s": seconds(one.t_ns)}
             return not_met(reason, known, hint=hint, problem=self._wrong)
@@ -156,7 +168,7 @@ class AnswersTogether:
                 continue
             if not recent or any(within(answer.value, self._expected(r.value), EXACT) for r in recent):
                 continue
-            value, unit = recent[-1].value, unit_of(self.input)
+            value, unit = recent[-1].value, in_unit(self.unit)
             reason = f"{moment(answer.t_ns)}, {self.output}: {number(answer.value)} for {number(value)}{unit} on "
             reason += f"{self.input}, expected {number(self._expected(value))}"
             return self._behind(reason, inputs, answers, evidence | {"first_wrong_s": seconds(answer.t_ns)})
@@ -171,7 +183,8 @@ class AnswersTogether:
             return not_met(reason, evidence, problem=self._wrong)
         reason += f"; the answers fit the input of {counted(behind, 'message')} earlier"
         hint = f"answer the newest message on {self.input}"
-        return not_met(reason, {**evidence, "behind": behind}, hint=hint, problem=self._wrong)
+        known, late = {**evidence, "behind": behind}, AnswerFacts(late=True)
+        return not_met(reason, known, hint=hint, problem=self._wrong, facts=late)
 
     def _inconsistent(
         self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, int]
@@ -236,11 +249,11 @@ class AnswersTogether:
         fixed = Problem(ProblemKind.NEVER_CHANGES, (self.input, self.output))
         if len({r.value for r in inputs}) == 1:
             reason = f"{self.output}: never changes, because {self.input} is {number(inputs[0].value)}"
-            return not_met(f"{reason}{unit_of(self.input)} all the time", evidence, problem=fixed)
+            return not_met(f"{reason}{in_unit(self.unit)} all the time", evidence, problem=fixed)
         if len(set(expected)) == 1 and _stays(inputs):
             low, high = min(r.value for r in inputs), max(r.value for r in inputs)
             reason = f"{self.output}: never changes, because {self.input} stays between {number(low)} and "
-            return not_met(f"{reason}{number(high)}{unit_of(self.input)}", evidence, problem=fixed)
+            return not_met(f"{reason}{number(high)}{in_unit(self.unit)}", evidence, problem=fixed)
         # a timer of 1 s may miss rare inputs; a controller that answers every other input may not
         often = 0 if 2 * len(answers) >= len(inputs) else _RARE * len(inputs)
         asked = {w for w, count in Counter(expected).items() if count > often}
@@ -249,7 +262,7 @@ class AnswersTogether:
         if not lacking:
             return None
         reason = f"{self.output}: never {number(lacking[0])}, though {self.input} was on both sides of "
-        return not_met(f"{reason}{number(self.threshold)}{unit_of(self.input)}", evidence, problem=self._wrong)
+        return not_met(f"{reason}{number(self.threshold)}{in_unit(self.unit)}", evidence, problem=self._wrong)
 
     def _all_well(self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, int]) -> Finding:
         reason = (
@@ -259,8 +272,10 @@ class AnswersTogether:
 
     def drawing(self, trace: Trace) -> Drawing:
         """Return the messages between the student's two nodes, with the threshold and the expected answers."""
-        expected = [Reading(r.t_ns, self._expected(r.value)) for r in published_numbers(trace, self.input)]
-        return threshold_drawing(self.input, self.output, self.threshold, expected)
+        expected = [
+            Reading(r.t_ns, self._expected(r.value)) for r in published_numbers(trace, self.input, self.input_field)
+        ]
+        return threshold_drawing(self, expected)
 
 
 def _usual_gap(answers: Sequence[Reading]) -> int:

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 from grader.core.chart import Level
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import NODE_GRAPH, Finding, ProblemKind, Roles
 from grader.core.quantities import SLACK, FieldNumber, FieldOf, Hertz, counted, seconds, within
 from grader.core.trace import Endpoint, Message, Trace
 from grader.judging.charts import gaps_panel
@@ -29,6 +29,7 @@ class Publishes:
             can have discovered it.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     topic: str
     type: str
     after_discovery: bool = False
@@ -56,7 +57,8 @@ class Subscribes:
         type: Message type, e.g. `nav_msgs/msg/Odometry`.
     """
 
-    shows_graph: ClassVar[bool] = True
+    drawing: ClassVar[str] = NODE_GRAPH
+    roles: ClassVar[Roles] = Roles(hears=("topic",))
     topic: str
     type: str
 

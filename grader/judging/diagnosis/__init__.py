@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import ast
 import logging
-from collections.abc import Mapping
-from dataclasses import field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
+from grader.core.author_files import AuthorMistake, line_of, words_of
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Check, Criterion, Exercise, Outcome, ProblemKind
+from grader.core.exercise import Check, Criterion, Exercise, Finding, Outcome
 from grader.core.report import Verdict
 from grader.core.submission import Submission
 from grader.core.trace import Fault, Trace, main_not_called, same_node_name
-from grader.judging.checks.fan import ThresholdResponse
-from grader.judging.checks.fields import RandomInRange
-from grader.judging.checks.programs import NoFault
-from grader.judging.checks.rate import TopicRate
-from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis import (
     attributes,
     callbacks,
@@ -33,12 +29,13 @@ from grader.judging.diagnosis import (
     silence,
     values,
 )
-from grader.judging.diagnosis.rules import Case, Clue, Rule
+from grader.judging.diagnosis.rules import Case, Clue, Rule, in_order, unfit
 from grader.judging.diagnosis.wiring import bare_statements
 from grader.judging.findings import FAULT_KEY, fault_evidence, fault_hint, fault_sentence
 from grader.judging.source import Source, argument, chain, first_line, last_name, read, text_of
+from grader.judging.wording import quote
 
-#: Modules of rules, in the order of evaluation; the rules of each follow the order of the text.
+#: Modules of rules; each rule says itself where it stands among all.
 _MODULES = (
     loading,
     scopes,
@@ -54,46 +51,126 @@ _MODULES = (
     positions,
     fan,
 )
-#: All rules; the first that applies wins.
-RULES: tuple[Rule, ...] = tuple(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))
+#: All rules of the grader in the order of their priorities; the first that applies wins.
+RULES: tuple[Rule, ...] = in_order(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))
 _LOST = (Outcome.NOT_MET, Outcome.PARTLY)
 _LOG = logging.getLogger(__name__)
 #: Evidence key for the id of the cause.
 CAUSE_KEY = "diagnosis"
 
 
-def diagnose(
+def cases_of(  # noqa: PLR0913  what was found, and everything that may explain it
     verdicts: tuple[Verdict, ...],
     exercise: Exercise,
     traces: Mapping[str, Trace],
     submission: Submission,
     sources: Mapping[str, str],
-) -> tuple[Verdict, ...]:
-    """Return the verdicts, in rubric order, with a place and one hint wherever a cause is very likely."""
+    facts: Mapping[str, object],
+) -> tuple[Case | None, ...]:
+    """Return what rules are asked about each verdict, in rubric order; None where nothing was lost.
+
+    Args:
+        verdicts: The verdicts.
+        exercise: Their exercise.
+        traces: Scenario id -> trace.
+        submission: Tells which files were found.
+        sources: Wanted file name -> its text.
+        facts: Criterion id -> what its check hands to rules.
+    """
     asked = {c.scenario for v, c in zip(verdicts, exercise.criteria, strict=True) if v.outcome in _LOST}
-    if not asked:
-        return verdicts
     # only these, because parsing a file takes longer than judging it
     names = dict.fromkeys(p for s in exercise.scenarios if s.id in asked for p in s.processes if p in sources)
     read_ = {name: read(submission.files[name].found or name, sources[name]) for name in names}
-    reporter = _Reporter(exercise)
-    return tuple(reporter.on(v, c, traces, read_) for v, c in zip(verdicts, exercise.criteria, strict=True))
+    lost: dict[str, Check] = {}
+    cases: list[Case | None] = []
+    for verdict, criterion in zip(verdicts, exercise.criteria, strict=True):
+        trace = traces.get(criterion.scenario)
+        if verdict.outcome not in _LOST or trace is None or trace.harness_problem:
+            cases.append(None)
+            continue
+        scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
+        own = {name: read_[name] for name in scenario.processes if name in read_}
+        siblings = tuple(c.check for c in exercise.criteria if c is not criterion)
+        fault, known = fault_of(verdict, trace), facts.get(criterion.id)
+        cases.append(Case(criterion, verdict, trace, own, fault, siblings, known, dict(lost)))
+        if verdict.outcome is Outcome.NOT_MET:
+            lost[criterion.id] = criterion.check
+    return tuple(cases)
 
 
-def clue_for(case: Case) -> tuple[str, Clue] | None:
-    """Return id and clue of the first rule that applies to a case; None if no cause is very likely.
+def diagnose(
+    verdicts: tuple[Verdict, ...],
+    cases: Sequence[Case | None],
+    rules: Sequence[Rule],
+    mistakes: list[AuthorMistake],
+) -> tuple[Verdict, ...]:
+    """Return the verdicts, in rubric order, with a place and one hint wherever a cause is very likely.
 
-    A rule that raises is logged and skipped: our own bugs must not prevent a report.
+    Args:
+        verdicts: The verdicts.
+        cases: What rules are asked about each; see `cases_of`.
+        rules: The rules in their order; see `rules_of`.
+        mistakes: Mistakes in the exercise's own rules are appended here.
     """
-    for rule in RULES:
+    owner: dict[str, str] = {}
+    return tuple(
+        verdict if case is None else _explained(verdict, clue_for(case, rules, mistakes), owner)
+        for verdict, case in zip(verdicts, cases, strict=True)
+    )
+
+
+def _explained(verdict: Verdict, found: tuple[str, Clue] | None, owner: dict[str, str]) -> Verdict:
+    """Return a verdict with its cause, if known; `owner` holds the criterion with which each one was reported."""
+    if found is None:
+        return verdict
+    id_, clue = found
+    if clue.same_as:
+        return _same_as(clue.same_as, verdict)
+    earlier = owner.setdefault(clue.key or f"{id_}:{clue.location}", verdict.id)
+    evidence = {**verdict.evidence, CAUSE_KEY: id_}
+    placed = replace(verdict, hint=clue.hint, location=clue.location or verdict.location, evidence=evidence)
+    return placed if earlier == verdict.id else _same_as(earlier, placed)
+
+
+def rules_of(exercise: Exercise) -> tuple[Rule, ...]:
+    """Return the rules that are asked about an exercise in their order; of equal ones, its own come first."""
+    own = [rule for rule in exercise.hints if isinstance(rule, Rule)]
+    return in_order((*own, *RULES)) if own else RULES
+
+
+def clue_for(
+    case: Case, rules: Sequence[Rule] | None = None, mistakes: list[AuthorMistake] | None = None
+) -> tuple[str, Clue] | None:
+    """Return id and clue of the first rule that applies to a case; None if no cause is very likely."""
+    return next(((rule.id, clue) for rule, clue in clues_for(case, RULES if rules is None else rules, mistakes)), None)
+
+
+def clues_for(
+    case: Case, rules: Sequence[Rule], mistakes: list[AuthorMistake] | None = None
+) -> Iterator[tuple[Rule, Clue]]:
+    """Yield the rules that apply to a case, with their clues, in the order of the rules.
+
+    A rule that raises is skipped, because a mistake in it must not prevent a report: a rule of a rubric's own is
+    appended to `mistakes`, another one is logged.
+    """
+    for rule in rules:
         try:
             clue = rule.clue(case)
-        except Exception:
-            _LOG.exception("the rule %s failed on the criterion %s", rule.id, case.criterion.id)
+            if rule.file and clue is not None and (wrong := unfit(clue, case)):
+                raise TypeError(wrong)
+        except Exception as error:
+            if not rule.file:
+                _LOG.exception("the rule %s failed on the criterion %s", rule.id, case.criterion.id)
+            elif mistakes is not None:
+                mistakes.append(_mistake(rule, error))
             continue
         if clue is not None:
-            return rule.id, clue
-    return None
+            yield rule, clue
+
+
+def _mistake(rule: Rule, error: Exception) -> AuthorMistake:
+    text = f"the rule {rule.id}: {type(error).__name__}: {quote(words_of(error))}"
+    return AuthorMistake(rule.file.rsplit("/", 1)[-1], line_of(error, rule.file, 0), text)
 
 
 def hint_for(fault: Fault, trace: Trace, text: str) -> str:
@@ -107,62 +184,18 @@ def hint_for(fault: Fault, trace: Trace, text: str) -> str:
     reason = fault_sentence(fault)
     evidence = {FAULT_KEY: fault_evidence(fault)}
     verdict = Verdict("fault", "", Outcome.NOT_MET, Fraction(0), Fraction(1), reason, evidence=evidence)
-    criterion = Criterion("fault", "", Fraction(1), trace.scenario, NoFault())
+    criterion = Criterion("fault", "", Fraction(1), trace.scenario, _Fault())
     sources = {fault.process: read(fault.file or fault.process, text)} if text else {}
     found = clue_for(Case(criterion, verdict, trace, sources, fault))
     return found[1].hint if found is not None else fault_hint(fault)
 
 
-@dataclass(slots=True)
-class _Reporter:
-    """Remembers the criterion with which each cause was reported, so that none is reported twice."""
+@dataclass(frozen=True, slots=True)
+class _Fault:
+    """The check of a fault without a rubric."""
 
-    exercise: Exercise
-    owner: dict[str, str] = field(default_factory=dict)
-    lost: dict[str, Check] = field(default_factory=dict)
-
-    def on(
-        self, verdict: Verdict, criterion: Criterion, traces: Mapping[str, Trace], sources: Mapping[str, Source]
-    ) -> Verdict:
-        """Return the verdict with its cause, if known."""
-        trace = traces.get(criterion.scenario)
-        if verdict.outcome not in _LOST or trace is None or trace.harness_problem:
-            return verdict
-        found = clue_for(self._case(verdict, criterion, trace, sources))
-        earlier = "" if found is not None else self._follows(criterion.check, verdict)
-        if verdict.outcome is Outcome.NOT_MET:
-            self.lost[criterion.id] = criterion.check
-        if found is None:
-            return _same_as(earlier, verdict) if earlier else verdict
-        id_, clue = found
-        key = clue.key or f"{id_}:{clue.location}"
-        earlier = self.owner.setdefault(key, criterion.id)
-        evidence = {**verdict.evidence, CAUSE_KEY: id_}
-        placed = replace(verdict, hint=clue.hint, location=clue.location or verdict.location, evidence=evidence)
-        return placed if earlier == criterion.id else _same_as(earlier, placed)
-
-    def _case(self, verdict: Verdict, criterion: Criterion, trace: Trace, sources: Mapping[str, Source]) -> Case:
-        scenario = next(s for s in self.exercise.scenarios if s.id == criterion.scenario)
-        own = {name: sources[name] for name in scenario.processes if name in sources}
-        siblings = tuple(c.check for c in self.exercise.criteria if c is not criterion)
-        return Case(criterion, verdict, trace, own, _fault_of(verdict, trace), siblings)
-
-    def _follows(self, check: Check, verdict: Verdict) -> str:
-        """Return the criterion whose failure explains why two nodes do not work together; empty if unclear."""
-        problem = verdict.problem
-        if not isinstance(check, AnswersTogether) or problem is None:
-            return ""
-        quiet = problem.kind in (ProblemKind.STOPPED, ProblemKind.NO_MESSAGE)
-        fixed = problem.kind is ProblemKind.NEVER_CHANGES
-        stopped = problem.kind is ProblemKind.STOPPED and check.input in problem.topics
-        answered = problem.kind is ProblemKind.WRONG_ANSWER or (quiet and check.output in problem.topics)
-        for id_, other in self.lost.items():
-            controller = isinstance(other, ThresholdResponse) and other.output == check.output
-            sensor = isinstance(other, RandomInRange) and other.topic == check.input
-            pace = isinstance(other, TopicRate) and other.topic == check.input
-            if (controller and answered) or (sensor and fixed) or (pace and stopped):
-                return id_
-        return ""
+    def judge(self, trace: Trace) -> Finding:
+        raise NotImplementedError("a fault is there already")
 
 
 def _same_as(criterion: str, verdict: Verdict) -> Verdict:
@@ -170,7 +203,7 @@ def _same_as(criterion: str, verdict: Verdict) -> Verdict:
     return replace(verdict, hint=hint, same_cause_as=criterion)
 
 
-def _fault_of(verdict: Verdict, trace: Trace) -> Fault | None:
+def fault_of(verdict: Verdict, trace: Trace) -> Fault | None:
     """Return the fault of the trace that a verdict rests on."""
     known = verdict.evidence.get(FAULT_KEY)
     if not isinstance(known, Mapping):

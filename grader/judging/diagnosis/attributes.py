@@ -42,7 +42,10 @@ _METHODS = {
 }
 
 
-@crash_rule(r"'(?:property|member_descriptor|getset_descriptor)' object|^AttributeError: type object '(\w+)' has no")
+@crash_rule(
+    r"'(?:property|member_descriptor|getset_descriptor)' object|^AttributeError: type object '(\w+)' has no",
+    priority=6010,
+)
 def _class_for_object(crash: Crash) -> Clue | None:
     """`msg = Twist` names the class; an object of it is needed."""
     source, classes = crash.source, message_classes(crash.source)
@@ -61,7 +64,9 @@ def _class_for_object(crash: Crash) -> Clue | None:
     return Clue(f"{direct.id} is the class: make an object first, msg = {direct.id}(), and use msg instead")
 
 
-@crash_rule(r"^AttributeError: 'dict' object has no attribute '\w+'|^AttributeError: 'MessageInfo' object has no")
+@crash_rule(
+    r"^AttributeError: 'dict' object has no attribute '\w+'|^AttributeError: 'MessageInfo' object has no", priority=6020
+)
 def _message_info(crash: Crash) -> Clue | None:
     """A callback with a second parameter receives what is known about the message as well."""
     for item in made(crash.source, "subscription"):
@@ -78,6 +83,7 @@ def _message_info(crash: Crash) -> Clue | None:
 @crash_rule(
     r"^AttributeError: module '(\w+_(?:msgs|srvs|interfaces))(?:\.(?:msg|srv))?' has no attribute '(\w+)'",
     in_file=False,
+    priority=6030,
 )
 def _package_attribute(crash: Crash) -> Clue | None:
     """`import geometry_msgs`, and `geometry_msgs.Twist`: the classes are one level further down."""
@@ -87,7 +93,8 @@ def _package_attribute(crash: Crash) -> Clue | None:
 
 
 @crash_rule(
-    r"^AttributeError: 'float' object has no attribute 'data'|^AttributeError: '(?:int|str|float)' object has no"
+    r"^AttributeError: 'float' object has no attribute 'data'|^AttributeError: '(?:int|str|float)' object has no",
+    priority=6040,
 )
 def _plain_value(crash: Crash) -> Clue | None:
     """A field is set in a number or a text, where a message is meant."""
@@ -103,7 +110,9 @@ def _plain_value(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(r"^AttributeError: module '(math|random|time|rclpy)' has no attribute '(\w+)'", in_file=False)
+@crash_rule(
+    r"^AttributeError: module '(math|random|time|rclpy)' has no attribute '(\w+)'", in_file=False, priority=6050
+)
 def _module_attribute(crash: Crash) -> Clue | None:
     module, name = crash.found.groups()
     if module == "rclpy":
@@ -125,6 +134,7 @@ def _rclpy_name(name: str) -> Clue | None:
 @crash_rule(
     r"^AttributeError: '(\w+)' object has no attribute '(\w+)'|^AttributeError: '(\w+)' object attribute '(\w+)' is",
     in_file=False,
+    priority=6060,
 )
 def _wrong_attribute(crash: Crash) -> Clue | None:
     owner, name = (crash.found[1], crash.found[2]) if crash.found[1] else (crash.found[3], crash.found[4])
@@ -171,7 +181,7 @@ def _function_for_module(crash: Crash, name: str) -> Clue | None:
     return None
 
 
-@crash_rule(r"^AttributeError: '(?:int|float|str|list|NoneType)' object has no attribute '(\w+)'")
+@crash_rule(r"^AttributeError: '(?:int|float|str|list|NoneType)' object has no attribute '(\w+)'", priority=6070)
 def _hidden_by_variable(crash: Crash) -> Clue | None:
     """A variable has the name of a module."""
     source = crash.source
@@ -371,7 +381,7 @@ def _outside_of_class(source: Source, owner: str, name: str) -> Clue | None:
     return Clue(f"{name} is a function of the file, not a method of {owner}: write {name}(...) without self")
 
 
-@crash_rule(r"^AttributeError: 'NoneType' object has no attribute '(\w+)'")
+@crash_rule(r"^AttributeError: 'NoneType' object has no attribute '(\w+)'", priority=6080)
 def _result_of_nothing(crash: Crash) -> Clue | None:
     """A variable holds the result of a function that returns nothing."""
     source = crash.source

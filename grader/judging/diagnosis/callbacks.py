@@ -14,7 +14,7 @@ from grader.judging.source import Function, Source, argument, chain, covers, fir
 _QUOTES = "\"'"
 
 
-@crash_rule("", *FaultKind)
+@crash_rule("", *FaultKind, priority=4010)
 def _callback_called(crash: Crash) -> Clue | None:
     """`create_timer(0.05, self.tick())`: the function runs once, and its result is used as the callback."""
     source = crash.source
@@ -38,7 +38,7 @@ def _returns_nothing(source: Source, call: ast.Call) -> bool:
     return bool(functions) and not returns
 
 
-@crash_rule()
+@crash_rule(priority=4020)
 def _callback_signature(crash: Crash) -> Clue | None:
     """A callback does not accept the arguments that it is called with."""
     return (
@@ -120,7 +120,7 @@ def _service_signature(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule("NoneType|has no attribute")
+@crash_rule("NoneType|has no attribute", priority=4030)
 def _no_data_yet(crash: Crash) -> Clue | None:
     """A value that a callback stores is read before the first message."""
     source = crash.source
@@ -171,7 +171,8 @@ def _starts_with_none(source: Source, store: ast.AST) -> bool:
 
 @crash_rule(
     "Context must be initialized before|rcl_shutdown already called|does not support the context manager"
-    "|InvalidHandle|context is (not valid|invalid)"
+    "|InvalidHandle|context is (not valid|invalid)",
+    priority=4040,
 )
 def _shut_down_early(crash: Crash) -> Clue | None:
     source, line = crash.source, crash.line
@@ -187,7 +188,7 @@ def _shut_down_early(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(r"create_(publisher|subscription)\(\) missing \d required positional arguments?: (.*)")
+@crash_rule(r"create_(publisher|subscription)\(\) missing \d required positional arguments?: (.*)", priority=4050)
 def _missing_qos(crash: Crash) -> Clue | None:
     found, call = crash.found, _call_at_fault(crash, f"create_{crash.found[1]}")
     if call is None or not call.args:
@@ -205,7 +206,7 @@ def _call_at_fault(crash: Crash, *names: str) -> ast.Call | None:
     return next((c for c in crash.source.calls(*names) if covers(c, crash.line)), None)
 
 
-@crash_rule("has no setter|can't set attribute|handle cannot be modified|has no attribute 'add_node'")
+@crash_rule("has no setter|can't set attribute|handle cannot be modified|has no attribute 'add_node'", priority=4060)
 def _read_only_property(crash: Crash) -> Clue | None:
     for node in crash.source.on_line(crash.line, ast.Attribute):
         if isinstance(node.ctx, ast.Store) and chain(node) == f"self.{node.attr}" and node.attr in NODE_PROPERTIES:
@@ -213,7 +214,7 @@ def _read_only_property(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule()
+@crash_rule(priority=4070)
 def _super_init(crash: Crash) -> Clue | None:
     """The constructor of Node was not called, called too late, or misspelt."""
     if crash.said(r"descriptor '__init__' requires a 'super' object"):
@@ -280,7 +281,7 @@ def _used_before_super(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule()
+@crash_rule(priority=4080)
 def _init_order(crash: Crash) -> Clue | None:
     source, line = crash.source, crash.line
     inits = [c for c in source.calls("init") if chain(c.func) in ("rclpy.init", "init")]
@@ -314,7 +315,7 @@ def _init_elsewhere(source: Source, inits: list[ast.Call], used: int) -> Clue | 
     return None
 
 
-@crash_rule()
+@crash_rule(priority=4090)
 def _endpoint_arguments(crash: Crash) -> Clue | None:
     """Arguments of create_publisher, create_subscription or create_timer have the wrong order or type."""
     source = crash.source
@@ -366,7 +367,7 @@ def _kind_of(source: Source, node: ast.expr) -> str:
     return "depth" if "qos" in dotted.lower() else ""
 
 
-@crash_rule(r"has no attribute '(?:__name__|_TYPE_SUPPORT|_CREATE_ROS_MESSAGE)'")
+@crash_rule(r"has no attribute '(?:__name__|_TYPE_SUPPORT|_CREATE_ROS_MESSAGE)'", priority=4100)
 def _made_for_type(crash: Crash) -> Clue | None:
     """`create_publisher(Twist(), ...)`: an object stands in the place of the message class."""
     for item in made(crash.source, "publisher", "subscription"):
@@ -400,7 +401,7 @@ def _topic_arguments(crash: Crash, item: Made) -> Clue | None:  # noqa: PLR0911 
     return None
 
 
-@crash_rule()
+@crash_rule(priority=4110)
 def _parameter_arguments(crash: Crash) -> Clue | None:
     """The arguments of declare_parameter are swapped."""
     call = _call_at_fault(crash, "declare_parameter")
@@ -410,14 +411,14 @@ def _parameter_arguments(crash: Crash) -> Clue | None:
     return Clue(f"the name comes first, then the value: declare_parameter({name}, {value})")
 
 
-@crash_rule(r"Invalid(Node|Topic)NameException", in_file=False)
+@crash_rule(r"Invalid(Node|Topic)NameException", in_file=False, priority=4120)
 def _bad_name(crash: Crash) -> Clue | None:
     if crash.found[1] == "Node":
         return Clue("a node name holds letters, digits and underscores only")
     return Clue("a topic name holds letters, digits, underscores and slashes only, and no part starts with a digit")
 
 
-@crash_rule("^TypeError|^AttributeError")
+@crash_rule("^TypeError|^AttributeError", priority=4130)
 def _spun_class(crash: Crash) -> Clue | None:
     call = _call_at_fault(crash, "spin", "spin_once")
     if call is None or not call.args:

@@ -7,7 +7,7 @@ import ast
 from grader.core.trace import FaultKind
 from grader.judging.checks.fields import RandomInRange
 from grader.judging.diagnosis.names import MESSAGE_FIELDS, SINGLE_NUMBERS, SPINS
-from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, rule
+from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
 from grader.judging.diagnosis.wiring import (
     bare_statements,
     head_of,
@@ -26,7 +26,9 @@ _EXITS = ("exit", "quit", "_exit")
 _DRAWS = ("random.random", "time.time", "time.monotonic")
 
 
-@crash_rule(r"The '(\w+)' field must be (?:of type '(\w+)'|a sub message of type '(\w+)')", in_file=False)
+@crash_rule(
+    r"The '(\w+)' field must be (?:of type '(\w+)'|a sub message of type '(\w+)')", in_file=False, priority=5010
+)
 def _wrong_field_type(crash: Crash) -> Clue | None:
     field, type_, message = crash.found.groups(default="")
     value, target = _given(crash, field)
@@ -130,6 +132,7 @@ def _is_whole(value: ast.expr | None) -> bool:
     r"Expected <class '([\w.]+)\.(\w+)'>, got <class '([\w.]+)'>"
     r"|Publisher\.publish\(\) missing 1 required positional argument",
     in_file=False,
+    priority=5020,
 )
 def _published_wrongly(crash: Crash) -> Clue | None:
     wrong = crash.said(r"Expected <class '[\w.]+\.(\w+)'>, got <class '([\w.]+)'>")
@@ -141,18 +144,18 @@ def _published_wrongly(crash: Crash) -> Clue | None:
     return Clue(f"this publisher sends {expected} objects, not {got}: make one, set its fields and publish it")
 
 
-@crash_rule(r"Parameter\(s\) already declared: \['([\w./]+)'", in_file=False)
+@crash_rule(r"Parameter\(s\) already declared: \['([\w./]+)'", in_file=False, priority=5030)
 def _declared_twice(crash: Crash) -> Clue | None:
     return Clue(f"the parameter {crash.found[1][:60]} is declared twice: take one declare_parameter out")
 
 
-@crash_rule(r"undeclared parameter\(s\): ([\w./]+)", in_file=False)
+@crash_rule(r"undeclared parameter\(s\): ([\w./]+)", in_file=False, priority=5040)
 def _undeclared_parameter(crash: Crash) -> Clue | None:
     name = crash.found[1][:60]
     return Clue(f"declare the parameter first, in __init__: self.declare_parameter('{name}', default_value)")
 
 
-@crash_rule("does not support the context manager|__enter__")
+@crash_rule("does not support the context manager|__enter__", priority=5050)
 def _with_init(crash: Crash) -> Clue | None:
     """`with rclpy.init():`, which only later releases of rclpy support."""
     for block in crash.source.on_line(crash.line, ast.With):
@@ -167,6 +170,7 @@ def _with_init(crash: Crash) -> Clue | None:
     r"rclpy_logging_rcutils_log\(\): incompatible function arguments"
     r"|RcutilsLogger\.(\w+)\(\) takes 2 positional arguments but \d+ were given",
     in_file=False,
+    priority=5060,
 )
 def _logger_arguments(crash: Crash) -> Clue | None:
     name = crash.found[1]
@@ -175,7 +179,7 @@ def _logger_arguments(crash: Crash) -> Clue | None:
     return Clue(f"{name} takes one text: put the values into it, {name}(f'... {{value}}')")
 
 
-@crash_rule(r"^EOFError|^termios\.error|^_?curses\.error|^IndexError", in_file=False)
+@crash_rule(r"^EOFError|^termios\.error|^_?curses\.error|^IndexError", in_file=False, priority=5070)
 def _unattended(crash: Crash) -> Clue | None:
     """The program waits for keyboard input, or for command line arguments."""
     if crash.found[0] != "IndexError":
@@ -186,7 +190,7 @@ def _unattended(crash: Crash) -> Clue | None:
     return Clue("the file is run without arguments: give the value a default in the program")
 
 
-@crash_rule("^RecursionError")
+@crash_rule("^RecursionError", priority=5080)
 def _endless_recursion(crash: Crash) -> Clue | None:
     function = crash.source.function_at(crash.line)
     if function is None or f" in {function.name}" not in "".join(crash.fault.frames[-3:]):
@@ -196,7 +200,7 @@ def _endless_recursion(crash: Crash) -> Clue | None:
     return Clue(hint, crash.source.place(function)) if named else None
 
 
-@crash_rule()
+@crash_rule(priority=5090)
 def _own_raise(crash: Crash) -> Clue | None:
     """The student's own `raise` ends the node."""
     source = crash.source
@@ -206,7 +210,7 @@ def _own_raise(crash: Crash) -> Clue | None:
     return Clue(f"{source.code(raised)} ends the node: log a warning instead, and go on")
 
 
-@rule(fault=None)
+@hint_rule(fault=None, priority=5100)
 def _events_executor(case: Case) -> Clue | None:
     used = next(case.source.calls("EventsExecutor"), None)
     stuck = made(case.source, "timer") if case.fault is None else case.fault.kind is FaultKind.HUNG
@@ -216,7 +220,7 @@ def _events_executor(case: Case) -> Clue | None:
     return Clue(hint, case.source.place(used))
 
 
-@crash_rule("", FaultKind.HUNG)
+@crash_rule("", FaultKind.HUNG, priority=5110)
 def _endless_loop(crash: Crash) -> Clue | None:
     """The innermost call of the stack that stands in a loop of the file names the loop."""
     source, where = crash.source, crash.frames()
@@ -235,7 +239,7 @@ def _endless_loop(crash: Crash) -> Clue | None:
     return Clue(hint, source.place(loop))
 
 
-@crash_rule("", FaultKind.EXITED)
+@crash_rule("", FaultKind.EXITED, priority=5120)
 def _named_only(crash: Crash) -> Clue | None:
     """A function that starts something is named, and not called."""
     source = crash.source
@@ -250,7 +254,7 @@ def _named_only(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule("", FaultKind.EXITED)
+@crash_rule("", FaultKind.EXITED, priority=5130)
 def _never_awaited(crash: Crash) -> Clue | None:
     """`async def main` called as a function only makes a coroutine, which nothing runs."""
     source = crash.source
@@ -264,14 +268,14 @@ def _never_awaited(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule("", FaultKind.EXITED)
+@crash_rule("", FaultKind.EXITED, priority=5140)
 def _empty_file(crash: Crash) -> Clue | None:
     if crash.source.nodes or any(row.strip() for row in crash.source.lines[:2000]):
         return None
     return Clue("the file is empty: hand in the one that holds your node")
 
 
-@crash_rule("", FaultKind.EXITED)
+@crash_rule("", FaultKind.EXITED, priority=5150)
 def _left_by_arguments(crash: Crash) -> Clue | None:
     source = crash.source
     if crash.fault.exit_code != 2:
@@ -287,7 +291,7 @@ def _left_by_arguments(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule("", FaultKind.EXITED)
+@crash_rule("", FaultKind.EXITED, priority=5160)
 def _left_by_exit(crash: Crash) -> Clue | None:
     source = crash.source
     exits: list[ast.AST] = [c for c in source.calls(*_EXITS) if chain(c.func) in (*_EXITS, "sys.exit", "os._exit")]
@@ -326,7 +330,7 @@ def _at_the_end(source: Source, node: ast.AST) -> bool:
     return handles or (source.function_of(node) is None and not _argument_test(source, node))
 
 
-@crash_rule("", FaultKind.EXITED)
+@crash_rule("", FaultKind.EXITED, priority=5170)
 def _shut_down_in_callback(crash: Crash) -> Clue | None:
     source = crash.source
     for item in made(source, "timer", "subscription"):
@@ -337,7 +341,7 @@ def _shut_down_in_callback(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule("", FaultKind.EXITED)
+@crash_rule("", FaultKind.EXITED, priority=5180)
 def _no_spin(crash: Crash) -> Clue | None:
     """The node is created, and the program ends."""
     source = crash.source
@@ -364,7 +368,7 @@ def _publishes(source: Source, loop: ast.AST) -> bool:
     return any(isinstance(n, ast.Call) and last_name(n.func) == "publish" for n in reached(source, [loop]))
 
 
-@crash_rule("", FaultKind.EXITED)
+@crash_rule("", FaultKind.EXITED, priority=5190)
 def _spins_once(crash: Crash) -> Clue | None:
     source = crash.source
     if crash.fault.exit_code != 0 or any(last_name(n) == "spin" for n in spins(source)):
@@ -379,7 +383,7 @@ def _spins_once(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule("", FaultKind.EXITED)
+@crash_rule("", FaultKind.EXITED, priority=5200)
 def _gave_up(crash: Crash) -> Clue | None:
     """A `return` leaves main before the node spins."""
     source = crash.source

@@ -9,8 +9,10 @@ from grader.core.dataclass import dataclass
 from grader.core.exercise import Outcome, ProblemKind
 from grader.core.quantities import within
 from grader.judging.checks.fan import ThresholdResponse
+from grader.judging.checks.fields import RandomInRange
+from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.together import AnswersTogether
-from grader.judging.diagnosis.rules import Case, Clue, rule, silent_topic
+from grader.judging.diagnosis.rules import Case, Clue, hint_rule, silent_topic
 from grader.judging.diagnosis.wiring import (
     Constant,
     conditions,
@@ -27,6 +29,7 @@ from grader.judging.diagnosis.wiring import (
     text,
     timer_code,
 )
+from grader.judging.facts import AnswerFacts, AnswerRow
 from grader.judging.source import Source, chain, first_line, last_name, subtree, text_of
 from grader.judging.values import EXACT, published, published_numbers
 from grader.judging.wording import number
@@ -69,8 +72,8 @@ def _subscribers(case: Case) -> Iterator[_Subscriber]:
 
 def _late(case: Case) -> _Subscriber | None:
     """Return the controller, if its answers are late."""
-    late = case.evidence("lag_s") is not None or case.evidence("behind") is not None
-    return next(_subscribers(case), None) if late else None
+    facts = case.found(AnswerFacts)
+    return next(_subscribers(case), None) if facts is not None and facts.late else None
 
 
 def _compared(case: Case) -> Iterator[tuple[Source, ast.Compare]]:
@@ -112,18 +115,16 @@ def _switches(source: Source, limit: float | None = None) -> list[_Switch]:
     return [s for s in found if limit is None or within(s.limit.value, limit, EXACT)]
 
 
-def _rows(case: Case) -> list[tuple[float, float | None, float]]:
-    """Return (input, answer, expected) of each held input."""
-    rows = case.evidence("rows")
-    good = [r for r in rows if isinstance(r, (list, tuple)) and len(r) == 4] if isinstance(rows, (list, tuple)) else []
-    return [(float(r[1]), None if r[2] is None else float(r[2]), float(r[3])) for r in good]
+def _rows(case: Case) -> tuple[AnswerRow, ...]:
+    facts = case.found(AnswerFacts)
+    return () if facts is None else facts.rows
 
 
 def _wrong_inputs(case: Case) -> list[float]:
-    return [v for v, got, want in _rows(case) if got is None or not within(got, want, EXACT)]
+    return [r.input for r in _rows(case) if r.answer is None or not within(r.answer, r.expected, EXACT)]
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_late)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_late, priority=13010)
 def _stored_late(late: _Subscriber) -> Clue | None:
     """An attribute is compared before it gets the new value."""
     source = late.source
@@ -138,7 +139,7 @@ def _stored_late(late: _Subscriber) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_late)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_late, priority=13020)
 def _oldest_compared(late: _Subscriber) -> Clue | None:
     """The oldest of several stored values is compared."""
     source = late.source
@@ -155,7 +156,7 @@ def _grows(source: Source, values: ast.expr) -> bool:
     return chain(values) != "" and any(chain(c.func) == f"{chain(values)}.append" for c in source.calls("append"))
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_late)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_late, priority=13030)
 def _put_off(late: _Subscriber) -> Clue | None:
     """The answer is left to a timer, or the callback sleeps before it answers."""
     source = late.source
@@ -169,7 +170,7 @@ def _put_off(late: _Subscriber) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether)
+@hint_rule(ThresholdResponse, AnswersTogether, priority=13040)
 def _compared_as_text(case: Case) -> Clue | None:
     """`str(msg.data) > '25'` compares alphabetically."""
     for source, test in _compared(case):
@@ -184,7 +185,7 @@ def _compared_as_text(case: Case) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether)
+@hint_rule(ThresholdResponse, AnswersTogether, priority=13050)
 def _compared_mean(case: Case) -> Clue | None:
     """A mean of the last values lags behind, and stays near the threshold."""
     for source, test in _compared(case):
@@ -201,7 +202,7 @@ def _sum_by_count(node: ast.BinOp) -> bool:
     return isinstance(node.left, ast.Call) and last_name(node.left.func) == "sum"
 
 
-@rule(ThresholdResponse, AnswersTogether, problem=ProblemKind.NO_NUMBER, given=_controller)
+@hint_rule(ThresholdResponse, AnswersTogether, problem=ProblemKind.NO_NUMBER, given=_controller, priority=13060)
 def _answer_without_number(controller: _Controller) -> Clue | None:
     """Answers have a type without a number."""
     source, check = controller.source, controller.check
@@ -212,7 +213,7 @@ def _answer_without_number(controller: _Controller) -> Clue | None:
     return Clue(hint, source.place(item.call), key=f"apart:{check.output}")
 
 
-@rule(ThresholdResponse, given=_controller)
+@hint_rule(ThresholdResponse, given=_controller, priority=13070)
 def _at_the_threshold(controller: _Controller) -> Clue | None:
     """Only inputs exactly at the threshold are answered wrongly."""
     source, check = controller.source, controller.check
@@ -230,11 +231,11 @@ def _at_the_threshold(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, given=_controller)
+@hint_rule(ThresholdResponse, given=_controller, priority=13080)
 def _inverted(controller: _Controller) -> Clue | None:
     """The answers are exchanged."""
     source, check = controller.source, controller.check
-    known = ((v, got) for v, got, _ in _rows(controller.case) if got is not None)
+    known = ((r.input, r.answer) for r in _rows(controller.case) if r.answer is not None)
     away = [(v, got) for v, got in known if not within(v, check.threshold, EXACT)]
     flipped = [within(got, check.otherwise if v > check.threshold else check.above, EXACT) for v, got in away]
     both = len({v > check.threshold for v, _ in away}) == 2
@@ -263,7 +264,7 @@ def _says_inverted(source: Source, switch: _Switch, check: ThresholdResponse | A
     return wrong in numbers and right not in numbers
 
 
-@rule(ThresholdResponse, given=_controller)
+@hint_rule(ThresholdResponse, given=_controller, priority=13090)
 def _rounded(controller: _Controller) -> Clue | None:
     """The input is truncated or rounded before the comparison."""
     source, check = controller.source, controller.check
@@ -279,7 +280,7 @@ def _rounded(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, given=_controller)
+@hint_rule(ThresholdResponse, given=_controller, priority=13100)
 def _other_threshold(controller: _Controller) -> Clue | None:
     source, check = controller.source, controller.check
     known = _switches(source)
@@ -298,7 +299,7 @@ def _other_threshold(controller: _Controller) -> Clue | None:
     return Clue(f"{hint}{number(check.threshold)}", source.place(others[0].limit.origin), key="other_threshold")
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13110)
 def _wrong_answer(controller: _Controller) -> Clue | None:
     """The controller sends a number that is not in the exercise."""
     source, check = controller.source, controller.check
@@ -307,8 +308,8 @@ def _wrong_answer(controller: _Controller) -> Clue | None:
     if len(strange) != 1:
         return None
     value = next(iter(strange))
-    rows = _rows(controller.case) if isinstance(check, ThresholdResponse) else []
-    sides = {want for _, got, want in rows if got is not None and within(got, value, EXACT)}
+    rows = _rows(controller.case)
+    sides = {r.expected for r in rows if r.answer is not None and within(r.answer, value, EXACT)}
     wanted = number(next(iter(sides))) if len(sides) == 1 else f"{number(check.above)} or {number(check.otherwise)}"
     places = [n for n in _answers(source) if _is_worth(source, n, value)]
     if len(places) != 1:
@@ -336,7 +337,7 @@ def _is_worth(source: Source, node: ast.AST, value: float) -> bool:
     return worth is not None and within(worth.value, value, EXACT)
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13120)
 def _compared_not_set(controller: _Controller) -> Clue | None:
     """`fan.data == 100.0` compares and sets nothing."""
     source = controller.source
@@ -349,7 +350,7 @@ def _compared_not_set(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13130)
 def _sent_before_set(controller: _Controller) -> Clue | None:
     """The message is published before its number is set."""
     source, check = controller.source, controller.check
@@ -366,7 +367,7 @@ def _sent_before_set(controller: _Controller) -> Clue | None:
     return Clue(hint, source.place(calls[0]))
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13140)
 def _sends_what_came(controller: _Controller) -> Clue | None:
     """The message that came is published instead of the answer."""
     source, check = controller.source, controller.check
@@ -383,7 +384,7 @@ def _sends_what_came(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13150)
 def _one_branch(controller: _Controller) -> Clue | None:
     """An answer is sent only on one side of the threshold."""
     source, check = controller.source, controller.check
@@ -405,7 +406,7 @@ def _tests_threshold(source: Source, test: ast.expr, threshold: float) -> bool:
     return any(s.node in inside for s in _switches(source, threshold))
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13160)
 def _answered_once(controller: _Controller) -> Clue | None:
     """A flag lets one answer through."""
     source, check = controller.source, controller.check
@@ -417,12 +418,14 @@ def _answered_once(controller: _Controller) -> Clue | None:
             function = source.function_of(call)
             stores = [s for name in names for s in source.stores(name) if source.function_of(s) is function]
             if stores and function is not None and is_flag(test.test):
-                hint = f"'if {source.code(test.test, 40)}' lets one answer through: answer each temperature"
+                hint = (
+                    f"'if {source.code(test.test, 40)}' lets one answer through: answer each message on {check.input}"
+                )
                 return Clue(hint, source.place(test), key="answered_once")
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13170)
 def _sent_in_one_branch(controller: _Controller) -> Clue | None:
     """`publish` stands inside `else`, or a return comes before it."""
     source, check = controller.source, controller.check
@@ -445,7 +448,7 @@ def _sent_in_one_branch(controller: _Controller) -> Clue | None:
     return Clue(hint, source.place(early[0]), key="one_branch")
 
 
-@rule(ThresholdResponse, given=_controller)
+@hint_rule(ThresholdResponse, given=_controller, priority=13180)
 def _no_other_side(controller: _Controller) -> Clue | None:
     """The message is kept, and its number is set on one side of the threshold only."""
     source, check = controller.source, controller.check
@@ -472,7 +475,7 @@ def _asks_none(test: ast.expr, name: str) -> bool:
     return isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not) and chain(test.operand) == name
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13190)
 def _latched(controller: _Controller) -> Clue | None:
     """A variable is set on one side of the threshold, and never reset."""
     source, check = controller.source, controller.check
@@ -494,7 +497,7 @@ def _latched(controller: _Controller) -> Clue | None:
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, given=_controller)
+@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13200)
 def _slow_timer(controller: _Controller) -> Clue | None:
     """A timer answers too rarely."""
     source, check = controller.source, controller.check
@@ -503,12 +506,13 @@ def _slow_timer(controller: _Controller) -> Clue | None:
         worth = constant(source, item.period)
         inside = set(runs(source, item))
         if worth is not None and worth.value > 1.25 and all(c in inside for c in calls):
-            hint = f"{timer_code(source, item)} answers every {number(worth.value)} s only: answer each temperature"
+            slow = f"{timer_code(source, item)} answers every {number(worth.value)} s only"
+            hint = f"{slow}: answer each message on {check.input}"
             return Clue(hint, source.place(worth.origin), key="slow_timer")
     return None
 
 
-@rule(ThresholdResponse, AnswersTogether, outcome=Outcome.NOT_MET)
+@hint_rule(ThresholdResponse, AnswersTogether, outcome=Outcome.NOT_MET, priority=13210)
 def _callback_sleeps(case: Case) -> Clue | None:
     """The callback sleeps, and what comes meanwhile is answered late."""
     for late in _subscribers(case):
@@ -517,4 +521,24 @@ def _callback_sleeps(case: Case) -> Clue | None:
             if isinstance(node, ast.Call) and last_name(node.func) == "sleep" and (slept or 0) > _PROMPT_S:
                 hint = f"{late.source.code(node, 50)} holds up the callback: what comes meanwhile is answered late"
                 return Clue(f"{hint}; take it out", late.source.place(node), key="late_answer")
+    return None
+
+
+@hint_rule(AnswersTogether, priority=13990)
+def _follows(case: Case) -> Clue | None:
+    """A criterion about one of the two nodes was lost already, and explains this one."""
+    check: AnswersTogether = case.check
+    problem = case.verdict.problem
+    if problem is None:
+        return None
+    quiet = problem.kind in (ProblemKind.STOPPED, ProblemKind.NO_MESSAGE)
+    fixed = problem.kind is ProblemKind.NEVER_CHANGES
+    stopped = problem.kind is ProblemKind.STOPPED and check.input in problem.topics
+    answered = problem.kind is ProblemKind.WRONG_ANSWER or (quiet and check.output in problem.topics)
+    for id_, other in case.lost.items():
+        controller = isinstance(other, ThresholdResponse) and other.output == check.output
+        sensor = isinstance(other, RandomInRange) and other.topic == check.input
+        pace = isinstance(other, TopicRate) and other.topic == check.input
+        if (controller and answered) or (sensor and fixed) or (pace and stopped):
+            return Clue(same_as=id_)
     return None

@@ -102,7 +102,7 @@ _STARTERS = frozenset(
 _MESSAGE_ENDINGS = ("_msgs", "_msg", "_interfaces", "_interface", "_srvs", "_srv", "_actions")
 
 
-@crash_rule("", *FaultKind, in_file=False)
+@crash_rule("", *FaultKind, in_file=False, priority=1010)
 def _notebook(crash: Crash) -> Clue | None:
     """The text of a Jupyter notebook, or a command that only a notebook understands."""
     source, row = crash.case.source, crash.case.source.line(crash.line)
@@ -113,7 +113,7 @@ def _notebook(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule("", FaultKind.SYNTAX_ERROR, in_file=False)
+@crash_rule("", FaultKind.SYNTAX_ERROR, in_file=False, priority=1020)
 def _syntax(crash: Crash) -> Clue | None:
     fault, row = crash.fault, crash.case.source.line(crash.line)
     known = _python_2(fault, row) or _newer_f_string(fault, row) or _other_language(fault, row) or _said(fault, row)
@@ -173,17 +173,17 @@ def _indent(row: str) -> str:
     return " and ".join(parts) or "no space"
 
 
-@crash_rule("encoding|codec can't decode", FaultKind.SYNTAX_ERROR, in_file=False)
+@crash_rule("encoding|codec can't decode", FaultKind.SYNTAX_ERROR, in_file=False, priority=1030)
 def _encoding(_: Crash) -> Clue | None:
     return Clue("save the file as UTF-8")
 
 
-@crash_rule("null bytes", FaultKind.SYNTAX_ERROR, FaultKind.EXCEPTION, in_file=False)
+@crash_rule("null bytes", FaultKind.SYNTAX_ERROR, FaultKind.EXCEPTION, in_file=False, priority=1040)
 def _null_bytes(_: Crash) -> Clue | None:
     return Clue("the file holds bytes that are no text: save it as UTF-8 in a text editor")
 
 
-@crash_rule("^(?:ImportError|ModuleNotFoundError|AttributeError): .*", in_file=False)
+@crash_rule("^(?:ImportError|ModuleNotFoundError|AttributeError): .*", in_file=False, priority=1050)
 def _hidden_module(crash: Crash) -> Clue | None:
     """A file of the submission hides the module that the error names."""
     case = crash.case
@@ -196,7 +196,7 @@ def _hidden_module(crash: Crash) -> Clue | None:
     return Clue(f"{name} has the name of a module and is imported in its place: rename it")
 
 
-@crash_rule("^ImportError: attempted relative import with no known parent package", in_file=False)
+@crash_rule("^ImportError: attempted relative import with no known parent package", in_file=False, priority=1060)
 def _no_package(crash: Crash) -> Clue | None:
     source = crash.case.source
     written = next((n for n in source.all(ast.ImportFrom) if n.level and n.lineno == crash.line), None)
@@ -210,7 +210,7 @@ def _no_package(crash: Crash) -> Clue | None:
     return Clue(f"{hint}, with {helper}.py in the same folder")
 
 
-@crash_rule(r"No module named '([\w.]+)'", in_file=False)
+@crash_rule(r"No module named '([\w.]+)'", in_file=False, priority=1070)
 def _ros_1(crash: Crash) -> Clue | None:
     module = crash.found[1].split(".")[0]
     if module not in ROS_1:
@@ -224,7 +224,7 @@ def _ros_1(crash: Crash) -> Clue | None:
     return Clue(hint)
 
 
-@crash_rule(r"^ModuleNotFoundError: No module named '([\w.]+)'", in_file=False)
+@crash_rule(r"^ModuleNotFoundError: No module named '([\w.]+)'", in_file=False, priority=1080)
 def _missing_module(crash: Crash) -> Clue | None:
     wanted = crash.found[1][:80]
     known = [*MODULES, *PACKAGES, *PLAIN_MODULES, "numpy"]
@@ -248,7 +248,11 @@ def _gives_messages(source: Source, module: str) -> bool:
     return any(n.module in suffixes for n in source.all(ast.ImportFrom))
 
 
-@crash_rule(r"^ImportError: cannot import name '(\w+)' from (partially initialized module )?'([\w.]+)'", in_file=False)
+@crash_rule(
+    r"^ImportError: cannot import name '(\w+)' from (partially initialized module )?'([\w.]+)'",
+    in_file=False,
+    priority=1090,
+)
 def _cannot_import(crash: Crash) -> Clue | None:
     name, partially, module = crash.found.groups()
     if partially:
@@ -267,7 +271,7 @@ def _cannot_import(crash: Crash) -> Clue | None:
     return Clue(f"from {module} import {near}, not {name}") if near else None
 
 
-@crash_rule(r"^FileNotFoundError: \[Errno 2\] No such file or directory: '([^']+)'", in_file=False)
+@crash_rule(r"^FileNotFoundError: \[Errno 2\] No such file or directory: '([^']+)'", in_file=False, priority=1100)
 def _missing_file(crash: Crash) -> Clue | None:
     path, source = crash.found[1], crash.source
     name = quote(path, 60)
@@ -282,7 +286,7 @@ def _missing_file(crash: Crash) -> Clue | None:
     return Clue(f"{name} is not in the submission: hand it in, in the folder of the program")
 
 
-@crash_rule(r"partially initialized module '(\w+)' has no attribute", in_file=False)
+@crash_rule(r"partially initialized module '(\w+)' has no attribute", in_file=False, priority=1110)
 def _shadowed_module(crash: Crash) -> Clue | None:
     hint = f"a file of yours has the name of the module {crash.found[1]} and is imported in its place: rename the file"
     return Clue(hint)

@@ -11,7 +11,7 @@ from grader.core.quantities import seconds
 from grader.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.received import LogsReceived, LogsValues
-from grader.judging.diagnosis.rules import Case, Clue, rule
+from grader.judging.diagnosis.rules import Case, Clue, hint_rule
 from grader.judging.diagnosis.wiring import (
     Made,
     constant,
@@ -27,6 +27,7 @@ from grader.judging.diagnosis.wiring import (
     runs,
     timer_code,
 )
+from grader.judging.facts import LogFacts, LogPaceFacts, PositionFacts
 from grader.judging.output import printed_lines, student_records
 from grader.judging.source import Source, argument, chain, last_name, text_of
 from grader.judging.wording import number
@@ -44,7 +45,7 @@ def _prints(source: Source) -> list[ast.Call]:
     return [c for c in source.all(ast.Call) if chain(c.func) in ("print", "sys.stdout.write", "pprint")]
 
 
-@rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.NOT_MET)
+@hint_rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.NOT_MET, priority=11010)
 def _into_file(case: Case) -> Clue | None:
     """No expected text is logged or printed, but the program writes to a file."""
     source = case.source
@@ -60,9 +61,10 @@ def _unseen(case: Case) -> bool:
     if isinstance(check, UsesLogger):
         return not student_records(case.trace, case.process) and not printed_lines(case.trace, case.process)
     if isinstance(check, LogsPosition):
-        return case.evidence("cause") in ("nothing", "no_pair") and case.evidence("right") == 0
-    values, missing = case.evidence("values"), case.evidence("missing")
-    return bool(values) and values == missing
+        found = case.found(PositionFacts)
+        return found is not None and found.cause in ("nothing", "no_pair") and found.right == 0
+    logged = case.found(LogFacts)
+    return logged is not None and logged.expected == logged.missing
 
 
 def _writes(call: ast.Call) -> bool:
@@ -77,7 +79,7 @@ def _writes(call: ast.Call) -> bool:
     return bool(mode) and mode is not None and bool(set(mode) & set("wax"))
 
 
-@rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.PARTLY, fault=None)
+@hint_rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.PARTLY, fault=None, priority=11020)
 def _printed(case: Case) -> Clue | None:
     """Lines are printed instead of logged."""
     check, source = case.check, case.source
@@ -106,7 +108,7 @@ def _most_printed(case: Case, prints: list[ast.Call]) -> list[ast.Call]:
     return sorted(prints, key=seen, reverse=True) if isinstance(case.check, LogsPosition) else prints
 
 
-@rule(UsesLogger)
+@hint_rule(UsesLogger, priority=11030)
 def _python_logging(case: Case) -> Clue | None:
     """Python's logging module is used instead of the node's logger."""
     return _by_python(case)
@@ -132,7 +134,7 @@ _FIELD = re.compile(r"\{(?P<value>[A-Za-z_][\w.]*(?:\(\))?(?:\[[^\]{}]*\])*)(?:!
 _PERCENT = re.compile(r"%[-+ 0#]*\d*(?:\.\d+)?[dfgeEsi](?![A-Za-z])")
 
 
-@rule(LogsPosition, LogsReceived, LogsValues, LogsMatching)
+@hint_rule(LogsPosition, LogsReceived, LogsValues, LogsMatching, priority=11040)
 def _text_as_it_stands(case: Case) -> Clue | None:
     """The f of an f-string is missing, or the values behind a `%` or in `format`."""
     source = case.source
@@ -165,7 +167,7 @@ def _text_as_it_stands(case: Case) -> Clue | None:
     return None
 
 
-@rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.NOT_MET)
+@hint_rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.NOT_MET, priority=11050)
 def _level_raised(case: Case) -> Clue | None:
     """The program hides its own records."""
     for call in case.source.calls("set_level", "set_logger_level"):
@@ -176,7 +178,7 @@ def _level_raised(case: Case) -> Clue | None:
     return None
 
 
-@rule(LogsReceived)
+@hint_rule(LogsReceived, priority=11060)
 def _received_at_debug(case: Case) -> Clue | None:
     """What is received is logged at a level that is not shown."""
     item = made_for(case.source, "subscription", case.check.topic)
@@ -188,12 +190,13 @@ def _received_at_debug(case: Case) -> Clue | None:
     return Clue(hint, case.source.place(logs[0]))
 
 
-@rule(UsesLogger, LogsPosition)
+@hint_rule(UsesLogger, LogsPosition, priority=11070)
 def _debug_only(case: Case) -> Clue | None:
     if any(case.source.calls("set_level", "set_logger_level")):
         return None
     logs = [n for n in case.source.all(ast.Call) if is_log(case.source, n)]
-    if isinstance(case.check, LogsPosition) and case.evidence("right") == 0:
+    position = case.found(PositionFacts)
+    if position is not None and position.right == 0:
         logs = [n for n in logs if any(name.rpartition(".")[2] in ("x", "y") for name in names_in(n))]
     elif not _nothing_logged(case):
         return None
@@ -203,7 +206,7 @@ def _debug_only(case: Case) -> Clue | None:
     return Clue(hint, case.source.place(logs[0]))
 
 
-@rule(UsesLogger, LogsPosition, outcome=Outcome.NOT_MET)
+@hint_rule(UsesLogger, LogsPosition, outcome=Outcome.NOT_MET, priority=11080)
 def _commented_out(case: Case) -> Clue | None:
     if not _nothing_logged(case) or any(is_log(case.source, n) for n in case.source.all(ast.Call)):
         return None
@@ -225,7 +228,7 @@ def position_log(case: Case) -> ast.Call | None:
     return logs[0] if len(logs) == 1 else None
 
 
-@rule(LogPeriod, LogsPosition, LogsReceived)
+@hint_rule(LogPeriod, LogsPosition, LogsReceived, priority=11090)
 def _logged_once(case: Case) -> Clue | None:
     call = position_log(case)
     if call is None:
@@ -233,7 +236,8 @@ def _logged_once(case: Case) -> Clue | None:
     once = argument(call, 99, "once")
     if isinstance(once, ast.Constant) and once.value is True:
         return Clue("once=True lets this log through a single time: take it out", case.source.place(call), key="once")
-    few = case.evidence("cause") == "few" or case.evidence("logs") == 1
+    position, pace = case.found(PositionFacts), case.found(LogPaceFacts)
+    few = (position is not None and position.cause == "few") or (pace is not None and pace.count == 1)
     test = next(case.source.around(call, ast.If), None)
     if not few or test is None or not _set_inside(test):
         return None
@@ -249,13 +253,13 @@ def _set_inside(test: ast.If) -> bool:
     return any(chain(t) in names_in(test.test) for t in stored)
 
 
-@rule(LogPeriod)
+@hint_rule(LogPeriod, priority=11100)
 def _log_period(case: Case) -> Clue | None:
     """The timer, the throttle or the callback sets the wrong pace."""
-    average, call = case.evidence("average_period_s"), position_log(case)
-    if call is None or not isinstance(average, float):
+    pace, call = case.found(LogPaceFacts), position_log(case)
+    if call is None or pace is None:
         return None
-    source, wanted_s = case.source, seconds(case.check.period)
+    source, wanted_s, average = case.source, seconds(case.check.period), pace.average_s
     worth = constant(source, argument(call, 99, "throttle_duration_sec"))
     if worth is not None and 0.8 * worth.value <= average <= 1.3 * worth.value:
         hint = f"throttle_duration_sec={number(worth.value)} lets a log through every {number(worth.value)} s"
@@ -299,13 +303,14 @@ def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: 
     return Clue(hint, source.place(worth.origin), key="log_pace")
 
 
-@rule(LogsReceived)
+@hint_rule(LogsReceived, priority=11110)
 def _received_not_logged(case: Case) -> Clue | None:
     """The callback of the subscription does not log, or does not log what it received."""
     source, check = case.source, case.check
     item = made_for(source, "subscription", check.topic)
     start = roots(source, item.callback) if item is not None else []
-    if item is None or not start or not case.evidence("missing"):
+    facts = case.found(LogFacts)
+    if item is None or not start or facts is None or not facts.missing:
         return None
     inside = list(reached(source, start))
     logs = [n for n in inside if isinstance(n, ast.Call) and is_log(source, n)]
@@ -347,7 +352,7 @@ def _shows(log: ast.AST, attributes: set[str]) -> bool:
     return any(chain(n) in attributes for n in ast.walk(log) if isinstance(n, ast.Attribute))
 
 
-@rule(WaitsGracefully)
+@hint_rule(WaitsGracefully, priority=11120)
 def _error_while_waiting(case: Case) -> Clue | None:
     if case.verdict.location is None:
         return None
@@ -358,7 +363,7 @@ def _error_while_waiting(case: Case) -> Clue | None:
     return Clue(f"this is no failure of the node: use info or warn instead of {last_name(call.func)}")
 
 
-@rule(LogsEvery)
+@hint_rule(LogsEvery, priority=11130)
 def _log_every(case: Case) -> Clue | None:
     """`count % 100 == 0` where one log for every ten messages is asked for, or no condition at all."""
     source, every, call = case.source, case.check.every, position_log(case)

@@ -69,7 +69,7 @@ _PARTS = re.compile(
 )
 
 
-@crash_rule(r"^TypeError")
+@crash_rule(r"^TypeError", priority=7010)
 def _whole_message(crash: Crash) -> Clue | None:
     """A message is compared, added or formatted, instead of a field of it."""
     found = crash.said(_WHOLE.pattern)
@@ -108,7 +108,7 @@ def _holder(crash: Crash, type_: str) -> str:
     return source.code(whole[0], 40) if len(whole) == 1 else "msg"
 
 
-@crash_rule(r"^TypeError")
+@crash_rule(r"^TypeError", priority=7020)
 def _message_parts(crash: Crash) -> Clue | None:
     """A message is called, indexed, unpacked or iterated: its fields have names."""
     found = crash.said(_PARTS.pattern)
@@ -154,7 +154,7 @@ def _used_so(crash: Crash, type_: str) -> str:
 # --- calls -----------------------------------------------------------------------------------------------------------
 
 
-@crash_rule(r"^TypeError: '(\w+)' object is not callable")
+@crash_rule(r"^TypeError: '(\w+)' object is not callable", priority=7030)
 def _not_callable(crash: Crash) -> Clue | None:
     kind = crash.found[1]
     if kind == "str":
@@ -201,12 +201,12 @@ def _quoted_callback(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(r"callback should be either be callable|Callback must be callable")
+@crash_rule(r"callback should be either be callable|Callback must be callable", priority=7040)
 def _text_callback(crash: Crash) -> Clue | None:
     return _quoted_callback(crash)
 
 
-@crash_rule(r"^NotImplementedError: Service classes can not be instantiated")
+@crash_rule(r"^NotImplementedError: Service classes can not be instantiated", priority=7050)
 def _service_instance(crash: Crash) -> Clue | None:
     """`Trigger()`: only the request and the response of a service can be made."""
     source = crash.source
@@ -229,7 +229,7 @@ def _service_instance(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(r"^TypeError:? *$|^TypeError: None$")
+@crash_rule(r"^TypeError:? *$|^TypeError: None$", priority=7060)
 def _wrong_request(crash: Crash) -> Clue | None:
     """Rclpy raises a bare TypeError for a request or response of another type."""
     source = crash.source
@@ -254,7 +254,10 @@ def _wrong_request(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(r"^TypeError: (?:\w+\.)?(?:__init__\(\): )?incompatible constructor arguments|^TypeError: __init__\(\)")
+@crash_rule(
+    r"^TypeError: (?:\w+\.)?(?:__init__\(\): )?incompatible constructor arguments|^TypeError: __init__\(\)",
+    priority=7070,
+)
 def _node_name(crash: Crash) -> Clue | None:
     """The name of the node is no text."""
     for call in _calls(crash, "__init__"):
@@ -265,7 +268,7 @@ def _node_name(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(_ARITY, in_file=False)
+@crash_rule(_ARITY, in_file=False, priority=7080)
 def _wrong_arguments(crash: Crash) -> Clue | None:
     """A function gets too few or too many arguments, or one by a name that it does not have."""
     name = crash.found[1]
@@ -406,7 +409,8 @@ def _to_call(crash: Crash, name: str) -> Clue | None:
 @crash_rule(
     r'^TypeError: can only concatenate str \(not "(?:float|int|NoneType|list|bool)"\)'
     r"|^TypeError: unsupported operand type\(s\) for \+=?: '(?:float|int)' and 'str'"
-    r"|^TypeError: can only concatenate (?:list|tuple)"
+    r"|^TypeError: can only concatenate (?:list|tuple)",
+    priority=7090,
 )
 def _text_and_number(crash: Crash) -> Clue | None:
     """`'x: ' + value`."""
@@ -440,7 +444,9 @@ def _summands(node: ast.expr) -> Iterator[ast.expr]:
         yield node
 
 
-@crash_rule(r"unsupported operand type\(s\) for [-+]=?: '(?:Time|Duration)' and|and '(?:Time|Duration)'$")
+@crash_rule(
+    r"unsupported operand type\(s\) for [-+]=?: '(?:Time|Duration)' and|and '(?:Time|Duration)'$", priority=7100
+)
 def _time_and_number(crash: Crash) -> Clue | None:
     del crash
     return Clue(
@@ -448,7 +454,7 @@ def _time_and_number(crash: Crash) -> Clue | None:
     )
 
 
-@crash_rule(r"^TypeError: can't multiply sequence by non-int|^TypeError: can only concatenate list")
+@crash_rule(r"^TypeError: can't multiply sequence by non-int|^TypeError: can only concatenate list", priority=7110)
 def _text_or_list_as_number(crash: Crash) -> Clue | None:
     """`'0.5' * 1.0` and `[0.5] + 0.1`."""
     source = crash.source
@@ -465,7 +471,7 @@ def _text_or_list_as_number(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(r"not supported between instances of '(?:float|int|str)' and '(?:float|int|str)'")
+@crash_rule(r"not supported between instances of '(?:float|int|str)' and '(?:float|int|str)'", priority=7120)
 def _text_compared(crash: Crash) -> Clue | None:
     """A number is compared with a text."""
     source = crash.source
@@ -479,7 +485,8 @@ def _text_compared(crash: Crash) -> Clue | None:
 
 @crash_rule(
     r"unsupported operand type|can't multiply sequence by non-int|can only concatenate|not supported between"
-    r"|bad operand type|must be (?:a )?real number|must be str, not"
+    r"|bad operand type|must be (?:a )?real number|must be str, not",
+    priority=7130,
 )
 def _starts_as(crash: Crash) -> Clue | None:
     """An attribute starts as None, or as a text, and is used as a number."""
@@ -500,7 +507,9 @@ def _starts_as(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(r"^TypeError: not (?:enough|all) arguments|^TypeError: %(\w) format|^TypeError: must be real number")
+@crash_rule(
+    r"^TypeError: not (?:enough|all) arguments|^TypeError: %(\w) format|^TypeError: must be real number", priority=7140
+)
 def _percent(crash: Crash) -> Clue | None:
     """`'%.2f, %.2f' % x, y`: placeholders and values do not fit."""
     source = crash.source
@@ -526,7 +535,8 @@ def _percent(crash: Crash) -> Clue | None:
 
 
 @crash_rule(
-    r"^IndexError: Replacement index (\d+) out of range|^KeyError: '(\w*)'$|^IndexError: tuple index out of range"
+    r"^IndexError: Replacement index (\d+) out of range|^KeyError: '(\w*)'$|^IndexError: tuple index out of range",
+    priority=7150,
 )
 def _format_fields(crash: Crash) -> Clue | None:
     """`'{} {}'.format(x)`: braces and values do not fit."""
@@ -547,7 +557,8 @@ def _format_fields(crash: Crash) -> Clue | None:
 
 @crash_rule(
     r"^ValueError: (?:Unknown format code '(\w)' for object of type '(\w+)'|Invalid format specifier"
-    r"|Sign not allowed|Precision not allowed)|^TypeError: unsupported format string passed to (\w+)"
+    r"|Sign not allowed|Precision not allowed)|^TypeError: unsupported format string passed to (\w+)",
+    priority=7160,
 )
 def _format_code(crash: Crash) -> Clue | None:
     """`{x:d}` of a float, `{text:.2f}`, `{None:.2f}`."""
@@ -576,7 +587,7 @@ def _format_code(crash: Crash) -> Clue | None:
 # --- numbers, lists and conversions ----------------------------------------------------------------------------------
 
 
-@crash_rule(r"^ZeroDivisionError")
+@crash_rule(r"^ZeroDivisionError", priority=7170)
 def _divided_by_zero(crash: Crash) -> Clue | None:
     source = crash.source
     divisions = [n for n in source.on_line(crash.line, ast.BinOp) if isinstance(n.op, (ast.Div, ast.FloorDiv, ast.Mod))]
@@ -593,7 +604,8 @@ def _divided_by_zero(crash: Crash) -> Clue | None:
 
 @crash_rule(
     r"^TypeError: 'float' object cannot be interpreted as an integer|^ValueError: non-integer"
-    r"|^TypeError: (?:list|tuple|string) indices must be integers|^TypeError: slice indices must be integers"
+    r"|^TypeError: (?:list|tuple|string) indices must be integers|^TypeError: slice indices must be integers",
+    priority=7180,
 )
 def _whole_number(crash: Crash) -> Clue | None:
     source = crash.source
@@ -612,7 +624,10 @@ def _whole(node: ast.expr) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, int)
 
 
-@crash_rule(r"^IndexError: (?:list index|string index|pop from|deque|array index|Cannot choose|index)|^IndexError$")
+@crash_rule(
+    r"^IndexError: (?:list index|string index|pop from|deque|array index|Cannot choose|index)|^IndexError$",
+    priority=7190,
+)
 def _too_short(crash: Crash) -> Clue | None:
     source = crash.source
     if "argv" in source.line(crash.line):
@@ -627,7 +642,7 @@ def _too_short(crash: Crash) -> Clue | None:
     )
 
 
-@crash_rule(r"^KeyError: (.+)$")
+@crash_rule(r"^KeyError: (.+)$", priority=7200)
 def _no_key(crash: Crash) -> Clue | None:
     source = crash.source
     taken = [n for n in source.on_line(crash.line, ast.Subscript) if isinstance(n.ctx, ast.Load)]
@@ -638,7 +653,10 @@ def _no_key(crash: Crash) -> Clue | None:
     return Clue(f"{owner} has no entry {key} at this time: set it first, or read it with {owner}.get({key})")
 
 
-@crash_rule(r"^ValueError: (?:could not convert string to float: |invalid literal for int\(\) with base 10: )(.*)$")
+@crash_rule(
+    r"^ValueError: (?:could not convert string to float: |invalid literal for int\(\) with base 10: )(.*)$",
+    priority=7210,
+)
 def _no_number(crash: Crash) -> Clue | None:
     source, found = crash.source, crash.found[1].strip("'\"")
     asked = "int" if crash.said("invalid literal for int") else "float"
@@ -653,7 +671,10 @@ def _no_number(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(r"^ValueError: (not enough|too many) values to unpack|^TypeError: cannot unpack non-iterable (\w+) object")
+@crash_rule(
+    r"^ValueError: (not enough|too many) values to unpack|^TypeError: cannot unpack non-iterable (\w+) object",
+    priority=7220,
+)
 def _unpacked(crash: Crash) -> Clue | None:
     source = crash.source
     for statement in source.on_line(crash.line, ast.Assign):
@@ -666,7 +687,9 @@ def _unpacked(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(r"^TypeError: '(\w+)' object is not subscriptable|^TypeError: '(\w+)' object does not support item")
+@crash_rule(
+    r"^TypeError: '(\w+)' object is not subscriptable|^TypeError: '(\w+)' object does not support item", priority=7230
+)
 def _not_indexed(crash: Crash) -> Clue | None:
     kind = crash.found[1] or crash.found[2]
     source = crash.source
@@ -683,7 +706,7 @@ def _not_indexed(crash: Crash) -> Clue | None:
 # --- coroutines ------------------------------------------------------------------------------------------------------
 
 
-@crash_rule(r"^TypeError: __init__\(\) should return None")
+@crash_rule(r"^TypeError: __init__\(\) should return None", priority=7240)
 def _returns_from_init(crash: Crash) -> Clue | None:
     source = crash.source
     found = [r for r in source.all(ast.Return) if r.value is not None and source.function_name(r) == "__init__"]
@@ -694,7 +717,8 @@ def _returns_from_init(crash: Crash) -> Clue | None:
 
 @crash_rule(
     r"^TypeError: (str|int|float)\(\) argument 'encoding'"
-    r"|^TypeError: (\w+)\(?\)? (?:expected|takes) at most \d arguments?"
+    r"|^TypeError: (\w+)\(?\)? (?:expected|takes) at most \d arguments?",
+    priority=7250,
 )
 def _too_many_for_builtin(crash: Crash) -> Clue | None:
     """`str('x', value)`, `float(0,5)`."""
@@ -710,7 +734,8 @@ def _too_many_for_builtin(crash: Crash) -> Clue | None:
 
 
 @crash_rule(
-    r"'int' object has no attribute 'remove_node'|'(\w+)' object has no attribute '(?:add_node|remove_node|spin_once)'"
+    r"'int' object has no attribute 'remove_node'|'(\w+)' object has no attribute '(?:add_node|remove_node|spin_once)'",
+    priority=7260,
 )
 def _second_to_spin(crash: Crash) -> Clue | None:
     for call in _calls(crash, "spin"):
@@ -719,7 +744,7 @@ def _second_to_spin(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(r"^RuntimeError: no running event loop")
+@crash_rule(r"^RuntimeError: no running event loop", priority=7270)
 def _no_event_loop(crash: Crash) -> Clue | None:
     """`await asyncio.sleep()` in a callback of rclpy."""
     awaited = [c for c in crash.source.on_line(crash.line, ast.Call) if chain(c.func).startswith("asyncio.")]
@@ -731,7 +756,7 @@ def _no_event_loop(crash: Crash) -> Clue | None:
     return Clue(f"{hint} it: take it out, a timer sets the pace", crash.source.place(awaited[0]))
 
 
-@crash_rule(r"^TypeError: object (\w+) can't be used in 'await' expression")
+@crash_rule(r"^TypeError: object (\w+) can't be used in 'await' expression", priority=7280)
 def _awaited_nothing(crash: Crash) -> Clue | None:
     awaits = list(crash.source.on_line(crash.line, ast.Await))
     if not awaits:
@@ -740,7 +765,7 @@ def _awaited_nothing(crash: Crash) -> Clue | None:
     return Clue(f"{code} gives nothing to wait for: write it without await")
 
 
-@crash_rule(r"'coroutine' object")
+@crash_rule(r"'coroutine' object", priority=7290)
 def _not_awaited(crash: Crash) -> Clue | None:
     source = crash.source
     functions = {f.name: f for f in source.all(ast.AsyncFunctionDef)}

@@ -7,8 +7,9 @@ import ast
 from grader.core.exercise import Outcome
 from grader.judging.checks.odometry import LogsPosition
 from grader.judging.diagnosis.logs import position_log
-from grader.judging.diagnosis.rules import Case, Clue, Maker, rule
+from grader.judging.diagnosis.rules import Case, Clue, Maker, hint_rule
 from grader.judging.diagnosis.wiring import is_flag, made, message_classes, names_in, number_at, reached, roots, runs
+from grader.judging.facts import PositionFacts
 from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
 
 _POSITION = "msg.pose.pose.position"
@@ -22,13 +23,19 @@ _PARTS = {
 _MEANING = {"twist": "velocity"}
 
 
-def _position_rule(*causes: str) -> Maker[Case]:
+def _position_rule(*causes: str, priority: int) -> Maker[Case]:
     """Make a rule for position logs in which the check found one of these causes."""
 
     def found(case: Case) -> Case | None:
-        return case if case.evidence("cause") in causes else None
+        return case if _cause(case) in causes else None
 
-    return rule(LogsPosition, outcome=Outcome.NOT_MET, given=found)
+    return hint_rule(LogsPosition, outcome=Outcome.NOT_MET, given=found, priority=priority)
+
+
+def _cause(case: Case) -> str:
+    """Return the cause that the check found; empty if it found none."""
+    facts = case.found(PositionFacts)
+    return "" if facts is None else facts.cause
 
 
 def _reads(source: Source, *parts: str) -> list[ast.Attribute]:
@@ -42,10 +49,10 @@ def _reads(source: Source, *parts: str) -> list[ast.Attribute]:
     return found
 
 
-@_position_rule(*_PARTS)
+@_position_rule(*_PARTS, priority=12010)
 def _other_part(case: Case) -> Clue | None:
     """The velocity or the orientation is logged instead of the position."""
-    source, cause = case.source, str(case.evidence("cause"))
+    source, cause = case.source, _cause(case)
     reads = _reads(source, *_PARTS[cause])
     if not reads or (cause in ("constant", "no_pair") and _reads(source, "position")):
         return None
@@ -54,7 +61,7 @@ def _other_part(case: Case) -> Clue | None:
     return Clue(hint, source.place(reads[0]))
 
 
-@_position_rule("swapped")
+@_position_rule("swapped", priority=12020)
 def _swapped_axes(case: Case) -> Clue | None:
     source = case.source
     for statement in source.all(ast.Assign):
@@ -100,7 +107,7 @@ def _order_in(call: ast.Call) -> list[str]:
     return [_axis(chain(n)) for n in places]
 
 
-@_position_rule("wrong", "sign", "no_sign", "abs")
+@_position_rule("wrong", "sign", "no_sign", "abs", priority=12030)
 def _no_sign(case: Case) -> Clue | None:
     """`abs()` removes the sign."""
     source, call = case.source, position_log(case)
@@ -114,10 +121,10 @@ def _no_sign(case: Case) -> Clue | None:
     return Clue(f"{source.code(near[0])} takes the sign away: log the number as it is", source.place(near[0]))
 
 
-@_position_rule("no_y", "no_x", "only_x", "only_y")
+@_position_rule("no_y", "no_x", "only_x", "only_y", priority=12040)
 def _wrong_axis(case: Case) -> Clue | None:
     """Z instead of y, or only one number."""
-    source, cause = case.source, case.evidence("cause")
+    source, cause = case.source, _cause(case)
     missing = "y" if cause in ("no_y", "only_x") else "x"
     if cause in ("no_y", "no_x"):
         reads = [n for n in source.all(ast.Attribute) if n.attr == "z" and isinstance(n.ctx, ast.Load)]
@@ -129,7 +136,7 @@ def _wrong_axis(case: Case) -> Clue | None:
     return Clue(f"{source.code(call, 60)} does not show {missing}: log {_POSITION}.{missing} too", source.place(call))
 
 
-@_position_rule("first_value")
+@_position_rule("first_value", priority=12050)
 def _kept_first(case: Case) -> Clue | None:
     """The callback stores a position only once."""
     source = case.source
@@ -141,7 +148,7 @@ def _kept_first(case: Case) -> Clue | None:
     return None
 
 
-@_position_rule("constant", "wrong")
+@_position_rule("constant", "wrong", priority=12060)
 def _rounded_away(case: Case) -> Clue | None:
     """`round(x, -1)` leaves tens of metres."""
     source = case.source
@@ -153,7 +160,7 @@ def _rounded_away(case: Case) -> Clue | None:
     return None
 
 
-@_position_rule("constant", "nothing", "no_pair")
+@_position_rule("constant", "nothing", "no_pair", priority=12070)
 def _thrown_away(case: Case) -> Clue | None:
     """The function that logs puts a new message in the place of the stored one."""
     source, call = case.source, position_log(case)
@@ -169,7 +176,7 @@ def _thrown_away(case: Case) -> Clue | None:
     return None
 
 
-@_position_rule("constant")
+@_position_rule("constant", priority=12080)
 def _never_stored(case: Case) -> Clue | None:
     """The callback assigns local variables, but others are logged."""
     source = case.source
@@ -184,7 +191,7 @@ def _never_stored(case: Case) -> Clue | None:
     return None
 
 
-@_position_rule("wrong")
+@_position_rule("wrong", priority=12090)
 def _scaled_position(case: Case) -> Clue | None:
     """The position is multiplied, as for another unit."""
     source, call = case.source, position_log(case)
@@ -198,14 +205,15 @@ def _scaled_position(case: Case) -> Clue | None:
     return None
 
 
-@_position_rule("stale", "wrong")
+@_position_rule("stale", "wrong", priority=12100)
 def _old_messages(case: Case) -> Clue | None:
     """A callback that sleeps lags behind the messages, and so does a loop that handles one at a time and sleeps."""
     source = case.source
-    oldest = _oldest_taken(source) if case.evidence("cause") == "stale" else None
+    facts = case.found(PositionFacts)
+    oldest = _oldest_taken(source) if _cause(case) == "stale" else None
     if oldest is not None:
         return oldest
-    if case.evidence("cause") == "wrong" and not case.evidence("right"):
+    if facts is not None and facts.cause == "wrong" and not facts.right:
         return None
     for item in made(source, "subscription"):
         for node in runs(source, item):
@@ -237,7 +245,7 @@ def _oldest_taken(source: Source) -> Clue | None:
     return None
 
 
-@_position_rule("wrong", "no_pair", "constant", "few", "stale", "sign")
+@_position_rule("wrong", "no_pair", "constant", "few", "stale", "sign", priority=12110)
 def _log_line(case: Case) -> Clue | None:
     """Only the line that logs is known."""
     call = position_log(case)

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from grader.core.dataclass import dataclass
 from grader.core.exercise import ProblemKind
 from grader.judging.checks.rate import TopicRate
-from grader.judging.diagnosis.rules import Case, Clue, lines_of, rule, silent_topic
+from grader.judging.diagnosis.rules import Case, Clue, hint_rule, lines_of, silent_topic
 from grader.judging.diagnosis.wiring import (
     Constant,
     Made,
@@ -28,6 +28,7 @@ from grader.judging.diagnosis.wiring import (
     timer_code,
     waits_for_ever,
 )
+from grader.judging.facts import RateFacts
 from grader.judging.source import Loop, Source, argument, chain, first_line, last_name
 from grader.judging.wording import number
 
@@ -43,9 +44,12 @@ class _Paced:
     source: Source
     calls: Sequence[ast.Call]
     wanted_hz: float
-    found_hz: float
-    first_s: float
-    count: int
+    facts: RateFacts
+
+    @property
+    def found_hz(self) -> float:
+        """The measured rate; NaN if there are too few messages for it."""
+        return self.facts.rate_hz
 
     @property
     def period_s(self) -> float:
@@ -61,17 +65,15 @@ def _paced(case: Case) -> _Paced | None:
     if silent_topic(case):
         return None
     calls = publish_calls(case.source, made_for(case.source, "publisher", check.topic))
-    found, first, count = (case.evidence(key) for key in ("rate_hz", "first_s", "window"))
-    known = float(found) if isinstance(found, (int, float)) else math.nan
-    first_s = float(first) if isinstance(first, (int, float)) else math.nan
-    return _Paced(case, case.source, calls, check.rate, known, first_s, count if isinstance(count, int) else 0)
+    facts = case.found(RateFacts) or RateFacts(0, math.nan)
+    return _Paced(case, case.source, calls, check.rate, facts)
 
 
 def _same(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=_SAME)
 
 
-@rule(TopicRate, given=_paced)
+@hint_rule(TopicRate, given=_paced, priority=9010)
 def _period(paced: _Paced) -> Clue | None:
     """The period of the timer explains the rate."""
     timers = paced.timers()
@@ -85,7 +87,9 @@ def _period(paced: _Paced) -> Clue | None:
         why = "; // divides to a whole number, / does not" if "//" in code else ""
         hint = f"{code} has a period of 0 s: write {number(paced.period_s)}{why}"
         return Clue(hint, paced.source.place(worth.origin))
-    explains = _same(1 / worth.value, paced.found_hz) or (paced.count <= 2 and _same(worth.value, paced.first_s))
+    explains = _same(1 / worth.value, paced.found_hz) or (
+        paced.facts.count <= 2 and _same(worth.value, paced.facts.first_s)
+    )
     return _period_clue(paced.source, timers[0], worth, paced.wanted_hz) if explains else None
 
 
@@ -102,7 +106,7 @@ def _period_clue(source: Source, timer: Made, worth: Constant, wanted_hz: float)
     return Clue(hint, source.place(worth.origin), key=f"period:{timer.call.lineno}")
 
 
-@rule(TopicRate, given=_paced)
+@hint_rule(TopicRate, given=_paced, priority=9020)
 def _callback_held_up(paced: _Paced) -> Clue | None:
     """The callback of the timer sleeps, or never returns."""
     if not paced.found_hz < paced.wanted_hz:
@@ -122,7 +126,7 @@ def _callback_held_up(paced: _Paced) -> Clue | None:
     return _held_up_now_and_then(paced)
 
 
-@rule(TopicRate, given=_paced)
+@hint_rule(TopicRate, given=_paced, priority=9030)
 def _loops_in_callback(paced: _Paced) -> Clue | None:
     """The callback of the timer publishes in a loop that never ends."""
     for timer in paced.timers():
@@ -142,9 +146,9 @@ def _endless(loop: ast.While) -> bool:
 
 def _held_up_now_and_then(paced: _Paced) -> Clue | None:
     """A callback sleeps on a condition, or another one does, as long as the longest pause between messages."""
-    source, longest = paced.source, paced.case.evidence("max_s")
+    source, longest = paced.source, paced.facts.longest_s
     items = made(source, "timer", "subscription")
-    if not paced.timers() or not isinstance(longest, float) or longest < 1.5 * paced.period_s:
+    if not paced.timers() or not longest >= 1.5 * paced.period_s:  # NaN if nothing was measured
         return None
     for item in items:
         for sleep in _sleeps(source, runs(source, item)):
@@ -177,7 +181,7 @@ def _pause(source: Source, loop: ast.AST) -> list[Constant]:
     return sorted([*_sleeps(source, inside), *timeouts], key=lambda s: first_line(s.origin))
 
 
-@rule(TopicRate, problem=ProblemKind.BURSTS, given=_paced)
+@hint_rule(TopicRate, problem=ProblemKind.BURSTS, given=_paced, priority=9040)
 def _published_several_times(paced: _Paced) -> Clue | None:
     """Each iteration publishes more than once, or several timers publish."""
     timers = paced.timers()
@@ -198,10 +202,10 @@ def _published_several_times(paced: _Paced) -> Clue | None:
     return Clue(f"{hint}: one every {number(paced.period_s)} s is asked for", source.place(loop))
 
 
-@rule(TopicRate, given=_paced)
+@hint_rule(TopicRate, given=_paced, priority=9050)
 def _stopped_itself(paced: _Paced) -> Clue | None:
     """A callback cancels its timer, destroys the node, or stops publishing on a condition."""
-    if not (paced.case.is_about(ProblemKind.STOPPED) or paced.count == 1):
+    if not (paced.case.is_about(ProblemKind.STOPPED) or paced.facts.count == 1):
         return None
     source = paced.source
     for timer in paced.timers():
@@ -216,7 +220,7 @@ def _stopped_itself(paced: _Paced) -> Clue | None:
     return None
 
 
-@rule(TopicRate, given=_paced)
+@hint_rule(TopicRate, given=_paced, priority=9060)
 def _too_slow(paced: _Paced) -> Clue | None:
     """The period is right, but the rate is too low."""
     timers = paced.timers()
@@ -230,7 +234,7 @@ def _too_slow(paced: _Paced) -> Clue | None:
     return Clue(f"{hint}: do less in it", paced.source.place(start[0] if start else timers[0].call))
 
 
-@rule(TopicRate, given=_paced)
+@hint_rule(TopicRate, given=_paced, priority=9070)
 def _waits_to_spin(paced: _Paced) -> Clue | None:
     """A loop that publishes spins once without a timeout, which waits until something wakes the node."""
     rare = math.isnan(paced.found_hz) or paced.found_hz < (1 - _SAME) * paced.wanted_hz
@@ -248,7 +252,7 @@ def _waits_to_spin(paced: _Paced) -> Clue | None:
     return None
 
 
-@rule(TopicRate, given=_paced)
+@hint_rule(TopicRate, given=_paced, priority=9080)
 def _loop_pace(paced: _Paced) -> Clue | None:
     """A loop publishes, but its pause is not the requested period."""
     if paced.timers() or math.isnan(paced.found_hz):
@@ -297,10 +301,10 @@ def _no_pause(paced: _Paced, loop: Loop) -> Clue | None:
     return Clue(hint, paced.source.place(loop))
 
 
-@rule(TopicRate, given=_paced)
+@hint_rule(TopicRate, given=_paced, priority=9090)
 def _published_once(paced: _Paced) -> Clue | None:
     """Neither a timer nor a loop publishes."""
-    if paced.count != 1 or paced.timers() or not paced.calls:
+    if paced.facts.count != 1 or paced.timers() or not paced.calls:
         return None
     source = paced.source
     function = source.function_of(paced.calls[0])

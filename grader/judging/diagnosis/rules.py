@@ -1,23 +1,18 @@
-"""The rules of diagnosis: which cases a rule may explain, as data, and a function that finds hint and place."""
+"""Hint rules: the cases that a rule may explain, its place among all rules, and a function that finds the hint."""
 
 from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import field, replace
 from functools import partial
 from typing import Any, TypeVar
 
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Check, Criterion, Location, Outcome, ProblemKind
+from grader.core.exercise import Check, Criterion, Location, Outcome, ProblemKind, named, roles_of
 from grader.core.report import Verdict
 from grader.core.trace import Fault, FaultKind, Trace
-from grader.judging.checks.fan import ThresholdResponse
-from grader.judging.checks.rate import TopicRate
-from grader.judging.checks.received import LogsReceived
-from grader.judging.checks.together import AnswersTogether
-from grader.judging.checks.topics import Publishes, Subscribes
 from grader.judging.diagnosis.wiring import made_for
 from grader.judging.source import Source, first_line
 from grader.judging.values import published, student_endpoints
@@ -26,6 +21,8 @@ _FRAME = re.compile(r"(?P<file>.*):(?P<line>\d+) in (?P<name>\S+)$")
 #: Stands for a missing file; nothing is found in it.
 NO_SOURCE = Source("")
 _ANYTHING = re.compile("")
+#: The place of a rule of a rubric's own, unless it says another: before all rules of the grader, which begin at 1000.
+FIRST = 100
 Given = TypeVar("Given")
 
 
@@ -36,11 +33,13 @@ class Clue:
     Attributes:
         location: The line to look at; None keeps the one from the check.
         key: Clues with equal keys have the same cause; by default the rule and the location.
+        same_as: Id of an earlier criterion in `Case.lost` with the same cause, which then is all that is said.
     """
 
-    hint: str
+    hint: str = ""
     location: Location | None = None
     key: str = ""
+    same_as: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +48,10 @@ class Case:
 
     Attributes:
         sources: Wanted file name -> source, for the submitted files of the scenario.
+        fault: The fault that the verdict rests on; None for none.
         siblings: The checks of the exercise's other criteria.
+        facts: What the check hands to rules, see `Finding.facts`.
+        lost: The earlier criteria that were not met, by id, with their checks.
     """
 
     criterion: Criterion
@@ -58,6 +60,8 @@ class Case:
     sources: Mapping[str, Source]
     fault: Fault | None = None
     siblings: tuple[Check, ...] = ()
+    facts: Any = None
+    lost: Mapping[str, Check] = field(default_factory=dict)
 
     @property
     def check(self) -> Any:
@@ -67,10 +71,10 @@ class Case:
     @property
     def process(self) -> str:
         """The one file that the criterion is about; empty if there are several."""
-        named = str(getattr(self.check, "process", ""))
         if self.fault is not None:
             return self.fault.process
-        return named or (next(iter(self.sources)) if len(self.sources) == 1 else "")
+        own = named(self.check, roles_of(type(self.check)).process)
+        return own[0] if own else (next(iter(self.sources)) if len(self.sources) == 1 else "")
 
     @property
     def source(self) -> Source:
@@ -86,9 +90,24 @@ class Case:
         """The topics of the problem."""
         return self.verdict.problem.topics if self.verdict.problem is not None else ()
 
-    def evidence(self, key: str) -> object:
-        """Return a value from the verdict's evidence, None if the key does not exist."""
-        return self.verdict.evidence.get(key)
+    def found(self, kind: type[Given]) -> Given | None:
+        """Return the facts of the check if they are of one kind, such as `RateFacts`; None otherwise."""
+        return self.facts if isinstance(self.facts, kind) else None
+
+    @property
+    def hears(self) -> tuple[str, ...]:
+        """The topics to which a node has to subscribe, as far as the check declares them."""
+        return named(self.check, *roles_of(type(self.check)).hears)
+
+    @property
+    def speaks(self) -> tuple[str, ...]:
+        """The topics on which the check misses messages, as far as it declares them."""
+        return named(self.check, *roles_of(type(self.check)).speaks)
+
+    @property
+    def type(self) -> str:
+        """The message type that the check asks for; empty if it names none."""
+        return "".join(named(self.check, roles_of(type(self.check)).type))
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,25 +144,40 @@ class Rule:
     """A common mistake.
 
     Attributes:
+        id: Its name, which reports state.
         find: Returns the clue if this mistake is very likely, else None; called only if all other conditions hold.
+        checks: Checks that it explains, as classes or by their names in rubrics; any if empty.
         problem: Problem that the check must have found; any or none if None.
         outcome: Outcome that it explains; any if None.
         fault: Whether the verdict must rest on a fault (True) or on none (False); either if None.
         text: Pattern that the text of an exception must have; empty for any.
+        priority: Its place among all rules: the one with the lowest number is asked first, and the first clue wins.
+        about: The mistake in a sentence, for `grade explain --rules`; may be empty.
+        file: Path of the author's file with the rule; empty for a rule of the grader.
+        function: What the decorator was above; None for a rule that was made without one.
     """
 
     id: str
     find: Callable[[Case], Clue | None]
-    checks: tuple[type, ...] = ()
+    checks: tuple[type | str, ...] = ()
     problem: ProblemKind | None = None
     outcome: Outcome | None = None
     fault: bool | None = False
     text: str = ""
+    priority: int = FIRST
+    about: str = ""
+    file: str = ""
+    function: Callable[..., object] | None = None
+
+    def explains(self, criterion: Criterion) -> bool:
+        """Return whether it is about the check of a criterion."""
+        kinds = tuple(check for check in self.checks if not isinstance(check, str))
+        return not self.checks or isinstance(criterion.check, kinds) or criterion.check_name in self.checks
 
     def clue(self, case: Case) -> Clue | None:
         """Return the rule's clue for a case; None if it does not apply."""
         applies = (
-            (not self.checks or isinstance(case.check, self.checks))
+            self.explains(case.criterion)
             and self.fault in (None, case.fault is not None)
             and self.outcome in (None, case.verdict.outcome)
             and (self.problem is None or case.is_about(self.problem))
@@ -158,36 +192,53 @@ def _case(case: Case) -> Case:
     return case
 
 
-def rule(
-    *checks: type,
+def hint_rule(
+    *checks: type | str,
     problem: ProblemKind | None = None,
     outcome: Outcome | None = None,
     fault: bool | None = False,
+    priority: int = FIRST,
     given: Callable[[Case], Given | None] = _case,  # type: ignore[assignment]
 ) -> Maker[Given]:
     """Turn a function into a rule; the arguments are those of `Rule`.
 
     Args:
-        checks: Checks that it explains; any if there are none.
+        checks: Checks that it explains, by their names in rubrics, or their classes; any if there are none.
         problem: Problem that the check must have found.
         outcome: Outcome that it explains.
         fault: Whether the verdict must rest on a fault, or on none; None for either.
+        priority: Its place among all rules; the lowest number is asked first.
         given: Computes the argument of the function from the case. If it returns None, the rule does not apply.
+
+    Raises:
+        TypeError: A check is neither a name nor a class.
     """
+    if not all(isinstance(check, (type, str)) for check in checks):
+        raise TypeError("expected the names of checks, found a function: write @hint_rule() above it")
 
     def make(find: Callable[[Given], Clue | None]) -> Rule:
         def found(case: Case) -> Clue | None:
             known = given(case)
             return None if known is None else find(known)
 
-        return Rule(find.__name__.removeprefix("_"), found, checks, problem, outcome, fault)
+        about = (find.__doc__ or "").strip().split("\n")[0]
+        id_ = find.__name__.removeprefix("_")
+        return Rule(id_, found, checks, problem, outcome, fault, priority=priority, about=about, function=find)
 
     return make
 
 
-def crash_rule(text: str = "", *kinds: FaultKind, in_file: bool = True) -> Maker[Crash]:
-    """Turn a function into a rule for faults of some kinds, exceptions if none are given, whose text has a pattern."""
-    make = rule(fault=True, given=partial(_crash, text, kinds or (FaultKind.EXCEPTION,), in_file))
+def crash_rule(text: str = "", *kinds: FaultKind, in_file: bool = True, priority: int = FIRST) -> Maker[Crash]:
+    """Turn a function into a rule for faults of some kinds, exceptions if none are given, whose text has a pattern.
+
+    Args:
+        text: The pattern, searched in an exception as the last line of its traceback writes it.
+        kinds: Kinds of faults.
+        in_file: Whether the rule applies only if the fault arose in a file that was handed in.
+        priority: Its place among all rules; the lowest number is asked first.
+    """
+    given = partial(_crash, text, kinds or (FaultKind.EXCEPTION,), in_file)
+    make = hint_rule(fault=True, priority=priority, given=given)
     return lambda find: replace(make(find), text=text)
 
 
@@ -201,6 +252,24 @@ def _crash(text: str, kinds: tuple[FaultKind, ...], in_file: bool, case: Case) -
     return None if found is None or (in_file and source is NO_SOURCE) else Crash(case, fault, source, found)
 
 
+def unfit(clue: object, case: Case) -> str:
+    """Describe what is wrong with what an author's rule returned for a case; empty if it can be reported."""
+    if not isinstance(clue, Clue):
+        return f"expected a Clue or None, found a {type(clue).__name__}"
+    texts = {"hint": clue.hint, "key": clue.key, "same_as": clue.same_as}
+    wrong = next((name for name, text in texts.items() if not isinstance(text, str)), "")
+    if wrong:
+        return f"expected a clue with a text as {wrong}, found a {type(texts[wrong]).__name__}"
+    place = clue.location
+    if not isinstance(place, (Location, type(None))):
+        return f"expected a clue with a Location, found a {type(place).__name__}"
+    if place is not None and (not place.file or place.line < 1):
+        return f"expected a clue with a file and a line from 1 on, found `{place.file}:{place.line}`"
+    if clue.same_as and clue.same_as not in case.lost:
+        return f"expected the id of an earlier criterion that was not met, found `{clue.same_as}`"
+    return "" if clue.hint or clue.same_as else "expected a clue with a hint, found an empty one"
+
+
 def lines_of(node: ast.AST, *others: ast.AST) -> str:
     """Return `line 7`, or `lines 7 and 9`, for text."""
     numbers = sorted({first_line(n) for n in (node, *others)})
@@ -209,31 +278,25 @@ def lines_of(node: ast.AST, *others: ast.AST) -> str:
     return f"lines {', '.join(map(str, numbers[:-1]))} and {numbers[-1]}"
 
 
+def in_order(rules: Iterable[Rule]) -> tuple[Rule, ...]:
+    """Return rules in the order in which they are asked; of equal priorities, the first stays first."""
+    return tuple(sorted(rules, key=lambda rule: rule.priority))
+
+
 def silent_topic(case: Case) -> str:
     """Return the topic on which expected messages are missing; empty if that is not the problem."""
-    check = case.check
-    if isinstance(check, (Publishes, TopicRate)):
-        asked = [check.topic]
-    elif isinstance(check, ThresholdResponse):
-        asked = [check.output]
-    else:
-        asked = [check.input, check.output] if isinstance(check, AnswersTogether) else []
-    type_ = check.type if isinstance(check, Publishes) else None
-    silent = (t for t in asked if not any(type_ in (None, m.type) for m in published(case.trace, t)))
-    return next(silent, "")
+    return next((t for t in case.speaks if not any(case.type in ("", m.type) for m in published(case.trace, t))), "")
 
 
 def unheard_topic(case: Case) -> str:
-    """Return the topic without a matching subscription; empty if that is not the problem."""
-    check = case.check
-    if isinstance(check, ThresholdResponse):
-        topic = check.input if silent_topic(case) else ""
-    elif isinstance(check, AnswersTogether):
-        topic = check.input if silent_topic(case) == check.output else ""
-    else:
-        topic = check.topic if isinstance(check, (Subscribes, LogsReceived)) else ""
-    type_ = check.type if isinstance(check, Subscribes) else None
-    there = [e for e in student_endpoints(case.trace, "subscription", topic) if type_ in (None, e.type)]
+    """Return the topic without a matching subscription; empty if that is not the problem.
+
+    A check that expects messages too says so only where those that answer the topic are missing.
+    """
+    topic = next(iter(case.hears), "")
+    if case.speaks and silent_topic(case) in ("", topic):
+        return ""
+    there = [e for e in student_endpoints(case.trace, "subscription", topic) if case.type in ("", e.type)]
     return "" if there else topic
 
 

@@ -22,7 +22,7 @@ from grader.judging.source import Function, Source, chain, covers, first_line, l
 _CREATE = ("create_publisher", "create_subscription", "create_service", "create_client")
 
 
-@crash_rule(r"^NameError: name '(\w+)' is not defined")
+@crash_rule(r"^NameError: name '(\w+)' is not defined", priority=2010)
 def _undefined_name(crash: Crash) -> Clue | None:
     name, source = crash.found[1], crash.source
     inside = [f for f in source.functions() if covers(f, crash.line)]
@@ -191,7 +191,8 @@ def _defined(source: Source) -> list[str]:
 
 @crash_rule(
     r"^UnboundLocalError: (?:local variable|cannot access local variable) '(\w+)'"
-    r"|^NameError: free variable '(\w+)'|^NameError: cannot access free variable '(\w+)'"
+    r"|^NameError: free variable '(\w+)'|^NameError: cannot access free variable '(\w+)'",
+    priority=2020,
 )
 def _unbound_local(crash: Crash) -> Clue | None:
     """A function uses a local variable that has no value yet."""

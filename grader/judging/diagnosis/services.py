@@ -11,7 +11,7 @@ from grader.core.trace import LogRecord
 from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
 from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse, ServiceSequence
 from grader.judging.diagnosis.names import SPINS
-from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, rule
+from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
 from grader.judging.diagnosis.wiring import (
     elsewhere_because,
     goes_to,
@@ -24,6 +24,7 @@ from grader.judging.diagnosis.wiring import (
     target_of,
     text,
 )
+from grader.judging.facts import OtherEnd
 from grader.judging.service_calls import CallKind, ResponseReader, episodes_of
 from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, parameters, text_of
 from grader.judging.wording import number, quote
@@ -46,12 +47,13 @@ def _sides(case: Case) -> Iterator[tuple[Source, str]]:
     yield from ((source, kind) for source in case.sources.values())
 
 
-@rule(*_CLIENTS, *_SERVERS)
+@hint_rule(*_CLIENTS, *_SERVERS, priority=3010)
 def _other_service(case: Case) -> Clue | None:
     """A server or client has another name."""
-    found = case.evidence("service")
-    if not case.is_about(ProblemKind.OTHER_NAME) or not isinstance(found, str):
+    other = case.found(OtherEnd)
+    if not case.is_about(ProblemKind.OTHER_NAME) or other is None:
         return None
+    found = other.name
     for source, kind in _sides(case):
         named = [(c, text(source, argument(c, 1, "srv_name"))) for c in _ends(source, kind)]
         fitting = [(c, name) for c, name in named if goes_to(name, found)] or (named if len(named) == 1 else [])
@@ -64,7 +66,7 @@ def _other_service(case: Case) -> Clue | None:
     return None
 
 
-@rule(*_CLIENTS, *_SERVERS)
+@hint_rule(*_CLIENTS, *_SERVERS, priority=3020)
 def _other_service_type(case: Case) -> Clue | None:
     """A server or client has another type."""
     offered = [c for c in (case.check, *case.siblings) if isinstance(c, ServiceAvailable)]
@@ -89,7 +91,7 @@ def _callbacks(source: Source) -> list[ast.AST]:
     return found + [n for callback in servers for n in reached(source, roots(source, callback))]
 
 
-@rule(*_CLIENTS)
+@hint_rule(*_CLIENTS, priority=3030)
 def _synchronous_call(case: Case) -> Clue | None:
     """`client.call()` waits for an answer that only a spinning node takes."""
     source = case.source
@@ -108,7 +110,7 @@ def _synchronous_call(case: Case) -> Clue | None:
     return None
 
 
-@rule(*_CLIENTS)
+@hint_rule(*_CLIENTS, priority=3040)
 def _spins_in_callback(case: Case) -> Clue | None:
     """A callback spins the node that is spinning already."""
     source = case.source
@@ -120,7 +122,7 @@ def _spins_in_callback(case: Case) -> Clue | None:
     return Clue(f"{hint} given to future.add_done_callback", source.place(call), key="waits_in_callback")
 
 
-@rule(*_CLIENTS, fault=None)
+@hint_rule(*_CLIENTS, fault=None, priority=3050)
 def _future_never_done(case: Case) -> Clue | None:
     """A loop asks whether a future is done, and nothing spins the node meanwhile."""
     source = case.source
@@ -135,7 +137,7 @@ def _future_never_done(case: Case) -> Clue | None:
     return None
 
 
-@rule(CallsOfClient, ReactsToResponses)
+@hint_rule(CallsOfClient, ReactsToResponses, priority=3060)
 def _shared_callback_group(case: Case) -> Clue | None:
     """A callback awaits the response of a client in the same callback group, whose callbacks run one at a time."""
     source = case.source
@@ -177,19 +179,21 @@ def _too_early(source: Source) -> Clue | None:
     return Clue(hint, source.place(found), key="result_too_early")
 
 
-@rule(*_CLIENTS)
+@hint_rule(*_CLIENTS, priority=3070)
 def _result_too_early(case: Case) -> Clue | None:
     """The result of a future is read at once."""
     return _too_early(case.source)
 
 
-@crash_rule("'NoneType' object has no attribute|'NoneType' object is not subscriptable")
+@crash_rule("'NoneType' object has no attribute|'NoneType' object is not subscriptable", priority=3080)
 def _no_result_yet(crash: Crash) -> Clue | None:
     """The missing result of a future is used."""
     return _too_early(crash.source)
 
 
-@crash_rule(r"'Future' object has no attribute '(\w+)'|'(?:function|method)' object has no attribute '(\w+)'")
+@crash_rule(
+    r"'Future' object has no attribute '(\w+)'|'(?:function|method)' object has no attribute '(\w+)'", priority=3090
+)
 def _future_is_no_answer(crash: Crash) -> Clue | None:
     """The future of a call, or the method `result`, is used like the response."""
     source, name = crash.source, crash.found[1] or crash.found[2]
@@ -210,7 +214,9 @@ def _future_is_no_answer(crash: Crash) -> Clue | None:
     return Clue(f"{hint}rclpy.spin_until_future_complete(node, future), then future.result().{name}")
 
 
-@crash_rule(r"'(\w+)_Request' object has no attribute '(\w+)'|'(\w+)_Response' object has no attribute '(\w+)'")
+@crash_rule(
+    r"'(\w+)_Request' object has no attribute '(\w+)'|'(\w+)_Response' object has no attribute '(\w+)'", priority=3100
+)
 def _request_is_response(crash: Crash) -> Clue | None:
     """The callback of a service names its parameters in the wrong order."""
     source = crash.source
@@ -227,7 +233,7 @@ def _request_is_response(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule()
+@crash_rule(priority=3110)
 def _future_before_node(crash: Crash) -> Clue | None:
     """The arguments of spin_until_future_complete are swapped."""
     source = crash.source
@@ -240,7 +246,7 @@ def _future_before_node(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule()
+@crash_rule(priority=3120)
 def _service_arguments(crash: Crash) -> Clue | None:
     """The arguments of create_client or create_service are swapped."""
     source = crash.source
@@ -258,7 +264,7 @@ def _service_arguments(crash: Crash) -> Clue | None:
     return None
 
 
-@rule(ServiceResponse, ServiceSequence)
+@hint_rule(ServiceResponse, ServiceSequence, priority=3130)
 def _another_response(case: Case) -> Clue | None:
     """The callback fills in one response and returns another one."""
     source = case.source
@@ -276,7 +282,7 @@ def _another_response(case: Case) -> Clue | None:
     return None
 
 
-@rule(ReactsToResponses, outcome=Outcome.NOT_MET)
+@hint_rule(ReactsToResponses, outcome=Outcome.NOT_MET, priority=3140)
 def _wrong_level(case: Case) -> Clue | None:
     """One side logs at the level of the other, or at a level that is not shown."""
     check: ReactsToResponses = case.check

@@ -8,15 +8,13 @@ import re
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Location, Outcome
 from grader.core.quantities import seconds
-from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.graph import BidirectionalGraph
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogsPosition
-from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.received import LogsReceived
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import Publishes, Subscribes
-from grader.judging.diagnosis.rules import NO_SOURCE, Case, Clue, file_for, rule, silent_topic, unheard_topic
+from grader.judging.diagnosis.rules import NO_SOURCE, Case, Clue, file_for, hint_rule, silent_topic, unheard_topic
 from grader.judging.diagnosis.wiring import (
     MOST_MADE,
     Made,
@@ -43,6 +41,7 @@ from grader.judging.diagnosis.wiring import (
     variable_of,
     waits_for_ever,
 )
+from grader.judging.facts import PositionFacts, RateFacts
 from grader.judging.output import student_records
 from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, subtree, text_of
 from grader.judging.values import carries_number, student_endpoints
@@ -68,16 +67,18 @@ def _unseen(case: Case) -> _Unseen | None:
     if topic:
         source = file_for(case, "publisher", topic)
         return _Unseen(case, source, publish_calls(source, made_for(source, "publisher", topic)))
-    position = isinstance(case.check, LogsPosition) and case.evidence("right") == 0
-    if position or (isinstance(case.check, UsesLogger) and not student_records(case.trace, case.process)):
+    position = case.found(PositionFacts)
+    if (position is not None and position.right == 0) or (
+        isinstance(case.check, UsesLogger) and not student_records(case.trace, case.process)
+    ):
         return _Unseen(case, case.source, _unseen_logs(case))
     return None
 
 
 def _unseen_or_once(case: Case) -> _Unseen | None:
     """Return the calls that left no trace, or only one message."""
-    once = isinstance(case.check, TopicRate) and case.evidence("window") == 1
-    return _unseen(case) or (_Unseen(case, case.source, []) if once else None)
+    rate = case.found(RateFacts)
+    return _unseen(case) or (_Unseen(case, case.source, []) if rate is not None and rate.count == 1 else None)
 
 
 def _unseen_logs(case: Case) -> list[ast.Call]:
@@ -88,7 +89,7 @@ def _unseen_logs(case: Case) -> list[ast.Call]:
     return [n for n in logs if not any(covers(n, line) for line in seen)]
 
 
-@rule()
+@hint_rule(priority=8010)
 def _other_domain(case: Case) -> Clue | None:
     """The file chooses a ROS domain, and no other node sees what it makes."""
     seen = {e.participant for e in student_endpoints(case.trace)}
@@ -113,7 +114,7 @@ def _sets_domain(node: ast.Assign | ast.keyword) -> bool:
     return any(text_of(t.slice) == "ROS_DOMAIN_ID" for t in subscripts)
 
 
-@rule()
+@hint_rule(priority=8020)
 def _simulated_time(case: Case) -> Clue | None:
     """The node waits for simulated time, and nothing publishes it."""
     published = any(e.topic == "/clock" for e in student_endpoints(case.trace, "publisher"))
@@ -134,7 +135,7 @@ def _sets_simulated_time(call: ast.Call) -> bool:
     return "use_sim_time" in constants and any(value is True for value in constants)
 
 
-@rule()
+@hint_rule(priority=8030)
 def _wrong_topic(case: Case) -> Clue | None:
     for kind, topic in (("publisher", silent_topic(case)), ("subscription", unheard_topic(case))):
         ends = student_endpoints(case.trace, kind)
@@ -142,8 +143,7 @@ def _wrong_topic(case: Case) -> Clue | None:
             continue
         source = file_for(case, kind, topic)
         own = [(e, m) for e in ends if (m := made_for(source, kind, e.topic, short(e.type))) is not None]
-        type_ = str(getattr(case.check, "type", ""))
-        own = [(e, m) for e, m in own if type_ in ("", e.type)] or own
+        own = [(e, m) for e, m in own if case.type in ("", e.type)] or own
         if len({m.call for _, m in own}) == 1:
             return _elsewhere(source, own[0][1], own[0][0].topic, topic)
     return None
@@ -156,7 +156,7 @@ def _elsewhere(source: Source, item: Made, found: str, topic: str) -> Clue:
     return Clue(hint, source.place(item.call), key=f"topic:{source.file}:{item.call.lineno}")
 
 
-@rule(Publishes, Subscribes)
+@hint_rule(Publishes, Subscribes, priority=8040)
 def _wrong_type(case: Case) -> Clue | None:
     check: Publishes | Subscribes = case.check
     kind = "publisher" if isinstance(check, Publishes) else "subscription"
@@ -171,13 +171,12 @@ def _wrong_type(case: Case) -> Clue | None:
     return Clue(f"{hint}from {module.replace('/', '.')} import {name}", case.source.place(item.call))
 
 
-@rule()
+@hint_rule(priority=8050)
 def _latched_subscription(case: Case) -> Clue | None:
     """A subscription with transient_local durability receives only from publishers that offer it."""
-    check = case.check
-    topic = check.topic if isinstance(check, (Subscribes, LogsReceived)) else getattr(check, "input", "")
+    topic = next(iter(case.hears), "")
     listening = student_endpoints(case.trace, "subscription", topic)
-    deaf = not isinstance(check, (AnswersTogether, ThresholdResponse)) or bool(silent_topic(case))
+    deaf = not case.speaks or bool(silent_topic(case))
     if not listening or not deaf or any(e.durability != "transient_local" for e in listening):
         return None
     source = file_for(case, "subscription", topic)
@@ -189,7 +188,7 @@ def _latched_subscription(case: Case) -> Clue | None:
     return Clue(hint, source.place(policy if policy is not None else item.call), key=f"apart:{topic}")
 
 
-@rule(AnswersTogether, BidirectionalGraph)
+@hint_rule(AnswersTogether, BidirectionalGraph, priority=8060)
 def _kept_apart(case: Case) -> Clue | None:
     """Two files are correct by themselves, but cannot communicate."""
     check: AnswersTogether | BidirectionalGraph = case.check
@@ -221,7 +220,7 @@ def _file_with(case: Case, kind: str, topic: str) -> tuple[Source, Made] | None:
     return found[0] if len(found) == 1 else None
 
 
-@rule(BidirectionalGraph)
+@hint_rule(BidirectionalGraph, priority=8070)
 def _graph_topic(case: Case) -> Clue | None:
     """A direction is missing from the graph because one file uses another name for its topic."""
     check: BidirectionalGraph = case.check
@@ -237,7 +236,7 @@ def _graph_topic(case: Case) -> Clue | None:
     return None
 
 
-@rule()
+@hint_rule(priority=8080)
 def _no_subscription(case: Case) -> Clue | None:
     """One of two directions is not implemented."""
     check = case.check
@@ -256,7 +255,7 @@ def _no_subscription(case: Case) -> Clue | None:
     return Clue(hint, source.place(node), key=f"unheard:{topic}")
 
 
-@rule()
+@hint_rule(priority=8090)
 def _never_publishes(case: Case) -> Clue | None:
     topic = silent_topic(case)
     source = file_for(case, "publisher", topic)
@@ -267,7 +266,7 @@ def _never_publishes(case: Case) -> Clue | None:
     return Clue(hint, source.place(item.call))
 
 
-@rule(given=_unseen)
+@hint_rule(given=_unseen, priority=8100)
 def _destroyed_first(unseen: _Unseen) -> Clue | None:
     """The node is destroyed before it spins."""
     source = unseen.source
@@ -282,7 +281,7 @@ def _destroyed_first(unseen: _Unseen) -> Clue | None:
     return None
 
 
-@rule(given=_unseen)
+@hint_rule(given=_unseen, priority=8110)
 def _never_reached(unseen: _Unseen) -> Clue | None:
     """The code stands after a return, or is left by the one before."""
     source = unseen.source
@@ -305,7 +304,7 @@ def _after(source: Source, statement: ast.stmt) -> list[ast.stmt]:
     return []
 
 
-@rule(given=_unseen)
+@hint_rule(given=_unseen, priority=8120)
 def _lambda_names(unseen: _Unseen) -> Clue | None:
     """`lambda: self.tick` names the method and does not call it."""
     source = unseen.source
@@ -317,7 +316,7 @@ def _lambda_names(unseen: _Unseen) -> Clue | None:
     return None
 
 
-@rule(given=_unseen)
+@hint_rule(given=_unseen, priority=8130)
 def _never_true(unseen: _Unseen) -> Clue | None:
     """The condition around the code can never hold: a publisher is no None."""
     source = unseen.source
@@ -333,7 +332,7 @@ def _never_true(unseen: _Unseen) -> Clue | None:
     return None
 
 
-@rule(given=_unseen)
+@hint_rule(given=_unseen, priority=8140)
 def _kept_in_local(unseen: _Unseen) -> Clue | None:
     """What is logged or published waits for a value that the callback keeps in a local variable."""
     source = unseen.source
@@ -377,7 +376,7 @@ def _kept_elsewhere(source: Source, waited: str) -> Clue | None:
     return Clue(f"nothing sets {waited}: assign what came to it in {name}", source.place(function))
 
 
-@rule(given=_unseen)
+@hint_rule(given=_unseen, priority=8150)
 def _not_spun(unseen: _Unseen) -> Clue | None:
     source = unseen.source
     node = node_made(source)
@@ -388,7 +387,7 @@ def _not_spun(unseen: _Unseen) -> Clue | None:
     return Clue(f"{hint} is ever called", source.place(node))
 
 
-@rule(LogsReceived)
+@hint_rule(LogsReceived, priority=8160)
 def _no_number_heard(case: Case) -> Clue | None:
     """A subscription has a type without a number."""
     check: LogsReceived = case.check
@@ -400,7 +399,7 @@ def _no_number_heard(case: Case) -> Clue | None:
     return Clue(hint, case.source.place(item.call), key=f"apart:{check.topic}")
 
 
-@rule(given=_unseen_or_once)
+@hint_rule(given=_unseen_or_once, priority=8170)
 def _nested_spin(unseen: _Unseen) -> Clue | None:
     """The node spins in its constructor, or inside a callback, and never returns."""
     source = unseen.source
@@ -418,10 +417,11 @@ def _nested_spin(unseen: _Unseen) -> Clue | None:
     return None
 
 
-@rule(LogsPosition)
+@hint_rule(LogsPosition, priority=8180)
 def _stopped_listening(case: Case) -> Clue | None:
     """The subscription requests a deadline that no publisher offers, or is destroyed before the data arrives."""
-    if case.evidence("right") != 0 or case.evidence("cause") not in ("nothing", "constant"):
+    facts = case.found(PositionFacts)
+    if facts is None or facts.right != 0 or facts.cause not in ("nothing", "constant"):
         return None
     source = case.source
     for item in made(source, "subscription"):
@@ -437,14 +437,14 @@ def _stopped_listening(case: Case) -> Clue | None:
     return Clue(f"after {source.code(ends)} no message can come any more: keep listening", source.place(ends))
 
 
-@rule(given=_unseen)
+@hint_rule(given=_unseen, priority=8190)
 def _waits_for_service(unseen: _Unseen) -> Clue | None:
     call = next(unseen.source.calls("wait_for_service"), None)
     hint = "this waits for a service that nobody offers here: the node must start without it"
     return None if call is None else Clue(hint, unseen.source.place(call))
 
 
-@rule(given=_unseen_or_once)
+@hint_rule(given=_unseen_or_once, priority=8200)
 def _unwoken_rate(unseen: _Unseen) -> Clue | None:
     """`rate.sleep()` returns only if another thread spins the node."""
     source = unseen.source
@@ -457,7 +457,7 @@ def _unwoken_rate(unseen: _Unseen) -> Clue | None:
     return Clue(f"{hint}: use create_timer instead", source.place(sleeps[0]), key="unwoken_rate")
 
 
-@rule(given=_unseen)
+@hint_rule(given=_unseen, priority=8210)
 def _spins_first(unseen: _Unseen) -> Clue | None:
     """A loop spins once without a timeout before it publishes or logs, and nothing wakes the node."""
     source = unseen.source
@@ -471,7 +471,7 @@ def _spins_first(unseen: _Unseen) -> Clue | None:
     return None
 
 
-@rule(given=_unseen)
+@hint_rule(given=_unseen, priority=8220)
 def _held_up(unseen: _Unseen) -> Clue | None:
     """A long sleep, or a waiting loop, comes before the node spins."""
     source = unseen.source
@@ -497,7 +497,7 @@ def _waits_in_constructor(source: Source) -> Clue | None:
     return None
 
 
-@rule(given=_unseen)
+@hint_rule(given=_unseen, priority=8230)
 def _never_called(unseen: _Unseen) -> Clue | None:
     """The code that publishes or logs is in a method that nothing calls."""
     source = unseen.source
@@ -523,7 +523,7 @@ def _may_be_unused(source: Source, function: Function) -> bool:
     return plain and not function.name.startswith("__") and function.name != "main" and not function.decorator_list
 
 
-@rule(given=_unseen)
+@hint_rule(given=_unseen, priority=8240)
 def _late_timer(unseen: _Unseen) -> Clue | None:
     """The timer's period is longer than the observation."""
     source, latest_s = unseen.source, seconds(unseen.case.trace.stop_ns) - 1
@@ -536,7 +536,7 @@ def _late_timer(unseen: _Unseen) -> Clue | None:
     return None
 
 
-@rule(outcome=Outcome.NOT_MET, given=_unseen)
+@hint_rule(outcome=Outcome.NOT_MET, given=_unseen, priority=8250)
 def _only_when_told(unseen: _Unseen) -> Clue | None:
     """Everything is published in the callback of a topic without a publisher."""
     source, calls = unseen.source, unseen.calls
@@ -551,7 +551,7 @@ def _only_when_told(unseen: _Unseen) -> Clue | None:
     return None
 
 
-@rule()
+@hint_rule(priority=8260)
 def _waits_to_hear(case: Case) -> Clue | None:
     """Publishing depends on an attribute that only the callback of a silent topic sets."""
     topic = silent_topic(case)

@@ -12,7 +12,7 @@ from grader.core.trace import Message
 from grader.judging.checks.fields import FieldFunction, RandomInRange
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues
-from grader.judging.diagnosis.rules import Case, Clue, rule
+from grader.judging.diagnosis.rules import Case, Clue, hint_rule
 from grader.judging.diagnosis.wiring import (
     Constant,
     constant,
@@ -24,8 +24,9 @@ from grader.judging.diagnosis.wiring import (
     target_of,
     variable_of,
 )
+from grader.judging.facts import DrawFacts, SeriesFacts
 from grader.judging.source import Source, chain, first_line, last_name, words
-from grader.judging.values import as_number, leaves, published, published_numbers, value_at
+from grader.judging.values import as_number, leaves, number_path, published, published_numbers, value_at
 from grader.judging.wording import moment, number
 
 _DRAWS = words(
@@ -101,8 +102,8 @@ def _place_of(got: _Given) -> ast.AST:
 
 
 def _first_values(case: Case) -> list[object]:
-    values = case.evidence("first_values")
-    return list(values) if isinstance(values, (list, tuple)) else []
+    facts = case.found(SeriesFacts)
+    return [] if facts is None else list(facts.first)
 
 
 def draws(source: Source) -> list[ast.Call]:
@@ -110,7 +111,7 @@ def draws(source: Source) -> list[ast.Call]:
     return list(source.calls(*_DRAWS))
 
 
-@rule(FieldValues, given=_wrong)
+@hint_rule(FieldValues, given=_wrong, priority=10010)
 def _set_elsewhere(wrong: _Wrong) -> Clue | None:
     """The field gets the right number, in an object that is not published or is replaced before."""
     source = wrong.source
@@ -167,7 +168,7 @@ def _used(source: Source, owner: str, begin: ast.AST, end: ast.AST) -> bool:
     return any(chain(n) == owner and first_line(n) in rows for n in source.names())
 
 
-@rule(FieldValues, given=_wrong)
+@hint_rule(FieldValues, given=_wrong, priority=10020)
 def _misplaced_field(wrong: _Wrong) -> Clue | None:
     """The right numbers are in the wrong fields."""
     numbers = leaves(wrong.message.value)
@@ -202,7 +203,7 @@ def _exchanged(case: Case, path: str, other: str, value: float) -> bool:
     ) or _is(case.check.values.get(other, math.nan), value)
 
 
-@rule(FieldValues, given=_wrong)
+@hint_rule(FieldValues, given=_wrong, priority=10030)
 def _strayed_value(wrong: _Wrong) -> Clue | None:
     """A field that must be zero holds the value expected in another field."""
     numbers = leaves(wrong.message.value)
@@ -216,7 +217,7 @@ def _strayed_value(wrong: _Wrong) -> Clue | None:
     return None
 
 
-@rule(FieldValues, given=_wrong)
+@hint_rule(FieldValues, given=_wrong, priority=10040)
 def _not_every_message(wrong: _Wrong) -> Clue | None:
     """The field gets the right number, but not in every message."""
     source = wrong.source
@@ -244,7 +245,7 @@ def _not_every_message(wrong: _Wrong) -> Clue | None:
     return None
 
 
-@rule(FieldValues, given=_wrong)
+@hint_rule(FieldValues, given=_wrong, priority=10050)
 def _not_assigned(wrong: _Wrong) -> Clue | None:
     """`msg.linear.x == 0.5` compares, and `msg.linear.x: 0.5` is a note on the type: neither sets the field."""
     source = wrong.source
@@ -261,7 +262,7 @@ def _not_assigned(wrong: _Wrong) -> Clue | None:
     return None
 
 
-@rule(FieldValues, given=_wrong)
+@hint_rule(FieldValues, given=_wrong, priority=10060)
 def _field_never_set(wrong: _Wrong) -> Clue | None:
     """A required field is never set."""
     for path, value in wrong.found.items():
@@ -286,7 +287,7 @@ def _touched(source: Source, path: str) -> bool:
     return wholes or aliases or keywords or bool(list(source.calls("setattr", "deepcopy", "copy")))
 
 
-@rule(FieldValues, given=_wrong)
+@hint_rule(FieldValues, given=_wrong, priority=10070)
 def _wrong_number(wrong: _Wrong) -> Clue | None:
     """The only assignment of the field gives another number."""
     # first the field that should hold a value, then those that should be zero
@@ -320,7 +321,7 @@ def _number_clue(source: Source, got: _Given, path: str, value: float, want: flo
     return Clue(hint, source.place(place))
 
 
-@rule(FieldFunction)
+@hint_rule(FieldFunction, priority=10080)
 def _set_after_publishing(case: Case) -> Clue | None:
     """The field is set after the message was published."""
     source, values = case.source, _first_values(case)
@@ -345,7 +346,7 @@ def _publishes(call: ast.Call, name: str) -> bool:
     return bool(name) and any(chain(argument) == name for argument in call.args)
 
 
-@rule(FieldFunction, problem=ProblemKind.WRONG_VALUE)
+@hint_rule(FieldFunction, problem=ProblemKind.WRONG_VALUE, priority=10090)
 def _in_degrees(case: Case) -> Clue | None:
     """The argument of a sine is turned into degrees."""
     source = case.source
@@ -359,7 +360,7 @@ def _in_degrees(case: Case) -> Clue | None:
     return Clue(hint, source.place(turned[0]))
 
 
-@rule(FieldFunction)
+@hint_rule(FieldFunction, priority=10100)
 def _other_function(case: Case) -> Clue | None:
     """`cos` for `sin`, or a division that rounds down."""
     source, formula = case.source, str(case.check.formula)
@@ -377,7 +378,7 @@ def _other_function(case: Case) -> Clue | None:
     return None
 
 
-@rule(FieldFunction)
+@hint_rule(FieldFunction, priority=10110)
 def _counter_reset(case: Case) -> Clue | None:
     """The counter is set to its first value before each message."""
     source = case.source
@@ -393,7 +394,7 @@ def _counter_reset(case: Case) -> Clue | None:
     return None
 
 
-@rule(FieldFunction)
+@hint_rule(FieldFunction, priority=10120)
 def _counts_sometimes(case: Case) -> Clue | None:
     """The counter grows only on a condition, or `=+ 1` gives it the same number again and again."""
     source = case.source
@@ -422,7 +423,7 @@ def _publishes_beside(source: Source, test: ast.If) -> bool:
     return bool(sends) and not any(test in list(source.around(c, ast.If)) for c in sends)
 
 
-@rule(FieldFunction, problem=ProblemKind.WRONG_VALUE)
+@hint_rule(FieldFunction, problem=ProblemKind.WRONG_VALUE, priority=10130)
 def _needless_pi(case: Case) -> Clue | None:
     """The value is computed with pi, which the formula does not have."""
     formula = str(case.check.formula)
@@ -435,7 +436,7 @@ def _needless_pi(case: Case) -> Clue | None:
     return None
 
 
-@rule(FieldFunction)
+@hint_rule(FieldFunction, priority=10140)
 def _counter_never_changes(case: Case) -> Clue | None:
     """The counter never changes."""
     values = _first_values(case)
@@ -447,7 +448,7 @@ def _counter_never_changes(case: Case) -> Clue | None:
     return None
 
 
-@rule(FieldFunction, problem=ProblemKind.COUNT_START)
+@hint_rule(FieldFunction, problem=ProblemKind.COUNT_START, priority=10150)
 def _count_starts_elsewhere(case: Case) -> Clue | None:
     """The count starts at another number than 0, or is incremented before its use."""
     source, problem = case.source, case.verdict.problem
@@ -493,7 +494,7 @@ def _attributes(value: ast.expr) -> Iterator[str]:
             yield chain(node)
 
 
-@rule(RandomInRange, problem=ProblemKind.NO_NUMBER)
+@hint_rule(RandomInRange, problem=ProblemKind.NO_NUMBER, priority=10160)
 def _drawn_as_text(case: Case) -> Clue | None:
     """The type of the messages has no number."""
     item = made_for(case.source, "publisher", case.check.topic)
@@ -503,12 +504,13 @@ def _drawn_as_text(case: Case) -> Clue | None:
     return Clue(hint, case.source.place(item.call), key=f"apart:{case.check.topic}")
 
 
-@rule(RandomInRange)
+@hint_rule(RandomInRange, priority=10170)
 def _draw_limits(case: Case) -> Clue | None:
     """The limits of the random draw are wrong."""
     source, check = case.source, case.check
     calls = draws(source)
-    if case.evidence("outside") is None or len(calls) != 1:
+    facts = case.found(DrawFacts)
+    if facts is None or not facts.outside or len(calls) != 1:
         return None
     call, low, high = calls[0], number(check.low), number(check.high)
     right = f"random.uniform({float(check.low)}, {float(check.high)})"
@@ -556,7 +558,7 @@ def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: in
     return left * right if isinstance(node.op, ast.Mult) else None
 
 
-@rule(RandomInRange)
+@hint_rule(RandomInRange, priority=10180)
 def _drawn_and_lost(case: Case) -> Clue | None:
     """The drawn number is put into a variable that is not used."""
     source, calls = case.source, draws(case.source)
@@ -571,27 +573,28 @@ def _drawn_and_lost(case: Case) -> Clue | None:
     return Clue(hint, source.place(calls[0]))
 
 
-@rule(RandomInRange)
+@hint_rule(RandomInRange, priority=10190)
 def _shifted_draw(case: Case) -> Clue | None:
     """Something is added to a draw between the right limits."""
     source, check, calls = case.source, case.check, draws(case.source)
-    if case.evidence("outside") is None or len(calls) != 1 or last_name(calls[0].func) not in ("uniform", "randint"):
+    facts = case.found(DrawFacts)
+    if facts is None or not facts.outside or len(calls) != 1:
+        return None
+    if last_name(calls[0].func) not in ("uniform", "randint"):
         return None
     around = source.parents.get(calls[0])
     limits = [number_at(source, a) for a in calls[0].args]
-    least, most = case.evidence("min"), case.evidence("max")
     if not isinstance(around, ast.BinOp) or limits != [check.low, check.high]:
         return None
     ends = [end for limit in (check.low, check.high) if (end := _with(source, around, calls[0], limit)) is not None]
-    known = len(ends) == len(limits) and isinstance(least, float) and isinstance(most, float)
     # single precision rounds by less than this
-    if not known or not min(ends) - 1e-3 <= least or not most <= max(ends) + 1e-3:  # type: ignore[operator]
+    if len(ends) < len(limits) or not min(ends) - 1e-3 <= facts.least or not facts.most <= max(ends) + 1e-3:
         return None
     hint = f"{source.code(around, 60)} moves the values out of {number(check.low)} to {number(check.high)}: write "
     return Clue(f"{hint}{source.code(calls[0], 50)} alone", source.place(around))
 
 
-@rule(RandomInRange, problem=ProblemKind.CONSTANT)
+@hint_rule(RandomInRange, problem=ProblemKind.CONSTANT, priority=10200)
 def _drawn_once(case: Case) -> Clue | None:
     """The value is drawn only once at the start, or the seed is set each time."""
     source = case.source
@@ -611,22 +614,26 @@ def _drawn_once(case: Case) -> Clue | None:
     return None
 
 
-@rule(RandomInRange)
+@hint_rule(RandomInRange, priority=10210)
 def _not_drawn(case: Case) -> Clue | None:
     """The file draws no random numbers."""
     source, check = case.source, case.check
-    if case.evidence("pattern") is None or draws(source):
+    facts = case.found(DrawFacts)
+    if facts is None or not facts.pattern or draws(source):
         return None
     values = published_numbers(case.trace, check.topic)
-    places = [g for leaf in ("data", "temperature") for g in given_leaf(source, leaf)]
-    if len(places) != 1 or not values:
+    if not values:
+        return None
+    path = check.field or number_path(published(case.trace, check.topic)[0].value)
+    places = given_leaf(source, path.rpartition(".")[2])
+    if len(places) != 1:
         return None
     code = source.code(places[0])
     hint = f"{code} draws nothing: random.uniform({float(check.low)}, {float(check.high)}) gives a new value each time"
     return Clue(hint, source.place(places[0]))
 
 
-@rule(AnswersTogether, problem=ProblemKind.NEVER_CHANGES)
+@hint_rule(AnswersTogether, problem=ProblemKind.NEVER_CHANGES, priority=10220)
 def _never_crosses(case: Case) -> Clue | None:
     """All drawn values are on one side of the controller's threshold."""
     check: AnswersTogether = case.check

@@ -1,0 +1,360 @@
+"""The public interface: what examples, rubrics of one's own and other programs may import; any other name is private.
+
+    from grader.api import Finding, Trace, met, not_met
+
+A name is imported when it is first looked up, because simulations import this module in the worker, which has neither
+msgspec nor pydantic, and because all of it takes half a second.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from grader.core.chart import Band as Band
+    from grader.core.chart import Chart as Chart
+    from grader.core.chart import Level as Level
+    from grader.core.chart import Look as Look
+    from grader.core.chart import Panel as Panel
+    from grader.core.chart import Point as Point
+    from grader.core.chart import Series as Series
+    from grader.core.chart import Tone as Tone
+    from grader.core.errors import ClassError as ClassError
+    from grader.core.errors import EnvironmentFault as EnvironmentFault
+    from grader.core.errors import EvidenceError as EvidenceError
+    from grader.core.errors import GraderError as GraderError
+    from grader.core.errors import HarnessError as HarnessError
+    from grader.core.errors import KeyFileError as KeyFileError
+    from grader.core.errors import RecordingError as RecordingError
+    from grader.core.errors import RubricError as RubricError
+    from grader.core.errors import SubmissionError as SubmissionError
+    from grader.core.errors import VariantError as VariantError
+    from grader.core.exercise import NODE_GRAPH as NODE_GRAPH
+    from grader.core.exercise import Check as Check
+    from grader.core.exercise import Finding as Finding
+    from grader.core.exercise import Location as Location
+    from grader.core.exercise import Outcome as Outcome
+    from grader.core.exercise import Problem as Problem
+    from grader.core.exercise import ProblemKind as ProblemKind
+    from grader.core.exercise import Roles as Roles
+    from grader.core.quantities import NS_PER_S as NS_PER_S
+    from grader.core.quantities import ActionType as ActionType
+    from grader.core.quantities import DurationNs as DurationNs
+    from grader.core.quantities import FieldNumber as FieldNumber
+    from grader.core.quantities import Hertz as Hertz
+    from grader.core.quantities import MessageType as MessageType
+    from grader.core.quantities import Pattern as Pattern
+    from grader.core.quantities import ServiceType as ServiceType
+    from grader.core.quantities import Topic as Topic
+    from grader.core.quantities import counted as counted
+    from grader.core.quantities import seconds as seconds
+    from grader.core.quantities import within as within
+    from grader.core.report import ExerciseReport as ExerciseReport
+    from grader.core.report import Report as Report
+    from grader.core.report import Summary as Summary
+    from grader.core.report import Verdict as Verdict
+    from grader.core.trace import ClockKind as ClockKind
+    from grader.core.trace import Delivery as Delivery
+    from grader.core.trace import Endpoint as Endpoint
+    from grader.core.trace import Fault as Fault
+    from grader.core.trace import FaultKind as FaultKind
+    from grader.core.trace import GraphSnapshot as GraphSnapshot
+    from grader.core.trace import LogRecord as LogRecord
+    from grader.core.trace import Mark as Mark
+    from grader.core.trace import Message as Message
+    from grader.core.trace import OutputLine as OutputLine
+    from grader.core.trace import Request as Request
+    from grader.core.trace import Response as Response
+    from grader.core.trace import ServiceEnd as ServiceEnd
+    from grader.core.trace import Trace as Trace
+    from grader.judging.charts import series as series
+    from grader.judging.charts import time_chart as time_chart
+    from grader.judging.diagnosis.rules import Case as Case
+    from grader.judging.diagnosis.rules import Clue as Clue
+    from grader.judging.diagnosis.rules import Crash as Crash
+    from grader.judging.diagnosis.rules import Rule as Rule
+    from grader.judging.diagnosis.rules import crash_rule as crash_rule
+    from grader.judging.diagnosis.rules import file_for as file_for
+    from grader.judging.diagnosis.rules import hint_rule as hint_rule
+    from grader.judging.diagnosis.rules import lines_of as lines_of
+    from grader.judging.diagnosis.rules import silent_topic as silent_topic
+    from grader.judging.diagnosis.rules import unheard_topic as unheard_topic
+    from grader.judging.diagnosis.wiring import Constant as Constant
+    from grader.judging.diagnosis.wiring import Made as Made
+    from grader.judging.diagnosis.wiring import conditions as conditions
+    from grader.judging.diagnosis.wiring import constant as constant
+    from grader.judging.diagnosis.wiring import given_leaf as given_leaf
+    from grader.judging.diagnosis.wiring import is_flag as is_flag
+    from grader.judging.diagnosis.wiring import is_log as is_log
+    from grader.judging.diagnosis.wiring import made as made
+    from grader.judging.diagnosis.wiring import made_for as made_for
+    from grader.judging.diagnosis.wiring import message_classes as message_classes
+    from grader.judging.diagnosis.wiring import names_in as names_in
+    from grader.judging.diagnosis.wiring import node_made as node_made
+    from grader.judging.diagnosis.wiring import number_at as number_in_code
+    from grader.judging.diagnosis.wiring import publish_calls as publish_calls
+    from grader.judging.diagnosis.wiring import reached as reached
+    from grader.judging.diagnosis.wiring import received as received
+    from grader.judging.diagnosis.wiring import roots as roots
+    from grader.judging.diagnosis.wiring import runs as runs
+    from grader.judging.diagnosis.wiring import short as short
+    from grader.judging.diagnosis.wiring import spins as spins
+    from grader.judging.diagnosis.wiring import target_of as target_of
+    from grader.judging.diagnosis.wiring import text as text_in_code
+    from grader.judging.diagnosis.wiring import timer_code as timer_code
+    from grader.judging.diagnosis.wiring import used as used
+    from grader.judging.diagnosis.wiring import value_of as value_of
+    from grader.judging.diagnosis.wiring import variable_of as variable_of
+    from grader.judging.facts import AnswerFacts as AnswerFacts
+    from grader.judging.facts import AnswerRow as AnswerRow
+    from grader.judging.facts import DrawFacts as DrawFacts
+    from grader.judging.facts import LogFacts as LogFacts
+    from grader.judging.facts import LogPaceFacts as LogPaceFacts
+    from grader.judging.facts import OtherEnd as OtherEnd
+    from grader.judging.facts import PositionFacts as PositionFacts
+    from grader.judging.facts import RateFacts as RateFacts
+    from grader.judging.facts import SeriesFacts as SeriesFacts
+    from grader.judging.findings import explain_fault as explain_fault
+    from grader.judging.findings import explain_no_client as explain_no_client
+    from grader.judging.findings import explain_no_message as explain_no_message
+    from grader.judging.findings import explain_no_server as explain_no_server
+    from grader.judging.findings import explain_no_subscription as explain_no_subscription
+    from grader.judging.findings import fault_sentence as fault_sentence
+    from grader.judging.findings import faulted as faulted
+    from grader.judging.findings import first_fault as first_fault
+    from grader.judging.findings import met as met
+    from grader.judging.findings import not_met as not_met
+    from grader.judging.findings import only_printed as only_printed
+    from grader.judging.findings import partly as partly
+    from grader.judging.findings import waiting_for as waiting_for
+    from grader.judging.output import printed_lines as printed_lines
+    from grader.judging.output import student_records as student_records
+    from grader.judging.output import written as written
+    from grader.judging.plots import Drawing as Drawing
+    from grader.judging.plots import Plot as Plot
+    from grader.judging.service_calls import Call as Call
+    from grader.judging.service_calls import calls_of as calls_of
+    from grader.judging.source import Source as Source
+    from grader.judging.source import argument as argument
+    from grader.judging.source import chain as chain
+    from grader.judging.source import covers as covers
+    from grader.judging.source import first_line as first_line
+    from grader.judging.source import last_line as last_line
+    from grader.judging.source import last_name as last_name
+    from grader.judging.source import parameters as parameters
+    from grader.judging.source import subtree as subtree
+    from grader.judging.source import text_of as text_of
+    from grader.judging.source import words as words
+    from grader.judging.values import Held as Held
+    from grader.judging.values import Reading as Reading
+    from grader.judging.values import delivered as delivered
+    from grader.judging.values import delivered_numbers as delivered_numbers
+    from grader.judging.values import held as held
+    from grader.judging.values import number_at as number_at
+    from grader.judging.values import published as published
+    from grader.judging.values import published_numbers as published_numbers
+    from grader.judging.values import student_endpoints as student_endpoints
+    from grader.judging.values import value_at as value_at
+    from grader.judging.wording import listed as listed
+    from grader.judging.wording import moment as moment
+    from grader.judging.wording import number as number
+    from grader.judging.wording import numbers as numbers
+    from grader.judging.wording import quote as quote
+    from grader.judging.wording import span as span
+    from grader.simulation import DifferentialDrive as DifferentialDrive
+    from grader.simulation import Moment as Moment
+    from grader.simulation import Output as Output
+    from grader.simulation import Simulation as Simulation
+    from grader.simulation import Turtle as Turtle
+    from grader.simulation import Unicycle as Unicycle
+    from grader.testing import TraceBuilder as TraceBuilder
+    from grader.testing import explain as explain
+    from grader.testing import judge as judge
+
+#: The public names by topic and by the module that they are in.
+CONTENTS: dict[str, dict[str, str]] = {
+    "Errors": {
+        "grader.core.errors": (
+            "GraderError RubricError SubmissionError RecordingError EvidenceError ClassError VariantError "
+            "KeyFileError EnvironmentFault HarnessError"
+        ),
+    },
+    "Results": {
+        "grader.core.report": "Report ExerciseReport Verdict Summary",
+        "grader.core.exercise": "Outcome",
+    },
+    "Checks": {
+        "grader.core.exercise": "Check Roles NODE_GRAPH Finding Problem ProblemKind Location",
+        "grader.judging.findings": (
+            "met partly not_met only_printed waiting_for explain_fault faulted first_fault fault_sentence "
+            "explain_no_message explain_no_subscription explain_no_server explain_no_client"
+        ),
+    },
+    "Parameters": {
+        "grader.core.quantities": "DurationNs Hertz FieldNumber Topic MessageType ServiceType ActionType Pattern",
+    },
+    "Recordings": {
+        "grader.core.trace": (
+            "Trace Message Delivery LogRecord OutputLine Request Response Fault FaultKind GraphSnapshot Endpoint "
+            "ServiceEnd Mark ClockKind"
+        ),
+        "grader.judging.values": (
+            "Reading Held published delivered published_numbers delivered_numbers held value_at number_at "
+            "student_endpoints"
+        ),
+        "grader.judging.output": "student_records printed_lines written",
+        "grader.judging.service_calls": "Call calls_of",
+    },
+    "Text": {
+        "grader.core.quantities": "NS_PER_S seconds counted within",
+        "grader.judging.wording": "moment span number numbers quote listed",
+    },
+    "Charts": {
+        "grader.judging.plots": "Drawing Plot",
+        "grader.core.chart": "Chart Panel Series Point Band Level Look Tone",
+        "grader.judging.charts": "series time_chart",
+    },
+    "Hint rules": {
+        "grader.judging.diagnosis.rules": (
+            "Rule Clue Case Crash hint_rule crash_rule silent_topic unheard_topic file_for lines_of"
+        ),
+        "grader.judging.facts": (
+            "RateFacts SeriesFacts DrawFacts AnswerRow AnswerFacts LogFacts PositionFacts LogPaceFacts OtherEnd"
+        ),
+    },
+    "Source code": {
+        "grader.judging.source": (
+            "Source first_line last_line covers last_name chain argument parameters text_of subtree words"
+        ),
+        "grader.judging.diagnosis.wiring": (
+            "Constant Made constant given_leaf made made_for target_of roots reached runs names_in is_log "
+            "publish_calls used conditions is_flag spins node_made variable_of timer_code short received "
+            "message_classes value_of number_in_code text_in_code"
+        ),
+    },
+    "Simulations": {
+        "grader.simulation": "Simulation Moment Output DifferentialDrive Turtle Unicycle",
+    },
+    "Tests": {
+        "grader.testing": "TraceBuilder judge explain",
+    },
+}
+#: Public name -> its name in its own module, where no other function has it.
+_RENAMED = {"number_in_code": "number_at", "text_in_code": "text"}
+_HOMES = {name: home for homes in CONTENTS.values() for home, names in homes.items() for name in names.split()}
+
+__all__ = ["grade", "observe", "rejudge", *_HOMES]  # noqa: PLE0604  the table is the list
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first looked up."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__} has no attribute {name}")
+    value = getattr(importlib.import_module(_HOMES[name]), _RENAMED.get(name, name))
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return sorted(__all__)
+
+
+def grade(  # noqa: PLR0913  options of the command
+    submission: str | Path,
+    *,
+    rubrics: Sequence[str | Path] = (),
+    exercises: Sequence[str] = (),
+    seed: int | None = None,
+    interfaces: Sequence[str | Path] = (),
+    clock: str = "auto",
+    isolation: str = "auto",
+    evidence: str | Path | None = None,
+) -> Report:
+    """Grade a submission, as `grade SUBMISSION` does.
+
+    Args:
+        submission: A folder, an archive, or a `.py` file.
+        rubrics: Rubric files; without any, the exercises that come with the grader.
+        exercises: Exercises to grade, by id or number; all of the rubrics if empty.
+        seed: Seed of all drawn values; drawn from the submission if None.
+        interfaces: Folders with packages of messages that are not installed.
+        clock: `virtual`, `wall`, or `auto`.
+        isolation: `auto`, `none`, or the name of a sandbox.
+        evidence: A new folder that keeps the recordings, for `rejudge`; None to keep none.
+
+    Raises:
+        GraderError: The submission, a rubric or the machine cannot be used; its class says who must act.
+    """
+    from grader.app import start  # noqa: PLC0415  takes long
+    from grader.app.keeping import EvidenceWriter  # noqa: PLC0415
+    from grader.app.request import GradeRequest  # noqa: PLC0415
+
+    request = GradeRequest(
+        str(submission),
+        exercises=tuple(exercises),
+        rubrics=tuple(map(Path, rubrics)),
+        seed=seed,
+        interfaces=tuple(map(Path, interfaces)),
+        clock=clock,
+        isolation=isolation,
+    )
+    writer = EvidenceWriter([Path(evidence)] if evidence is not None else [], request)
+    report = start.grade(request, _quiet, writer.remember)
+    writer.write(report)
+    return report
+
+
+def observe(
+    *programs: str | Path,
+    duration_s: float = 10.0,
+    interfaces: Sequence[str | Path] = (),
+    clock: str = "auto",
+    isolation: str = "auto",
+) -> Summary:
+    """Run programs together without a rubric, as `grade observe PROGRAM...` does, and return what they did.
+
+    Args:
+        programs: Python files, launch files, packages, workspaces, or executables as `FOLDER/NAME`.
+        duration_s: How long they run, in seconds of their clock.
+        interfaces: Folders with packages of messages that are not installed.
+        clock: `virtual`, `wall`, or `auto`.
+        isolation: `auto`, `none`, or the name of a sandbox.
+
+    Raises:
+        GraderError: A program or the machine cannot be used; its class says who must act.
+    """
+    from grader.app.observe import ObserveRequest  # noqa: PLC0415  takes long
+    from grader.app.observe import observe as observed  # noqa: PLC0415
+    from grader.core.quantities import nanoseconds  # noqa: PLC0415
+
+    files, folders = tuple(map(Path, programs)), tuple(map(Path, interfaces))
+    request = ObserveRequest(files, nanoseconds(duration_s), clock=clock, isolation=isolation, interfaces=folders)
+    return observed(request, _quiet)
+
+
+def rejudge(evidence: str | Path, *, rubrics: Sequence[str | Path] = (), exercises: Sequence[str] = ()) -> Report:
+    """Judge kept recordings again without running anything, as `grade rejudge EVIDENCE` does.
+
+    Args:
+        evidence: The folder that `grade` kept.
+        rubrics: Rubric files; without any, the exercises that come with the grader.
+        exercises: Exercises to judge; those that were graded if empty.
+
+    Raises:
+        EvidenceError: The folder is damaged, or has no recording of these exercises.
+        RubricError: A rubric cannot be used.
+    """
+    from grader.app.rejudge import judgement  # noqa: PLC0415  takes long
+    from grader.app.rejudge import rejudge as judged_again  # noqa: PLC0415
+    from grader.execution.evidence.store import open_evidence  # noqa: PLC0415
+
+    how = judgement(tuple(exercises), tuple(map(Path, rubrics)), pictures=True)
+    return judged_again(open_evidence(Path(evidence)), how)
+
+
+def _quiet(step: str) -> None:
+    """Report progress to nobody."""

@@ -1,0 +1,83 @@
+"""Typed records that checks hand to hint rules; reports show the evidence of a finding, and none of these."""
+
+from __future__ import annotations
+
+import math
+
+from grader.core.dataclass import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class RateFacts:
+    """The pace of the messages that were measured; NaN if there are too few for it."""
+
+    count: int  # messages measured
+    first_s: float  # time of the first, since the scenario began
+    rate_hz: float = math.nan
+    longest_s: float = math.nan  # longest time from one message to the next
+
+
+@dataclass(frozen=True, slots=True)
+class SeriesFacts:
+    """The first values of a field."""
+
+    first: tuple[float, ...]  # in the order of the messages, ten at most
+
+
+@dataclass(frozen=True, slots=True)
+class DrawFacts:
+    """What is wrong with numbers that should be random."""
+
+    least: float  # smallest value
+    most: float  # largest value
+    outside: int = 0  # values out of range
+    pattern: str = ""  # what they follow instead of chance, such as `constant`; empty if they are random
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerRow:
+    """One input that was held for some time, and the answer to it."""
+
+    input: float
+    answer: float | None  # the last answer while it was held; None for none
+    expected: float
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerFacts:
+    """The answers of a controller that are wrong."""
+
+    rows: tuple[AnswerRow, ...] = ()  # in the order of the inputs, if each one was held for some time
+    late: bool = False  # whether each answer fits an earlier input
+
+
+@dataclass(frozen=True, slots=True)
+class LogFacts:
+    """What a process logs of the values that it received."""
+
+    expected: int  # values that it should have logged
+    missing: int  # those that it did not
+
+
+@dataclass(frozen=True, slots=True)
+class PositionFacts:
+    """Why logs do not show a position."""
+
+    cause: str  # such as `swapped`; `nothing` if there is no log at all
+    right: int  # logs that show it
+
+
+@dataclass(frozen=True, slots=True)
+class LogPaceFacts:
+    """How often a process logs."""
+
+    count: int  # logs
+    average_s: float  # average time from one log to the next; 0 if there is only one
+
+
+@dataclass(frozen=True, slots=True)
+class OtherEnd:
+    """What a node has in place of the subscription, server or client that is missing."""
+
+    name: str  # its topic or service
+    type: str  # its type

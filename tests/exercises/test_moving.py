@@ -1,0 +1,71 @@
+"""An exercise can be moved to another repository: copies of its folders grade as the originals do, byte for byte."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from archive import judged, read_archive
+from sample_folders import ARCHIVE, EXERCISES, expected_in
+
+from grader.core.rubric_files import rubric_file, rubrics_in
+from grader.reporting.json_report import dumps
+from grader.rubrics.loader import read_rubric
+
+ROOT = EXERCISES.parents[1]
+NAMES = sorted(path.name for path in EXERCISES.glob("*/"))
+#: Graded in each run: one that plays a recording of its own, and one of two nodes.
+USUAL = ("exercise_2", "exercise_3")
+GRADE = (sys.executable, "-c", "from grader.cli.main import main; main()")
+
+
+@pytest.fixture
+def moved(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+    """A folder with nothing but the two folders of an exercise, its solution and its template."""
+    place = tmp_path / "course"
+    shutil.copytree(ROOT / "rubrics" / request.param, place / "rubric", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(EXERCISES / request.param, place / "tests")
+    return place
+
+
+def test_each_exercise_has_both_folders() -> None:
+    """Its rubric lies in one, its test submissions in the other."""
+    assert [path.parent.name for path in rubrics_in(ROOT / "rubrics")] == NAMES
+
+
+@pytest.mark.parametrize("moved", NAMES, indirect=True)
+def test_what_was_recorded_is_judged_the_same_elsewhere(moved: Path) -> None:
+    """By the copied rubric, from the copied recordings: the same reports."""
+    exercise = read_rubric(rubric_file(moved / "rubric"))
+    differ = [
+        name
+        for name, recorded in read_archive(moved / "tests" / ARCHIVE).items()
+        if dumps(judged(recorded, {exercise.id: exercise})) != recorded.report.decode()
+    ]
+    assert differ == []
+    assert expected_in(moved / "tests").keys() == read_archive(moved / "tests" / ARCHIVE).keys()
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    "moved",
+    [pytest.param(name, marks=[] if name in USUAL else pytest.mark.nightly) for name in NAMES],
+    indirect=True,
+)
+def test_a_copied_exercise_grades_real_nodes(moved: Path) -> None:
+    """The reference solution gets every point, and a wrong program loses what it should."""
+    exercise = read_rubric(rubric_file(moved / "rubric"))
+    right = moved / "right"
+    right.mkdir()
+    for file in exercise.files:
+        shutil.copy(ROOT / "reference_solutions" / file, right)
+    wrong = next(name for name in expected_in(moved / "tests") if name.startswith("wrong/"))
+    for submission, lost in (("right", {}), (f"tests/{wrong}", expected_in(moved / "tests")[wrong]["expected"])):
+        words = [submission, "--rubric", "rubric", "--seed", "1", "--json", "--no-progress"]
+        done = subprocess.run([*GRADE, *words], cwd=moved, check=False, capture_output=True, text=True)
+        verdicts = [v for e in json.loads(done.stdout)["exercises"] for v in e["criteria"]]
+        assert {v["id"]: v["outcome"] for v in verdicts if v["outcome"] != "met"} == lost, done.stderr

@@ -1,0 +1,144 @@
+"""The public interface: its names and signatures are pinned, and nothing else of the package is used from outside."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import os
+import re
+import subprocess
+import sys
+import textwrap
+from collections.abc import Iterator
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import grader
+from grader import api
+from grader.core import errors, exercise
+
+ROOT = Path(__file__).resolve().parent.parent
+PINNED = ROOT / "tests" / "api.txt"
+#: Python that authors write, or copy from a page.
+PAGES = sorted([*(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").rglob("*.md"), ROOT / "README.md"])
+SCRIPTS = sorted([*(ROOT / "examples").rglob("*.py")])
+
+
+def signature(value: Any) -> str:
+    if inspect.isclass(value) and issubclass(value, BaseException):
+        return f"({value.__bases__[0].__name__})"
+    if inspect.isclass(value) and issubclass(value, Enum):
+        return f": {' '.join(value.__members__)}"
+    if inspect.isclass(value) and getattr(value, "_is_protocol", False):
+        return f": {' '.join(sorted(name for name in vars(value) if not name.startswith('_')))}"
+    return re.sub(r"<[^<>]* at 0x[0-9a-f]+>", "...", str(inspect.signature(value)))
+
+
+def described(name: str) -> str:
+    value = getattr(api, name)
+    plain = inspect.isfunction(value) or (inspect.isclass(value) and not hasattr(value, "__args__"))
+    return f"{name}{signature(value)}" if plain else f"{name}: {value!r}"
+
+
+def test_names_and_signatures_are_pinned() -> None:
+    """A change of the file is a change for everybody who wrote a check; `UPDATE_GOLDEN=1` writes it."""
+    text = "\n".join(map(described, api.__all__)) + "\n"
+    if os.environ.get("UPDATE_GOLDEN"):
+        PINNED.write_text(text, encoding="utf-8")
+    assert PINNED.read_text(encoding="utf-8") == text
+
+
+def test_every_name_is_there_once_and_type_checkers_know_it() -> None:
+    """The table, by which names are imported, and the imports for type checkers are the same."""
+    tree = ast.parse(Path(api.__file__).read_text(encoding="utf-8"))
+    block = next(node for node in tree.body if isinstance(node, ast.If))
+    typed = {
+        str(alias.asname): (str(node.module), alias.name)
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert len(api.__all__) == len(set(api.__all__))
+    assert set(api.__all__) == {*typed, "grade", "observe", "rejudge"}
+    assert set(dir(api)) == set(api.__all__)
+    for name, (home, own) in typed.items():
+        assert getattr(api, name) is getattr(sys.modules[home], own)
+    with pytest.raises(AttributeError, match="has no attribute nothing"):
+        api.nothing  # noqa: B018
+
+
+def test_every_error_is_public_and_in_the_tree_of_the_docstring() -> None:
+    """Who must act is said there for each."""
+    known = {name for name, kind in vars(errors).items() if isinstance(kind, type) and issubclass(kind, Exception)}
+    assert known == set(api.CONTENTS["Errors"]["grader.core.errors"].split())
+    assert all(re.search(rf"\b{name}\b", errors.__doc__ or "") for name in known)
+
+
+def grader_imports(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.split(".")[0] == "grader")
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "grader":
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def private(source: str) -> list[str]:
+    """Return what a program imports of the package and may not."""
+    public = {f"grader.api.{name}" for name in api.__all__}
+    return [name for name in grader_imports(ast.parse(source)) if name not in public]
+
+
+def test_examples_and_pages_use_only_public_names() -> None:
+    """So does what is copied from them."""
+    texts = {str(path): path.read_text(encoding="utf-8") for path in SCRIPTS}
+    for page in PAGES:
+        blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+        texts |= {f"{page}, block {n}": textwrap.dedent(block) for n, block in enumerate(blocks, 1)}
+    assert {where: private(text) for where, text in texts.items() if private(text)} == {}
+    assert sum(bool(list(grader_imports(ast.parse(text)))) for text in texts.values()) > 3
+
+
+@pytest.mark.parametrize(
+    "line", ["import grader.core.trace", "from grader.core.trace import Trace", "from grader.api import secret"]
+)
+def test_a_planted_import_is_found(line: str) -> None:
+    """The rule can fail."""
+    assert private(line)
+
+
+def modules_of(code: str) -> set[str]:
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}\nimport sys\nprint(*sys.modules)"], capture_output=True, text=True, check=True
+    )
+    return set(done.stdout.split())
+
+
+def test_a_simulation_imports_neither_judging_nor_its_libraries() -> None:
+    """It runs beside the nodes, where they are not there."""
+    names = " ".join(api.CONTENTS["Simulations"].values()).replace(" ", ", ")
+    loaded = modules_of(f"from grader.api import DurationNs, Topic, seconds, {names}")
+    assert "grader.simulation.robots" in loaded
+    assert not {name for name in loaded if re.match(r"grader\.(judging|reporting|app)|msgspec|pydantic", name)}
+
+
+def test_commands_do_not_import_the_public_interface() -> None:
+    """It is for others."""
+    assert "grader.api" not in modules_of("import grader.cli.main")
+
+
+def test_the_members_of_a_check_are_declared_in_one_place() -> None:
+    """What the grader asks of a check is a member of the protocol; nothing else is looked up by a literal name."""
+    members = {name for name in vars(exercise.Check) if not name.startswith("_")}
+    assert members == {"judge", "roles", "expected", "drawing", "judge_sources", "of_beginning"}
+    asked: set[str] = set()
+    for path in (Path(grader.__file__).parent / "judging").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            named = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+            if named in ("getattr", "has") and isinstance(node, ast.Call):
+                about = ast.unparse(node.args[0])
+                if re.fullmatch(r"(\w+\.)?check|kind", about) and isinstance(node.args[1], ast.Constant):
+                    asked.add(str(node.args[1].value))
+    assert {"drawing", "expected"} <= asked <= members
