@@ -40,7 +40,7 @@ from program_strategy import programs
 
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.supervisor import Job
-from grader.reporting.delivery import write_whole
+from grader.files import write_whole
 
 #: How many programs are drawn and recorded together.
 AT_ONCE = 50
