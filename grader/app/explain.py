@@ -218,7 +218,7 @@ def _is_open(items: tuple[object, ...]) -> bool:
 
 
 def unknown(
-    name: str, names: Sequence[str], expected: str = "the id of a criterion or the name of a check"
+    name: str, names: Sequence[str], wrong: str = "expected the id of a criterion or the name of a check, found neither"
 ) -> GraderError:
     """Return the error about a name that nothing has, with the names that are near."""
     known = list(dict.fromkeys(names))
@@ -226,4 +226,4 @@ def unknown(
     parts = [k for k in known if name.casefold() in k and k not in near] if len(name) > 2 else []
     offered = [*near, *parts][:OFFERED]
     hint = f"the nearest are {', '.join(offered)}" if offered else f"there are {', '.join(known)}"
-    return GraderError(f"explain {name}: expected {expected}, found neither", hint)
+    return GraderError(f"explain {name}: {wrong}", hint)

@@ -37,7 +37,9 @@ def explain_rules(rubrics: tuple[Path, ...] = (), name: str = "") -> list[RuleEx
     checks = {*CHECKS, *(check_name(c) for e in exercises for c in e.criteria)}
     wanted = [r for r in found if r.name == name]
     if not wanted and name not in checks:
-        raise unknown(name, [*(r.name for r in found), *checks], "the name of a hint rule or of a check")
+        raise unknown(
+            name, [*(r.name for r in found), *checks], "expected the name of a hint rule or of a check, found neither"
+        )
     return wanted or [r for r in found if not r.checks or name in r.checks]
 
 

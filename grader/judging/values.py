@@ -48,6 +48,11 @@ class Held:
     stop_ns: int
     value: float
 
+    @property
+    def t_ns(self) -> int:
+        """When it came."""
+        return self.start_ns
+
 
 class FewSuffice:
     """A check of every message or response on its own, whose number only a whole recording shows."""

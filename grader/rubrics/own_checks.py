@@ -346,7 +346,7 @@ def _no_check(kind: object) -> str:
 def _no_simulation(kind: object) -> str:
     """Return why something is not a simulation; empty if it is one."""
     if not isinstance(kind, type) or not issubclass(kind, Simulation):
-        return "expected a class derived from grader.simulation.Simulation, found something else"
+        return "expected a class derived from grader.api.Simulation, found something else"
     if "__dataclass_fields__" not in vars(kind):
         return "expected a dataclass, found another class: write @dataclass above it"
     return _no_parameters(lambda: simulation_shape("own", kind))

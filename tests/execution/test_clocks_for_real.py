@@ -236,3 +236,34 @@ def test_events_that_time_does_not_bring_stay_in_virtual_time(run: Callable[...,
     trace = run(program, COUNTER, clock="virtual")
     assert said(trace)[:3] == [(0.0, "matched 1"), (0.3, "heard 1"), (0.6, "heard 2")]
     assert trace.clock_reason == ""
+
+
+#: Ways to poll without ever blocking.
+POLLING = {
+    "spin_once": "while rclpy.ok():\n    rclpy.spin_once(node, timeout_sec=0)",
+    "looking": "while rclpy.ok():\n    rclpy.spin_once(node, timeout_sec=0)\n    node.get_clock().now()",
+    "own_executor": "executor.add_node(node)\nwhile rclpy.ok():\n    executor.spin_once(timeout_sec=0)",
+    "coroutine": "executor.create_task(wait)\nexecutor.add_node(node)\nwhile rclpy.ok():\n    executor.spin_once()",
+    "added_each_time": "executor.create_task(wait)\nwhile rclpy.ok():\n    rclpy.spin_once(node, executor=executor)",
+    "until": "future = rclpy.task.Future()\nwhile rclpy.ok():\n"
+    "    rclpy.spin_until_future_complete(node, future, timeout_sec=0)",
+}
+
+
+@pytest.mark.parametrize("loop", POLLING.values(), ids=POLLING)
+def test_a_timer_that_is_polled_fires_on_time(run: Callable[..., Trace], loop: str) -> None:
+    """Although time passes in larger steps for a program that polls: never beyond its next timer."""
+    program = """
+        from rclpy.executors import SingleThreadedExecutor
+
+        async def wait():
+            await rclpy.task.Future()
+
+        node, executor = Node("polled"), SingleThreadedExecutor()
+        node.create_timer(0.004, lambda: say("quick"))
+        node.create_timer(0.125, lambda: say("slow"))
+    """
+    trace = run(textwrap.dedent(program) + loop, clock="virtual", duration_ns=NS_PER_S)
+    told = [(line.text, line.t_ns / 1e6) for line in trace.of(OutputLine) if line.t_ns < NS_PER_S]
+    assert [t for text, t in told if text == "quick"] == [4 * number for number in range(1, 250)]
+    assert [t for text, t in told if text == "slow"] == [125 * number for number in range(1, 8)]

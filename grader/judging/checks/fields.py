@@ -15,7 +15,7 @@ from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern
 from grader.core.trace import Message, Trace
 from grader.judging.facts import DrawFacts, SeriesFacts
 from grader.judging.findings import explain_fault, explain_no_message, met, not_met
-from grader.judging.output import number_in
+from grader.judging.logs.outputs import number_in
 from grader.judging.plots import Drawing, Plot, value_panels
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
 from grader.judging.values import (

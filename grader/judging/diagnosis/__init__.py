@@ -10,7 +10,7 @@ from fractions import Fraction
 
 from grader.core.author_files import AuthorMistake, line_of, words_of
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Check, Criterion, Exercise, Finding, Outcome
+from grader.core.exercise import Criterion, Exercise, Finding, Outcome
 from grader.core.report import Verdict
 from grader.core.submission import Submission
 from grader.core.trace import Fault, Trace, main_not_called, same_node_name
@@ -81,7 +81,7 @@ def cases_of(  # noqa: PLR0913  what was found, and everything that may explain 
     # only these, because parsing a file takes longer than judging it
     names = dict.fromkeys(p for s in exercise.scenarios if s.id in asked for p in s.processes if p in sources)
     read_ = {name: read(submission.files[name].found or name, sources[name]) for name in names}
-    lost: dict[str, Check] = {}
+    lost: dict[str, Criterion] = {}
     cases: list[Case | None] = []
     for verdict, criterion in zip(verdicts, exercise.criteria, strict=True):
         trace = traces.get(criterion.scenario)
@@ -90,11 +90,11 @@ def cases_of(  # noqa: PLR0913  what was found, and everything that may explain 
             continue
         scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
         own = {name: read_[name] for name in scenario.processes if name in read_}
-        siblings = tuple(c.check for c in exercise.criteria if c is not criterion)
+        others = tuple(c for c in exercise.criteria if c is not criterion)
         fault, known = fault_of(verdict, trace), facts.get(criterion.id)
-        cases.append(Case(criterion, verdict, trace, own, fault, siblings, known, dict(lost)))
+        cases.append(Case(criterion, verdict, trace, own, fault, others, known, dict(lost)))
         if verdict.outcome is Outcome.NOT_MET:
-            lost[criterion.id] = criterion.check
+            lost[criterion.id] = criterion
     return tuple(cases)
 
 

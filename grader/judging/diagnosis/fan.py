@@ -535,7 +535,8 @@ def _follows(case: Case) -> Clue | None:
     fixed = problem.kind is ProblemKind.NEVER_CHANGES
     stopped = problem.kind is ProblemKind.STOPPED and check.input in problem.topics
     answered = problem.kind is ProblemKind.WRONG_ANSWER or (quiet and check.output in problem.topics)
-    for id_, other in case.lost.items():
+    for id_, criterion in case.lost.items():
+        other = criterion.check
         controller = isinstance(other, ThresholdResponse) and other.output == check.output
         sensor = isinstance(other, RandomInRange) and other.topic == check.input
         pace = isinstance(other, TopicRate) and other.topic == check.input
