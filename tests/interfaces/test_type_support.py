@@ -260,7 +260,6 @@ def test_processes_that_build_the_same_at_once_agree(tmp_path: Path) -> None:
     (tmp_path / "mine" / "msg" / "Foo.msg").write_text("int32 a\n")
     text = f"""
 from pathlib import Path
-from grader.execution.domains import shared_domains
 from grader.interfaces.build import build
 from grader.interfaces.definitions import find_packages
 print(build(find_packages(Path({str(tmp_path / "mine")!r})), Path({str(tmp_path / "cache")!r}), [Path({str(SHARE)!r})]))
