@@ -19,6 +19,7 @@ from grader.core.trace import ClockKind, FaultKind, Trace
 from grader.judging.checks import CHECKS
 from grader.judging.installation import lacking_package
 from grader.judging.judge_run import judge_exercise
+from grader.testing import TraceBuilder
 
 FILE = "velocity_publisher.py"
 ODOM = "odom_subscriber.py"
@@ -189,6 +190,35 @@ def test_a_rate_that_a_busy_machine_can_have_lowered_is_undecided(rate: float, s
         assert given.verdicts[0].reason == (
             "the machine was too busy: the nodes waited 1.2 s of 10.0 s for a processor, which can be why"
         )
+
+
+@pytest.mark.parametrize(
+    ("clock", "rate", "late_s", "outcome"),
+    [
+        (ClockKind.WALL, 10.0, 0.198, "undecided"),
+        (ClockKind.VIRTUAL, 10.0, 0.198, "not_met"),
+        (ClockKind.WALL, 10.6, 0.0, "not_met"),
+        (ClockKind.WALL, 10.6, 0.05, "not_met"),
+        (ClockKind.WALL, 10.0, 0.05, "met"),
+    ],
+    ids=["held back", "virtual time", "too fast", "too fast and held back", "right anyway"],
+)
+def test_a_rate_that_a_late_discovery_can_have_raised_is_undecided(
+    clock: ClockKind, rate: float, late_s: float, outcome: str
+) -> None:
+    """On the wall clock the first message waits for the grader's subscription, and the second one follows at once."""
+    times_s = [n / rate for n in range(30)]
+    held = next(n for n, t_s in enumerate(times_s) if t_s >= late_s)  # a timer leaves out what is past
+    times_s = [late_s, *(t_s for t_s in times_s[held:] if t_s > late_s)]
+    builder = TraceBuilder("a.py", stop_s=3.0)
+    for t_s in times_s:
+        builder.message(t_s, "/talk", "std_msgs/msg/Float64", {"data": 1.0})
+    trace = replace(builder.trace(), clock=clock)
+    asked = criterion("rate", CHECKS["topic_rate"]("/talk", 10.0, 0.3))
+    given = judge_exercise(exercise(asked), {"alone": trace}, handed_in(FILE))
+    assert outcomes(given) == {"rate": outcome}, given.verdicts[0].reason
+    if outcome == "undecided":
+        assert given.verdicts[0].reason.startswith("the machine was too busy: the first message had to wait")
 
 
 def test_what_cannot_be_asked_waits_for_the_criterion_that_it_needs() -> None:
