@@ -166,6 +166,8 @@ class ProcessModel:
 
     def end(self, ended: Ended) -> None:
         """Note the end; no thread goes on."""
+        if self.ended:
+            return
         self.ended, self.ok = True, False
         self.world.expected.ends[self.number] = self.world.now, ended
         world = self.world
@@ -294,10 +296,12 @@ class ProcessModel:
         yield from self.pause(self.end_of(LAST_NAP_MS * NS_PER_MS))
 
     def say(self, text: str) -> None:
-        self.world.expected.logs.setdefault(self.number, []).append((self.world.now, text))
+        if not self.ended:
+            self.world.expected.logs.setdefault(self.number, []).append((self.world.now, text))
 
     def write(self, text: str) -> None:
-        self.world.expected.lines.setdefault(self.number, []).append((self.world.now, text))
+        if not self.ended:
+            self.world.expected.lines.setdefault(self.number, []).append((self.world.now, text))
 
 
 class TimerModel:
@@ -344,7 +348,8 @@ class FutureModel:
     def __init__(self, executor: Executor | None = None) -> None:
         self.executor = executor
         self.done, self.value = False, 0
-        self.callbacks: list[Callable[[], Steps]] = []
+        #: The first one is of the client itself, which forgets the request.
+        self.callbacks: list[Callable[[], Steps]] = [nothing]
 
     def set(self, executor: Executor, value: int) -> None:
         self.done, self.value = True, value
