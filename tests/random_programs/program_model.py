@@ -10,6 +10,7 @@ from __future__ import annotations
 import heapq
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
@@ -536,7 +537,8 @@ class NodeModel:
     def call(self, name: str, body: tuple[Statement, ...], heard: int = 0, scope: Scope | None = None) -> Steps:
         """Run a callback."""
         self.runs[name] = self.runs.get(name, 0) + 1
-        yield from self.run(body, scope or Scope(name, name, heard))
+        with suppress(ReturnedError):
+            yield from self.run(body, scope or Scope(name, name, heard))
 
     def run(self, body: tuple[Statement, ...], scope: Scope) -> Steps:
         for one in body:
@@ -634,8 +636,12 @@ class NodeModel:
     def leave(self, how: Ending) -> None:
         if how is Ending.SHUTDOWN:
             self.process.ok = False
-            return
+            raise ReturnedError
         raise Leave(ENDINGS[how], how)
+
+
+class ReturnedError(Exception):
+    """A callback returns before its end."""
 
 
 class TimeUpError(Exception):

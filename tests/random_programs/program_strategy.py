@@ -210,8 +210,11 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
         beside = Room(own[0], (1,), (), own[1], MAIN_ENDS, shared=True, awaits=False, waits=True)
     room = rooms if several else rooms * (len(groups) + 1)
 
-    def callback(group: int, channels: str, *, heard: bool = True) -> tuple[Statement, ...]:
-        return room[group].statements(draw, channels, heard=heard)
+    def callback(group: int, channels: str, *, heard: bool = True, answers: bool = False) -> tuple[Statement, ...]:
+        its = room[group]
+        if answers:  # after a shutdown, no response can be sent
+            its = replace(its, ends=tuple(how for how in its.ends if how is not Ending.SHUTDOWN))
+        return its.statements(draw, channels, heard=heard)
 
     of = [draw(st.integers(0, len(groups))) for _ in (*topics, *services)]
     node = Node(
@@ -237,7 +240,7 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
             Server(
                 f"v{number}{n}",
                 service,
-                callback(group, after(service)),
+                callback(group, after(service), answers=True),
                 room[group].value(draw, heard=True),
                 group,
             )
