@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from grader.core.exercise import Problem as Problem
     from grader.core.exercise import ProblemKind as ProblemKind
     from grader.core.exercise import Roles as Roles
+    from grader.core.quantities import NS_PER_MS as NS_PER_MS
     from grader.core.quantities import NS_PER_S as NS_PER_S
     from grader.core.quantities import ActionType as ActionType
     from grader.core.quantities import DurationNs as DurationNs
@@ -70,8 +71,10 @@ if TYPE_CHECKING:
     from grader.core.trace import Response as Response
     from grader.core.trace import ServiceEnd as ServiceEnd
     from grader.core.trace import Trace as Trace
+    from grader.core.trace import unmet_policy as unmet_policy
     from grader.judging.charts import series as series
     from grader.judging.charts import time_chart as time_chart
+    from grader.judging.checks import name_of_check as name_of_check
     from grader.judging.diagnosis.rules import Case as Case
     from grader.judging.diagnosis.rules import Clue as Clue
     from grader.judging.diagnosis.rules import Crash as Crash
@@ -82,6 +85,7 @@ if TYPE_CHECKING:
     from grader.judging.diagnosis.rules import lines_of as lines_of
     from grader.judging.diagnosis.rules import silent_topic as silent_topic
     from grader.judging.diagnosis.rules import unheard_topic as unheard_topic
+    from grader.judging.diagnosis.values import draws as draws
     from grader.judging.diagnosis.wiring import Constant as Constant
     from grader.judging.diagnosis.wiring import Made as Made
     from grader.judging.diagnosis.wiring import conditions as conditions
@@ -94,7 +98,7 @@ if TYPE_CHECKING:
     from grader.judging.diagnosis.wiring import message_classes as message_classes
     from grader.judging.diagnosis.wiring import names_in as names_in
     from grader.judging.diagnosis.wiring import node_made as node_made
-    from grader.judging.diagnosis.wiring import number_at as number_in_code
+    from grader.judging.diagnosis.wiring import number_in_code as number_in_code
     from grader.judging.diagnosis.wiring import publish_calls as publish_calls
     from grader.judging.diagnosis.wiring import reached as reached
     from grader.judging.diagnosis.wiring import received as received
@@ -103,7 +107,7 @@ if TYPE_CHECKING:
     from grader.judging.diagnosis.wiring import short as short
     from grader.judging.diagnosis.wiring import spins as spins
     from grader.judging.diagnosis.wiring import target_of as target_of
-    from grader.judging.diagnosis.wiring import text as text_in_code
+    from grader.judging.diagnosis.wiring import text_in_code as text_in_code
     from grader.judging.diagnosis.wiring import timer_code as timer_code
     from grader.judging.diagnosis.wiring import used as used
     from grader.judging.diagnosis.wiring import value_of as value_of
@@ -117,11 +121,13 @@ if TYPE_CHECKING:
     from grader.judging.facts import PositionFacts as PositionFacts
     from grader.judging.facts import RateFacts as RateFacts
     from grader.judging.facts import SeriesFacts as SeriesFacts
+    from grader.judging.findings import FAULT_KEY as FAULT_KEY
     from grader.judging.findings import explain_fault as explain_fault
     from grader.judging.findings import explain_no_client as explain_no_client
     from grader.judging.findings import explain_no_message as explain_no_message
     from grader.judging.findings import explain_no_server as explain_no_server
     from grader.judging.findings import explain_no_subscription as explain_no_subscription
+    from grader.judging.findings import fault_hint as fault_hint
     from grader.judging.findings import fault_sentence as fault_sentence
     from grader.judging.findings import faulted as faulted
     from grader.judging.findings import first_fault as first_fault
@@ -148,11 +154,15 @@ if TYPE_CHECKING:
     from grader.judging.source import subtree as subtree
     from grader.judging.source import text_of as text_of
     from grader.judging.source import words as words
+    from grader.judging.values import EXACT as EXACT
+    from grader.judging.values import JITTER_NS as JITTER_NS
     from grader.judging.values import Held as Held
     from grader.judging.values import Reading as Reading
     from grader.judging.values import delivered as delivered
     from grader.judging.values import delivered_numbers as delivered_numbers
+    from grader.judging.values import heard_from_ns as heard_from_ns
     from grader.judging.values import held as held
+    from grader.judging.values import last_of_instant as last_of_instant
     from grader.judging.values import number_at as number_at
     from grader.judging.values import published as published
     from grader.judging.values import published_numbers as published_numbers
@@ -188,9 +198,10 @@ CONTENTS: dict[str, dict[str, str]] = {
     },
     "Checks": {
         "grader.core.exercise": "Check Roles NODE_GRAPH Finding Problem ProblemKind Location",
+        "grader.judging.checks": "name_of_check",
         "grader.judging.findings": (
-            "met partly not_met only_printed waiting_for explain_fault faulted first_fault fault_sentence "
-            "explain_no_message explain_no_subscription explain_no_server explain_no_client"
+            "met partly not_met only_printed waiting_for explain_fault faulted first_fault fault_sentence fault_hint "
+            "explain_no_message explain_no_subscription explain_no_server explain_no_client FAULT_KEY"
         ),
     },
     "Parameters": {
@@ -199,17 +210,17 @@ CONTENTS: dict[str, dict[str, str]] = {
     "Recordings": {
         "grader.core.trace": (
             "Trace Message Delivery LogRecord OutputLine Request Response Fault FaultKind GraphSnapshot Endpoint "
-            "ServiceEnd Mark ClockKind"
+            "ServiceEnd Mark ClockKind unmet_policy"
         ),
         "grader.judging.values": (
-            "Reading Held published delivered published_numbers delivered_numbers held value_at number_at "
-            "student_endpoints"
+            "Reading Held published delivered published_numbers delivered_numbers held heard_from_ns last_of_instant "
+            "value_at number_at student_endpoints EXACT JITTER_NS"
         ),
         "grader.judging.output": "student_records printed_lines written",
         "grader.judging.service_calls": "Call calls_of",
     },
     "Text": {
-        "grader.core.quantities": "NS_PER_S seconds counted within",
+        "grader.core.quantities": "NS_PER_S NS_PER_MS seconds counted within",
         "grader.judging.wording": "moment span number numbers quote listed",
     },
     "Charts": {
@@ -229,6 +240,7 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.judging.source": (
             "Source first_line last_line covers last_name chain argument parameters text_of subtree words"
         ),
+        "grader.judging.diagnosis.values": "draws",
         "grader.judging.diagnosis.wiring": (
             "Constant Made constant given_leaf made made_for target_of roots reached runs names_in is_log "
             "publish_calls used conditions is_flag spins node_made variable_of timer_code short received "
@@ -242,8 +254,6 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.testing": "TraceBuilder judge explain",
     },
 }
-#: Public name -> its name in its own module, where no other function has it.
-_RENAMED = {"number_in_code": "number_at", "text_in_code": "text"}
 _HOMES = {name: home for homes in CONTENTS.values() for home, names in homes.items() for name in names.split()}
 
 __all__ = ["grade", "observe", "rejudge", *_HOMES]  # noqa: PLE0604  the table is the list
@@ -253,7 +263,7 @@ def __getattr__(name: str) -> Any:
     """Import a public name when it is first looked up."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__} has no attribute {name}")
-    value = getattr(importlib.import_module(_HOMES[name]), _RENAMED.get(name, name))
+    value = getattr(importlib.import_module(_HOMES[name]), name)
     globals()[name] = value
     return value
 

@@ -571,9 +571,3 @@ def _part(value: Mapping[str, object], name: str) -> Mapping[str, object]:
 def said_of(value: Mapping[str, object]) -> str:
     """Return the content of a message as text: `order = 3, name = 'a'`."""
     return ", ".join(f"{quote(str(name), 40)} = {shown(inner)}" for name, inner in islice(value.items(), 12))
-
-
-def threshold_drawing(input_: str, output: str, threshold: float, expected: Sequence[Reading]) -> Drawing:
-    """Return the inputs of a controller with its threshold, above its answers with the expected ones."""
-    level = Level(threshold, f"{number(threshold)}{unit_of(input_)}", name="threshold")
-    return Drawing((Plot(input_, levels=(level,)), Plot(output, expected=tuple(expected))))

@@ -36,7 +36,8 @@ class Header:
 @cache
 def builtin_exercises() -> tuple[Exercise, ...]:
     """Return the built-in exercises, ordered by number; raises RubricError without any."""
-    return compiled("rubrics", state_of([*_paths(), *_recorded()]) + state_of_package(), _read_exercises)
+    state = state_of([*_paths(), *_recorded(), *shipped("rubrics").glob("*/*.py")])
+    return compiled("rubrics", state + state_of_package(), _read_exercises)
 
 
 def _read_exercises() -> tuple[Exercise, ...]:

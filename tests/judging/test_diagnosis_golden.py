@@ -29,10 +29,13 @@ from grader.core.report import ExerciseReport, Verdict
 from grader.core.trace import Start, StartWay, Trace
 from grader.judging import judge_run
 from grader.judging.diagnosis import CAUSE_KEY, RULES, diagnose
-from grader.judging.diagnosis.rules import FIRST, Case, Rule
+from grader.judging.diagnosis.rules import FIRST, Case, Rule, in_order
+from grader.rubrics.exercise_checks import hints_of, known_checks
 from grader.submissions.sources import source_text
 
 HERE = Path(__file__).parent
+#: The rules of the grader and of the exercises that come with it.
+EVERY: tuple[Any, ...] = in_order((*RULES, *hints_of(known_checks())))  # type: ignore[arg-type]
 Row = Mapping[str, Any]
 CRASHES = rows("crashes.yaml")
 BEHAVIOURS = rows("behaviours.yaml")
@@ -148,21 +151,21 @@ def test_every_rule_is_shown_to_work() -> None:
     shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS, *SLIPS)} | {v["evidence"].get(CAUSE_KEY) for v in verdicts}
     # it only names another criterion, so that reports do not name it
     shown |= {"follows" for v in verdicts if v.get("same_cause_as") and CAUSE_KEY not in v["evidence"]}
-    assert {rule.id for rule in RULES} - shown == set()
+    assert {rule.id for rule in EVERY} - shown == set()
 
 
 def test_the_rules_are_asked_in_the_order_that_is_written_down() -> None:
     """Wherever a rule is defined: its priority alone decides."""
     order = (HERE / "diagnosis" / "order.txt").read_text("utf-8").split()
-    assert [rule.id for rule in RULES] == [*order, "follows"]
-    priorities = [rule.priority for rule in RULES]
+    assert [rule.id for rule in EVERY] == [*order, "follows"]
+    priorities = [rule.priority for rule in EVERY]
     assert len(set(priorities)) == len(priorities)
     assert min(priorities) >= 1000 > FIRST
 
 
 def test_the_ids_of_rules_are_unique() -> None:
     """Reports name them."""
-    ids = [rule.id for rule in RULES]
+    ids = [rule.id for rule in EVERY]
     assert len(ids) == len(set(ids))
 
 
@@ -312,7 +315,7 @@ def test_a_near_miss_is_not_blamed(
 
 
 #: Rules that say what a program does wrong, whatever was recorded: a right program must never get them.
-TEXTUAL = {rule.id for rule in RULES} - {
+TEXTUAL = {rule.id for rule in EVERY} - {
     "log_line",  # where a log is written
     "log_period",
     "late_timer",

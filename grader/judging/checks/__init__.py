@@ -1,9 +1,10 @@
-"""The checks that rubrics can use; CHECKS lists all of them."""
+"""The general checks that rubrics can use; CHECKS lists all of them."""
+
+import sys
 
 from grader.judging.checks.actions import ActionFeedback, ActionResult, LifecycleStates
 from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
 from grader.judging.checks.closed_loop import ReachesGoal, StaysInRange
-from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange, FieldMonotone, RandomInRange
 from grader.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
 from grader.judging.checks.heard import LogsResponse, LogsTexts
@@ -27,7 +28,6 @@ from grader.judging.checks.services import (
     ServiceSequence,
 )
 from grader.judging.checks.timing import Latency, Period, Reaction, Silence
-from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes, Transform
 
 #: Name in a rubric -> check class; the fields of the class are the parameters.
@@ -42,8 +42,6 @@ CHECKS: dict[str, type] = {
     "waits_gracefully": WaitsGracefully,
     "random_in_range": RandomInRange,
     "logs_received": LogsReceived,
-    "threshold_response": ThresholdResponse,
-    "answers_together": AnswersTogether,
     "bidirectional_graph": BidirectionalGraph,
     "field_function": FieldFunction,
     "logs_every": LogsEvery,
@@ -84,4 +82,15 @@ CHECKS: dict[str, type] = {
     "source_uses": SourceUses,
     "source_avoids": SourceAvoids,
 }
-__all__ = ["CHECKS"]
+_NAMES = {kind: name for name, kind in CHECKS.items()}
+__all__ = ["CHECKS", "name_of_check"]
+
+
+def name_of_check(check: object) -> str:
+    """Return the name of a check in rubrics: of a general one, or of one in a file that brings a table of its own."""
+    kind = type(check)
+    if kind in _NAMES:
+        return _NAMES[kind]
+    table = getattr(sys.modules.get(kind.__module__), "CHECKS", None)
+    own = table.items() if isinstance(table, dict) else ()
+    return next((str(name) for name, one in own if one is kind), kind.__name__)
