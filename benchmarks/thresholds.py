@@ -28,7 +28,7 @@ from grader.app.grade import grade_in
 from grader.app.request import GradeRequest
 from grader.core.errors import GraderError
 from grader.execution.recording_session import RecordingSession, open_session
-from grader.reporting.delivery import write_whole
+from grader.files import write_whole
 
 HERE = Path(__file__).resolve().parent / "thresholds"
 RUBRIC = HERE / "pace.yaml"

@@ -315,7 +315,8 @@ def _public(name: str) -> str:
     """Return the entry of one name."""
     value = getattr(api, name)
     if not (inspect.isfunction(value) or inspect.isclass(value)) or hasattr(value, "__args__"):
-        return f"### `{name}`\n\n`{value!r}`"
+        text = re.sub(r"\b(?:[a-z_]+\.)+(?=[A-Z~])", "", repr(value)).replace("~", "")
+        return f"### `{name}`\n\n`{text}`"
     doc = inspect.cleandoc(value.__doc__ or "")
     text = f"### `{name}`\n\n"
     if inspect.isfunction(value):

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from grader.core.quantities import ActionType as ActionType
     from grader.core.quantities import DurationNs as DurationNs
     from grader.core.quantities import FieldNumber as FieldNumber
+    from grader.core.quantities import FieldOf as FieldOf
     from grader.core.quantities import Hertz as Hertz
     from grader.core.quantities import MessageType as MessageType
     from grader.core.quantities import Pattern as Pattern
@@ -72,17 +73,20 @@ if TYPE_CHECKING:
     from grader.core.trace import ServiceEnd as ServiceEnd
     from grader.core.trace import Trace as Trace
     from grader.core.trace import unmet_policy as unmet_policy
+    from grader.judging.charts import gaps_panel as gaps_panel
     from grader.judging.charts import series as series
     from grader.judging.charts import time_chart as time_chart
-    from grader.judging.checks import name_of_check as name_of_check
+    from grader.judging.diagnosis.rules import NO_SOURCE as NO_SOURCE
     from grader.judging.diagnosis.rules import Case as Case
     from grader.judging.diagnosis.rules import Clue as Clue
     from grader.judging.diagnosis.rules import Crash as Crash
+    from grader.judging.diagnosis.rules import Maker as Maker
     from grader.judging.diagnosis.rules import Rule as Rule
     from grader.judging.diagnosis.rules import crash_rule as crash_rule
     from grader.judging.diagnosis.rules import file_for as file_for
     from grader.judging.diagnosis.rules import hint_rule as hint_rule
     from grader.judging.diagnosis.rules import lines_of as lines_of
+    from grader.judging.diagnosis.rules import log_call as log_call
     from grader.judging.diagnosis.rules import silent_topic as silent_topic
     from grader.judging.diagnosis.rules import unheard_topic as unheard_topic
     from grader.judging.diagnosis.values import draws as draws
@@ -90,7 +94,10 @@ if TYPE_CHECKING:
     from grader.judging.diagnosis.wiring import Made as Made
     from grader.judging.diagnosis.wiring import conditions as conditions
     from grader.judging.diagnosis.wiring import constant as constant
+    from grader.judging.diagnosis.wiring import elsewhere_because as elsewhere_because
     from grader.judging.diagnosis.wiring import given_leaf as given_leaf
+    from grader.judging.diagnosis.wiring import goes_to as goes_to
+    from grader.judging.diagnosis.wiring import head_of as head_of
     from grader.judging.diagnosis.wiring import is_flag as is_flag
     from grader.judging.diagnosis.wiring import is_log as is_log
     from grader.judging.diagnosis.wiring import made as made
@@ -100,6 +107,7 @@ if TYPE_CHECKING:
     from grader.judging.diagnosis.wiring import node_made as node_made
     from grader.judging.diagnosis.wiring import number_in_code as number_in_code
     from grader.judging.diagnosis.wiring import publish_calls as publish_calls
+    from grader.judging.diagnosis.wiring import python_loggers as python_loggers
     from grader.judging.diagnosis.wiring import reached as reached
     from grader.judging.diagnosis.wiring import received as received
     from grader.judging.diagnosis.wiring import roots as roots
@@ -112,6 +120,7 @@ if TYPE_CHECKING:
     from grader.judging.diagnosis.wiring import used as used
     from grader.judging.diagnosis.wiring import value_of as value_of
     from grader.judging.diagnosis.wiring import variable_of as variable_of
+    from grader.judging.diagnosis.wiring import waits_for_ever as waits_for_ever
     from grader.judging.facts import AnswerFacts as AnswerFacts
     from grader.judging.facts import AnswerRow as AnswerRow
     from grader.judging.facts import DrawFacts as DrawFacts
@@ -136,13 +145,17 @@ if TYPE_CHECKING:
     from grader.judging.findings import only_printed as only_printed
     from grader.judging.findings import partly as partly
     from grader.judging.findings import waiting_for as waiting_for
-    from grader.judging.output import printed_lines as printed_lines
-    from grader.judging.output import student_records as student_records
-    from grader.judging.output import written as written
+    from grader.judging.logs.outputs import printed_lines as printed_lines
+    from grader.judging.logs.outputs import student_records as student_records
+    from grader.judging.logs.outputs import written as written
     from grader.judging.plots import Drawing as Drawing
     from grader.judging.plots import Plot as Plot
+    from grader.judging.plots import threshold_drawing as threshold_drawing
+    from grader.judging.series import lag_ns as lag_ns
+    from grader.judging.series import steps_behind as steps_behind
     from grader.judging.service_calls import Call as Call
     from grader.judging.service_calls import calls_of as calls_of
+    from grader.judging.source import Function as Function
     from grader.judging.source import Source as Source
     from grader.judging.source import argument as argument
     from grader.judging.source import chain as chain
@@ -158,6 +171,8 @@ if TYPE_CHECKING:
     from grader.judging.values import JITTER_NS as JITTER_NS
     from grader.judging.values import Held as Held
     from grader.judging.values import Reading as Reading
+    from grader.judging.values import as_number as as_number
+    from grader.judging.values import carries_number as carries_number
     from grader.judging.values import delivered as delivered
     from grader.judging.values import delivered_numbers as delivered_numbers
     from grader.judging.values import heard_from_ns as heard_from_ns
@@ -168,6 +183,7 @@ if TYPE_CHECKING:
     from grader.judging.values import published_numbers as published_numbers
     from grader.judging.values import student_endpoints as student_endpoints
     from grader.judging.values import value_at as value_at
+    from grader.judging.wording import in_unit as in_unit
     from grader.judging.wording import listed as listed
     from grader.judging.wording import moment as moment
     from grader.judging.wording import number as number
@@ -181,6 +197,7 @@ if TYPE_CHECKING:
     from grader.simulation import Turtle as Turtle
     from grader.simulation import Unicycle as Unicycle
     from grader.testing import TraceBuilder as TraceBuilder
+    from grader.testing import builtin_check as builtin_check
     from grader.testing import explain as explain
     from grader.testing import judge as judge
 
@@ -198,14 +215,15 @@ CONTENTS: dict[str, dict[str, str]] = {
     },
     "Checks": {
         "grader.core.exercise": "Check Roles NODE_GRAPH Finding Problem ProblemKind Location",
-        "grader.judging.checks": "name_of_check",
         "grader.judging.findings": (
-            "met partly not_met only_printed waiting_for explain_fault faulted first_fault fault_sentence fault_hint "
-            "explain_no_message explain_no_subscription explain_no_server explain_no_client FAULT_KEY"
+            "met partly not_met only_printed waiting_for explain_fault faulted first_fault fault_sentence "
+            "explain_no_message explain_no_subscription explain_no_server explain_no_client fault_hint FAULT_KEY"
         ),
     },
     "Parameters": {
-        "grader.core.quantities": "DurationNs Hertz FieldNumber Topic MessageType ServiceType ActionType Pattern",
+        "grader.core.quantities": (
+            "DurationNs Hertz FieldNumber Topic MessageType ServiceType ActionType Pattern FieldOf"
+        ),
     },
     "Recordings": {
         "grader.core.trace": (
@@ -213,24 +231,26 @@ CONTENTS: dict[str, dict[str, str]] = {
             "ServiceEnd Mark ClockKind unmet_policy"
         ),
         "grader.judging.values": (
-            "Reading Held published delivered published_numbers delivered_numbers held heard_from_ns last_of_instant "
-            "value_at number_at student_endpoints EXACT JITTER_NS"
+            "Reading Held published delivered published_numbers delivered_numbers held value_at number_at "
+            "student_endpoints as_number carries_number heard_from_ns last_of_instant EXACT JITTER_NS"
         ),
-        "grader.judging.output": "student_records printed_lines written",
+        "grader.judging.logs.outputs": "student_records printed_lines written",
+        "grader.judging.series": "lag_ns steps_behind",
         "grader.judging.service_calls": "Call calls_of",
     },
     "Text": {
-        "grader.core.quantities": "NS_PER_S NS_PER_MS seconds counted within",
-        "grader.judging.wording": "moment span number numbers quote listed",
+        "grader.core.quantities": "NS_PER_S seconds counted within NS_PER_MS",
+        "grader.judging.wording": "moment span number numbers quote listed in_unit",
     },
     "Charts": {
-        "grader.judging.plots": "Drawing Plot",
+        "grader.judging.plots": "Drawing Plot threshold_drawing",
         "grader.core.chart": "Chart Panel Series Point Band Level Look Tone",
-        "grader.judging.charts": "series time_chart",
+        "grader.judging.charts": "series time_chart gaps_panel",
     },
     "Hint rules": {
         "grader.judging.diagnosis.rules": (
-            "Rule Clue Case Crash hint_rule crash_rule silent_topic unheard_topic file_for lines_of"
+            "Rule Clue Case Crash hint_rule crash_rule silent_topic unheard_topic file_for lines_of log_call "
+            "Maker NO_SOURCE"
         ),
         "grader.judging.facts": (
             "RateFacts SeriesFacts DrawFacts AnswerRow AnswerFacts LogFacts PositionFacts LogPaceFacts OtherEnd"
@@ -238,20 +258,21 @@ CONTENTS: dict[str, dict[str, str]] = {
     },
     "Source code": {
         "grader.judging.source": (
-            "Source first_line last_line covers last_name chain argument parameters text_of subtree words"
+            "Source first_line last_line covers last_name chain argument parameters text_of subtree words Function"
         ),
         "grader.judging.diagnosis.values": "draws",
         "grader.judging.diagnosis.wiring": (
             "Constant Made constant given_leaf made made_for target_of roots reached runs names_in is_log "
             "publish_calls used conditions is_flag spins node_made variable_of timer_code short received "
-            "message_classes value_of number_in_code text_in_code"
+            "message_classes value_of number_in_code text_in_code elsewhere_because goes_to head_of "
+            "python_loggers waits_for_ever"
         ),
     },
     "Simulations": {
         "grader.simulation": "Simulation Moment Output DifferentialDrive Turtle Unicycle",
     },
     "Tests": {
-        "grader.testing": "TraceBuilder judge explain",
+        "grader.testing": "TraceBuilder judge explain builtin_check",
     },
 }
 _HOMES = {name: home for homes in CONTENTS.values() for home, names in homes.items() for name in names.split()}

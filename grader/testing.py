@@ -44,7 +44,7 @@ from grader.judging.diagnosis.rules import Case, Clue, Rule, unfit
 from grader.judging.findings import met, not_met, partly
 from grader.judging.source import read
 
-__all__ = ["TraceBuilder", "explain", "judge", "met", "not_met", "partly"]
+__all__ = ["TraceBuilder", "builtin_check", "explain", "judge", "met", "not_met", "partly"]
 
 #: Order within one instant: the scenario, the grader, the graph, the nodes.
 _PHASE = {Mark: 0, Delivery: 1, GraphSnapshot: 2}
@@ -77,6 +77,19 @@ def judge(check: Check, trace: Trace, sources: Mapping[str, str] | None = None) 
     return finding
 
 
+def builtin_check(name: str, **parameters: Any) -> Check:
+    """Return one of the grader's checks, by its name and parameters as in a rubric; times are in nanoseconds.
+
+    Raises:
+        KeyError: There is no such check.
+        TypeError: A parameter is missing, or there is no such parameter.
+    """
+    from grader.rubrics.exercise_checks import known_checks  # noqa: PLC0415  takes long
+
+    check: Check = known_checks()[name](**parameters)
+    return check
+
+
 def _asked(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
     if sources is not None and reads_sources(check):
         return check.judge_sources(trace, sources)
@@ -103,10 +116,8 @@ def explain(
         return None
     outcome = Outcome.PARTLY if finding.credit else Outcome.NOT_MET
     # a check of one's own has its name from the rubric, which is not there: it is taken to be the one that is meant
-    known = [name for name, kind in CHECKS.items() if type(check) is kind]
-    meant = [name for name in rule.checks if isinstance(name, str) and name in (known or {name} - CHECKS.keys())]
-    name = next(iter(meant), "")
-    criterion = Criterion("tested", "", Fraction(1), trace.scenario, check, check_name=name)
+    meant = (name for name in rule.checks if isinstance(name, str) and name not in CHECKS)
+    criterion = _criterion("tested", check, trace, next(meant, ""))
     verdict = Verdict(
         "tested",
         "",
@@ -120,11 +131,18 @@ def explain(
         problem=finding.problem,
     )
     files = {name: read(name, text) for name, text in sources.items()}
-    case = Case(criterion, verdict, trace, files, fault_of(verdict, trace), tuple(siblings), finding.facts)
+    others = tuple(_criterion(f"sibling_{n}", one, trace) for n, one in enumerate(siblings))
+    case = Case(criterion, verdict, trace, files, fault_of(verdict, trace), others, finding.facts)
     clue = rule.clue(case)
     if clue is not None and (wrong := unfit(clue, case)):
         raise ValueError(f"the rule {rule.id}: {wrong}")
     return clue
+
+
+def _criterion(id_: str, check: Check, trace: Trace, own: str = "") -> Criterion:
+    """Return a criterion with a check, which has its name in rubrics, or `own` if it is not the grader's."""
+    name = next((name for name, kind in CHECKS.items() if type(check) is kind), own)
+    return Criterion(id_, "", Fraction(1), trace.scenario, check, check_name=name)
 
 
 @dataclass(slots=True)
@@ -256,7 +274,7 @@ class TraceBuilder:
         return self
 
     def mark(self, t_s: float, name: str, detail: str = "") -> TraceBuilder:
-        """Add an event of the scenario itself; `grader.core.trace.Mark` lists the names."""
+        """Add an event of the scenario itself; `Mark` lists the names."""
         return self.add(Mark(nanoseconds(t_s), name, detail))
 
     def trace(self, scenario: str = "alone") -> Trace:

@@ -498,7 +498,7 @@ def test_a_reader_that_had_enough_is_no_problem(option: str) -> None:
     child = process("ada", option, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert child.stdout is not None
     child.stdout.close()
-    _, complaint = child.communicate(b"\n", timeout=60)
+    _, complaint = child.communicate(b"\n", timeout=600)
     assert complaint == b""
     assert child.returncode == 0
 
@@ -509,7 +509,7 @@ def test_a_full_disk_behind_standard_output_is_said() -> None:
     """The report is lost, and nobody takes the exit code for a success."""
     with Path("/dev/full").open("wb") as full:
         child = process("ada", stdout=full)
-        _, complaint = child.communicate(timeout=60)
+        _, complaint = child.communicate(timeout=600)
     assert complaint == b"error: standard output: the text report cannot be written: No space left on device\n"
     assert child.returncode == 2
 
@@ -518,7 +518,7 @@ def test_a_full_disk_behind_standard_output_is_said() -> None:
 def test_an_ascii_terminal_still_gets_the_numbers() -> None:
     """Signs that it cannot show give way to plain ones."""
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
-    out, complaint = process("ada", stdout=subprocess.PIPE, env=environment).communicate(timeout=60)
+    out, complaint = process("ada", stdout=subprocess.PIPE, env=environment).communicate(timeout=600)
     assert complaint == b""
     assert b"Criterion 0 +/-" in out
 
@@ -538,7 +538,7 @@ def test_a_terminal_sees_progress_and_colours() -> None:
     except OSError:  # Linux says so when the other side is closed
         pass
     os.close(leader)
-    assert child.wait(timeout=60) == 0
+    assert child.wait(timeout=600) == 0
     assert b"\x1b[1;32mada: 10 of 10 points" in seen
     assert b"exercise 1: \\x1b[31malone" in seen
     assert b"\x1b[31malone" not in seen

@@ -95,7 +95,7 @@ def test_tab_completes_in_a_shell(folder: Path, shell: str) -> None:
     )
     program.chmod(0o755)
     environment = {**os.environ, "PATH": f"{program.parent}:{os.environ['PATH']}", "HOME": str(folder), "TERM": "dumb"}
-    session = pexpect.spawn(SHELLS[shell], env=environment, encoding="utf-8", timeout=30, dimensions=(50, 200))
+    session = pexpect.spawn(SHELLS[shell], env=environment, encoding="utf-8", timeout=300, dimensions=(50, 200))
     session.sendline(
         f"grade completion {shell} > script; {'source' if shell == 'fish' else '.'} ./script; echo read''y"
     )

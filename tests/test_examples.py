@@ -16,6 +16,8 @@ from ruamel.yaml import YAML
 
 from grader.app.request import GradeRequest
 from grader.cli import main
+from grader.core.report import Report
+from grader.judging.diagnosis import CAUSE_KEY
 from grader.rubrics.loader import read_rubric
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -30,10 +32,36 @@ def rubric(name: str) -> Path:
 
 
 @cache
-def expected(name: str) -> dict[str, dict[str, str]]:
-    """Return what each wrong submission of an example loses: criteria that are not met, with their outcomes."""
+def listed(name: str) -> dict[str, dict[str, Any]]:
+    """Return what is expected of each wrong submission of an example, as its file has it."""
     found: Any = YAML(typ="safe").load((ROOT / "examples" / name / "expected.yaml").read_text(encoding="utf-8"))
     return dict(found)
+
+
+def expected(name: str) -> dict[str, dict[str, str]]:
+    """Return what each wrong submission of an example loses: criteria that are not met, with their outcomes."""
+    lost = {wrong: rows.items() for wrong, rows in listed(name).items()}
+    return {
+        wrong: {id_: row if isinstance(row, str) else next(iter(row)) for id_, row in rows}
+        for wrong, rows in lost.items()
+    }
+
+
+def causes(name: str, wrong: str) -> dict[str, tuple[str, str]]:
+    """Return the hint rule that each criterion gets, and the code of the line that it names."""
+    rows = {id_: row for id_, row in listed(name)[wrong].items() if not isinstance(row, str)}
+    return {id_: next(iter(named.items())) for id_, row in rows.items() for named in row.values()}
+
+
+def named_causes(report: Report, submission: Path) -> dict[str, tuple[str, str]]:
+    """Return the hint rules of a rubric's own that a report names, with the code of the line."""
+    found = {}
+    for verdict in (v for exercise in report.exercises for v in exercise.verdicts):
+        place = verdict.location
+        if CAUSE_KEY in verdict.evidence and place is not None:
+            line = (submission / place.file).read_text(encoding="utf-8").splitlines()[place.line - 1]
+            found[verdict.id] = (str(verdict.evidence[CAUSE_KEY]), line.strip())
+    return found
 
 
 def submissions() -> Iterator[ParameterSet]:
@@ -53,6 +81,22 @@ def test_a_submission_gets_what_it_is_worth(name: str, folder: str) -> None:
     told = {v.id: v.reason for exercise in report.exercises for v in exercise.verdicts}
     assert outcomes(report) == ({} if folder == "reference" else expected(name)[folder.removeprefix("wrong/")]), told
     assert (report.score == report.max_score) == (folder == "reference")
+    wrong = folder.removeprefix("wrong/")
+    hinted = {} if folder == "reference" else causes(name, wrong)
+    own = listed_rules(name)
+    assert {id_: cause for id_, cause in named_causes(report, submission).items() if cause[0] in own} == hinted
+
+
+def listed_rules(name: str) -> set[str]:
+    """Return the hint rules of an example's own."""
+    return {rule.id for rule in read_rubric(rubric(name)).hints}
+
+
+def test_every_rule_of_an_example_names_a_mistake() -> None:
+    """Of one of its wrong submissions."""
+    told = {name: {rule for wrong in listed(name) for rule, _ in causes(name, wrong).values()} for name in EXAMPLES}
+    assert told == {name: listed_rules(name) for name in EXAMPLES}
+    assert sum(map(len, told.values())) >= 7
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

@@ -8,20 +8,24 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from kept_runs import kept_run, velocity_run, velocity_trace
 
 from grader.app import explain as explaining
 from grader.app import grade as session
 from grader.app.explain import explain
+from grader.app.hint_rules import explain_rules, try_rules
 from grader.app.request import GradeRequest
 from grader.cli import main
 from grader.core.errors import GraderError
 from grader.core.exercise import Exercise
 from grader.core.report import CheckExplanation, CriterionExplanation
 from grader.judging.checks import CHECKS
+from grader.judging.diagnosis import RULES
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.check_parameters import manual_of
 from grader.rubrics.loader import read_rubric
 
+ROOT = Path(__file__).resolve().parent.parent
 CRITERIA = [(e.id, c.id) for path in builtin_rubrics().values() for e in [read_rubric(path)] for c in e.criteria]
 
 
@@ -168,3 +172,73 @@ def test_without_a_name_all_of_them_are_listed() -> None:
     rows = json.loads(grade("--json").output)["explanations"]
     assert {row["kind"] for row in rows} == {"criterion", "check"}
     assert len(rows) > len(CHECKS)
+
+
+def test_rules_are_listed_in_their_order() -> None:
+    """With what they explain; those of a rubric stand among the others."""
+    rubric = ROOT / "examples" / "fibonacci" / "fibonacci.yaml"
+    found = explain_rules((rubric,))
+    assert [r.priority for r in found] == sorted(r.priority for r in found)
+    assert {r.name for r in found} == {*(r.id for r in RULES), *(r.id for r in read_rubric(rubric).hints)}
+    own = {r.name: r for r in found if r.file}
+    assert own["last_number_cut_off"].checks == ("fibonacci_results",)
+    assert own["deaf_loop"].about == "The loop that computes does not look whether somebody cancels."
+    shown = grade("--rules", "--rubric", str(rubric)).output
+    assert "100  deaf_loop (hints.py): action_result" in shown
+    assert max(map(len, shown.splitlines())) <= 120
+    assert json.loads(grade("--rules", "--json").output)["schema"] == "grader/rules/v1"
+
+
+def test_the_rules_for_one_check_are_listed() -> None:
+    """A rule without checks explains any."""
+    found = explain_rules(name="topic_rate")
+    assert all(not r.checks or "topic_rate" in r.checks for r in found)
+    assert {"topic_rate"} < {name for r in found for name in r.checks or ("",)} | {"topic_rate", ""}
+    assert [r.name for r in explain_rules(name="slow_timer")] == ["slow_timer"]
+    refused = grade("--rules", "slow_timr")
+    assert refused.exit_code == 2
+    assert "slow_timr: expected the name of a hint rule or of a check, found neither" in refused.output
+    assert "slow_timer" in refused.output
+
+
+def test_rules_are_asked_about_a_kept_recording(tmp_path: Path) -> None:
+    """All that apply are told, in their order; a report shows the first."""
+    source = """\
+class Velocity(Node):
+    def __init__(self):
+        super().__init__("velocity")
+        self.out = self.create_publisher(Twist, "/cmd_vel", 10)
+        self.create_timer(0.1, self.tick)
+
+    def tick(self):
+        self.out.publish(Twist())
+"""
+    report = kept_run(tmp_path / "kept", velocity_run(velocity_trace(rate_hz=10), source=source))
+    trials = try_rules(tmp_path / "kept")
+    lost = [v for v in report.exercises[0].verdicts if v.outcome.value in ("not_met", "partly")]
+    assert [t.criterion for t in trials] == [f"velocity_publisher/{v.id}" for v in lost]
+    first = {t.criterion.partition("/")[2]: t.rules[0] for t in trials if t.rules}
+    assert first
+    assert {id_: rule[0] for id_, rule in first.items()} == {
+        v.id: v.evidence["diagnosis"] for v in lost if "diagnosis" in v.evidence
+    }
+    shown = grade("--rules", "--on", str(tmp_path / "kept"))
+    assert shown.exit_code == 0
+    assert all(f"{t.criterion}: not met." in shown.output for t in trials if t.outcome == "not_met")
+    told = json.loads(grade("--rules", "--on", str(tmp_path / "kept"), "--json").output)["rules"]
+    assert [row["criterion"] for row in told] == [t.criterion for t in trials]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--on", "kept"], "--on needs --rules"),
+        (["--rules", "topic_rate", "--on", "kept"], "--on needs --rules, and no NAME"),
+        (["--rules", "--on", "nothing_there"], "nothing_there"),
+    ],
+)
+def test_a_trial_needs_rules_and_a_recording(words: list[str], told: str) -> None:
+    """Anything else is refused."""
+    refused = grade(*words)
+    assert refused.exit_code == 2
+    assert told in refused.output

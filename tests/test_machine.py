@@ -39,7 +39,7 @@ def rows(program: Path, *options: str, before: tuple[str, ...] = (), **variables
     """Return what the program printed under `grade observe`, by its row; skips if its tier does not work here."""
     command = [*before, str(GRADE), "observe", str(program), "--duration", "1", "--json", *options]
     environment = {**os.environ, **variables}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600, env=environment)
     if done.stderr.startswith("error: isolation"):
         pytest.skip(done.stderr.strip())
     assert done.stdout, done.stderr

@@ -34,6 +34,7 @@ def test_only_growth_by_more_than_a_fifth_is_warned_of(
 
 
 @pytest.mark.ros
+@pytest.mark.skipif(shutil.which("perf") is None, reason="perf is not installed")
 def test_virtual_seconds_are_those_of_all_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rubrics observe the five scenarios for 26 s, 28 s, and between 11 s and 24 s."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))

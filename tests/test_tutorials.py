@@ -19,6 +19,7 @@ CONSOLE = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 #: Pages that are read one after the other in one folder, and the number of their commands.
 SERIES = {
     "author": (["tutorials/author.md", "how-to/own-check.md"], 10),
+    "rule": (["tutorials/hint-rule.md"], 5),
     "class": (["tutorials/student.md", "tutorials/instructor.md", "tutorials/ta.md", "tutorials/ci.md"], 17),
 }
 

@@ -122,10 +122,12 @@ def test_each_command_has_a_man_page_that_can_be_shown(wheel: Path, tmp_path: Pa
     if shutil.which("groff") is None:
         pytest.skip("groff is not installed")
     for name in found:
-        command = ["groff", "-man", "-ww", "-Tutf8", "-Kutf8", archive.extract(name, tmp_path)]
+        # Without colours, bold, overstriking and underlining, which newer versions write as escape sequences.
+        plain = ("-P-c", "-P-b", "-P-o", "-P-u")
+        command = ["groff", "-man", "-ww", "-Tutf8", "-Kutf8", *plain, archive.extract(name, tmp_path)]
         done = subprocess.run(command, check=True, capture_output=True, text=True, encoding="utf-8")
         assert done.stderr == "", name
-        assert done.stdout.startswith(Path(name).stem.replace("-", " ").upper())
+        assert f"\nNAME\n       {Path(name).stem} " in done.stdout  # newer versions shorten a long name in the header
 
 
 @pytest.fixture

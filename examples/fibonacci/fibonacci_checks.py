@@ -7,6 +7,13 @@ from grader.api import Finding, HarnessError, Trace, calls_of, met, not_met
 
 
 @dataclass(frozen=True)
+class ResultFacts:
+    """What hint rules may know of a wrong result."""
+
+    lacking: int  # numbers that are missing at its end, if all others are right; 0 otherwise
+
+
+@dataclass(frozen=True)
 class FibonacciResults:
     """Every goal has a result with the Fibonacci numbers from number 0 to its order: `0, 1, 1, 2, 3, 5` for order 5.
 
@@ -36,7 +43,10 @@ class FibonacciResults:
                 if got != wanted:
                     found, expected = ("none" if n is None else n for n in (got, wanted))
                     reason = f"{self.action}, order {order}: number {place} is {found}, expected {expected}"
-                    return not_met(reason, {"order": order, "sequence": list(result["sequence"][:50])})
+                    numbers, right = list(result["sequence"]), fibonacci(order)
+                    lacking = len(right) - len(numbers) if numbers == right[: len(numbers)] else 0
+                    facts = ResultFacts(lacking)
+                    return not_met(reason, {"order": order, "sequence": numbers[:50]}, facts=facts)
         if compared < self.at_least:
             reason = f"{self.action}: {compared} results, expected at least {self.at_least}"
             return not_met(reason, {"results": compared}, blocked_by="action_result")

@@ -54,7 +54,7 @@ def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanat
     checks = {**known_checks(), **{check_name(c): type(c.check) for _, c in pairs}}
     if name in checks:
         return [_check(name, checks[name], [f"{e.id}/{c.id}" for e, c in pairs if check_name(c) == name])]
-    raise _unknown(name, [*(c.id for _, c in pairs), *checks])
+    raise unknown(name, [*(c.id for _, c in pairs), *checks])
 
 
 def everything(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
@@ -77,9 +77,13 @@ def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation 
     return [_check(name, kind, used.get(name, [])) for name, kind in {**known_checks(), **own}.items()]
 
 
+def exercises_of(rubrics: tuple[Path, ...]) -> list[Exercise]:
+    """Return the exercises of the given rubrics, or the built-in ones; each variant has its first values."""
+    return read_exercises(GradeRequest("", every=True, rubrics=rubrics, draw=First()), recorded=True)
+
+
 def _pairs(rubrics: tuple[Path, ...]) -> list[tuple[Exercise, Criterion]]:
-    exercises = read_exercises(GradeRequest("", every=True, rubrics=rubrics, draw=First()), recorded=True)
-    return [(e, c) for e in exercises for c in e.criteria]
+    return [(e, c) for e in exercises_of(rubrics) for c in e.criteria]
 
 
 def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation:
@@ -213,10 +217,13 @@ def _is_open(items: tuple[object, ...]) -> bool:
     return any(isinstance(item, (AnyOrder, SomeOf)) for item in items)
 
 
-def _unknown(name: str, names: Sequence[str]) -> GraderError:
+def unknown(
+    name: str, names: Sequence[str], wrong: str = "expected the id of a criterion or the name of a check, found neither"
+) -> GraderError:
+    """Return the error about a name that nothing has, with the names that are near."""
     known = list(dict.fromkeys(names))
     near = difflib.get_close_matches(name, known, n=OFFERED, cutoff=0.4)
     parts = [k for k in known if name.casefold() in k and k not in near] if len(name) > 2 else []
     offered = [*near, *parts][:OFFERED]
     hint = f"the nearest are {', '.join(offered)}" if offered else f"there are {', '.join(known)}"
-    return GraderError(f"explain {name}: expected the id of a criterion or the name of a check, found neither", hint)
+    return GraderError(f"explain {name}: {wrong}", hint)

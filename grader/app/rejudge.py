@@ -20,6 +20,7 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import ALL_MET, NOT_ALL_MET, UNDECIDED, UNUSABLE, EvidenceError, GraderError, exit_code
 from grader.core.exercise import Exercise
 from grader.core.report import Report, Reproduction
+from grader.core.submission import Run
 from grader.execution.evidence.store import (
     Evidence,
     first_report,
@@ -76,14 +77,20 @@ def judgement(
 
 def rejudge(evidence: Evidence, how: Judgement) -> Report:
     """Judge one submission's evidence; raises EvidenceError if it is damaged or has none of the requested exercises."""
+    exercises, run = again(evidence, how)
+    return judge_run(exercises, run, pictures=how.pictures)
+
+
+def again(evidence: Evidence, how: Judgement) -> tuple[list[Exercise], Run]:
+    """Return the exercises to judge by, and the run that evidence holds; raises EvidenceError like `rejudge`."""
     kept = evidence.manifest.run
     request = request_of(kept.request, submission=kept.path, seed=kept.seed, rubrics=how.rubrics)
     exercises = _as_recorded(_asked(evidence, how), request)
     run = run_of(evidence, exercises, verify=how.verify)
     if how.chosen:
         request = replace(request, exercises=how.chosen)
-    again = replace(run.reproduce, command=command_words(request, kept.seed))
-    return judge_run(exercises, replace(run, reproduce=again), pictures=how.pictures)
+    same = replace(run.reproduce, command=command_words(request, kept.seed))
+    return exercises, replace(run, reproduce=same)
 
 
 def judged_again(evidence: Evidence, exercises: Sequence[Exercise], request: GradeRequest, played: str) -> Report:

@@ -236,7 +236,7 @@ def _varying(topic: TopicSummary, path: str, low: float, high: float, needs: str
     comment = f"seen: {number(low)} to {number(high)}; decide: which range does the task ask for?"
     hint = f"{path} stays in its range"
     bounds = _round_range(low, high)
-    if path in ("data", "temperature") and carries_number(topic.types[0]):
+    if path != "variance" and carries_number(topic.types[0]):
         title = f"Random numbers on {topic.name}"
         asked = {"topic": topic.name, **bounds}
         yield DraftCriterion(f"{name}_random", title, "random_in_range", asked, hint, needs, comment)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError, HarnessError
-from grader.reporting.delivery import write_whole
+from grader.files import write_whole
 from grader.submissions.archives import (
     ARCHIVE_SUFFIXES,
     HEAD_BYTES,

@@ -10,7 +10,7 @@ from grader.classroom.final_marks import MARK, KeptMark, fits, load_mark, shown_
 from grader.classroom.store import RESULT
 from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError
-from grader.reporting.delivery import write_whole
+from grader.files import write_whole
 from grader.reporting.escape import shown
 from grader.reporting.html.final_mark import with_final_mark
 from grader.reporting.json_report import ReportData

@@ -86,6 +86,9 @@ WAITING_PER_JOB = 3
 AGAIN = "run the same command again"
 #: Longest line read from a process.
 _LINE_BYTES = 1 << 20
+#: Real seconds in which a process has to end that is no longer needed; a busy machine takes a while to end all that it
+#: has started.
+_END_S = 60.0
 WORKER = (sys.executable, "-s", "-m", "grader.classroom.worker")
 
 
@@ -237,7 +240,7 @@ class LocalScheduler:
             with suppress(OSError):
                 process.stdin.close()  # it cleans up and ends
         with suppress(subprocess.TimeoutExpired):
-            process.wait(timeout=10)
+            process.wait(timeout=_END_S)
         _kill(process)
         process.wait()
         if process.stdout is not None:

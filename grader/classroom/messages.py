@@ -13,7 +13,7 @@ from grader.classroom.store import Conditions
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Drawn
-from grader.reporting.delivery import write_whole
+from grader.files import write_whole
 from grader.submissions.collected import Collected, name_problem
 
 #: Largest size of an answer, and most files in it.

@@ -22,7 +22,7 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError
 from grader.core.exercise import Drawn
 from grader.core.limits import TIME_BUDGET_S
-from grader.reporting.delivery import write_whole
+from grader.files import write_whole
 from grader.reporting.escape import json_value
 
 SCHEMA = "grader/batch-result/v1"

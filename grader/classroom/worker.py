@@ -30,8 +30,8 @@ from grader.core.report import Report, Reproduction
 from grader.core.submission import Run
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.usage import families, usage
+from grader.files import write_whole
 from grader.reporting.audience import for_student
-from grader.reporting.delivery import write_whole
 from grader.reporting.html.render import render_html
 from grader.reporting.json_report import dumps
 from grader.reporting.platforms.gradescope import render_gradescope

@@ -279,7 +279,7 @@ def complain(*lines: str, kind: str = "warning") -> None:
 
 def write_file(path: Path, content: bytes, *, parents: bool = False) -> None:
     """Write a file atomically, and its folders if asked; raises GraderError if that fails."""
-    from grader.reporting.delivery import write_whole
+    from grader.files import write_whole
 
     try:
         if parents:

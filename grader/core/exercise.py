@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field
 from enum import Enum
 from fractions import Fraction
@@ -388,7 +388,7 @@ class Exercise:
     variant: Variant | None = None  # the values for this student; None if nothing varies
     interfaces: tuple[str, ...] = ()  # paths of the folders with interface packages that the rubric brings
     bonus: Fraction = Fraction(0)  # points above the maximum that an instructor may give
-    hints: tuple[HintRule, ...] = ()  # the rubric's own hint rules, in the order of its files
+    hints: Iterable[HintRule] = ()  # the rubric's own hint rules, in the order of its files
 
     @property
     def recorded(self) -> tuple[RecordedStream, ...]:

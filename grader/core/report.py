@@ -268,6 +268,31 @@ class CheckExplanation:
 
 
 @dataclass(frozen=True, slots=True)
+class RuleExplanation:
+    """What a hint rule explains."""
+
+    name: str  # as reports name it
+    priority: int  # its place among all rules: the lowest number is asked first
+    about: str  # the mistake, in a sentence; may be empty
+    checks: tuple[str, ...]  # the checks that it explains, by their names in rubrics; empty for any
+    problem: str  # the problem that the check must have found, such as `wrong_rate`; empty for any
+    fault: bool | None  # whether the program must have failed, or must not; None for either
+    file: str  # the author's file that holds it; empty for a rule of the grader
+
+
+@dataclass(frozen=True, slots=True)
+class RuleTrial:
+    """A criterion that lost points in a recording, and the rules that explain it."""
+
+    criterion: str  # as `exercise/criterion`
+    outcome: str
+    reason: str
+    # Name, priority, place and hint of each rule that applies, in their order: reports show the first. A place is
+    # written `file:line`, and is empty if the rule names none
+    rules: tuple[tuple[str, int, str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class CriterionExplanation:
     """What a criterion asks of a submission."""
 

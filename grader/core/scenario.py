@@ -144,6 +144,8 @@ class NumberStream:
     # until the end of an observation that starts with the scenario.
     hold_ns: LongTime
     start_ns: Time  # time of the first message since scenario start
+    # Name of the field that holds the number; by default `data`, or else the only number of a message
+    field: Annotated[str, Kind("field name")] = ""
 
 
 #: The type of messages that the stimulus `odometry` plays and `--odom-bag` replaces. Both are older than `recorded` and

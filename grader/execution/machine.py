@@ -82,6 +82,8 @@ MIN_SCRATCH_BYTES = 512 * MIB
 #: Memory below which a scenario with two nodes, its worker and the grader may not fit.
 MIN_MEMORY_BYTES = GIB
 
+#: How long a program may take to tell its version, in seconds.
+SAID_S = 60.0
 _VERSION = re.compile(r"<version>\s*([0-9.]+)\s*</version>")
 _CREATE_RULESET, _ASK_VERSION = 444, 1  # linux/landlock.h; the number is the same on every architecture
 #: Where the kernel exposes its settings.
@@ -164,7 +166,7 @@ def _bubblewrap() -> Fact:
 
 def _said_by(program: str) -> str:
     try:
-        done = subprocess.run([program, "--version"], capture_output=True, text=True, timeout=5, check=False)
+        done = subprocess.run([program, "--version"], capture_output=True, text=True, timeout=SAID_S, check=False)
     except (OSError, subprocess.SubprocessError, UnicodeError):
         return "cannot be started"
     return done.stdout.strip()[:80]

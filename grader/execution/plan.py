@@ -71,6 +71,7 @@ class PlannedNumbers:
     period_ns: int
     repeats: int
     numbers: tuple[PlannedNumber, ...]
+    field: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -368,7 +369,7 @@ def _numbers(stream: NumberStream, draw: random.Random, own: random.Random, unti
         # a node may switch off when messages stop, so the last number is repeated until the observation ends
         each[-1] = max(each[-1], -(-(until_ns - start_ns) // stream.period_ns) - sum(each[:-1]))
         numbers, repeats = tuple(n for n, times in zip(numbers, each, strict=True) for _ in range(times)), 1
-    return PlannedNumbers(stream.topic, stream.type, start_ns, stream.period_ns, repeats, numbers)
+    return PlannedNumbers(stream.topic, stream.type, start_ns, stream.period_ns, repeats, numbers, stream.field)
 
 
 def _number(spec: NumberSpec, draw: random.Random) -> PlannedNumber:

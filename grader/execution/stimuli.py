@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -10,6 +11,8 @@ from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedMessage
 from grader.execution.interfaces import message_class, plain_fields
 from grader.execution.plan import Plan, PlannedNumbers, PlannedRecording
 
+#: The numeric types of fields, as the classes of messages name them.
+_NUMBER = re.compile(r"float|double|u?int(8|16|32|64)")
 #: The distance of "just above" from a limit for floating-point types; integers differ by 1.
 FRACTION_STEP = 0.001
 
@@ -38,6 +41,7 @@ class Appear(TopicEvent):
 
     type: str
     fixed: bool = False
+    field: str = ""  # name of the field that holds a number to publish; see `numeric_field`
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +163,7 @@ def _message_events(stream: PlannedMessages) -> Iterator[Event]:
 
 
 def _number_events(stream: PlannedNumbers) -> Iterator[Event]:
-    yield Appear(0, stream.topic, stream.type)
+    yield Appear(0, stream.topic, stream.type, field=stream.field)
     for index in range(len(stream.numbers) * stream.repeats):
         t_ns = stream.start_ns + index * stream.period_ns
         yield PublishNumber(t_ns, stream.topic, stream.numbers[index // stream.repeats])
@@ -172,28 +176,32 @@ def _recording_events(recording: PlannedRecording) -> Iterator[Event]:
     yield Disappear(recording.stop_ns, recording.topic)
 
 
-def numeric_field(interface: str) -> tuple[str, bool] | None:
-    """Return the numeric field of a message type, and whether it is an integer; None if there is none."""
+def numeric_field(interface: str, field: str = "") -> tuple[str, bool] | None:
+    """Return the numeric field of a message type, and whether it is an integer; None if there is none.
+
+    Without a field, that is `data`, or else the only number apart from a variance, as in sensor_msgs/msg/FluidPressure.
+    """
     message = message_class(interface)
     if message is None:
         return None
     kinds: Mapping[str, str] = message.get_fields_and_field_types()
-    for name in ("data", "temperature"):
-        kind = kinds.get(name, "")
-        if kind in ("float", "double"):
-            return name, False
-        if kind.startswith(("int", "uint")) and "[" not in kind and "<" not in kind:
-            return name, True
-    return None
+    if field or "data" in kinds:
+        known = [(field or "data", kinds.get(field or "data", ""))]
+    else:
+        known = [(name, kind) for name, kind in kinds.items() if name != "variance" and _NUMBER.fullmatch(kind)]
+    if len(known) != 1 or not _NUMBER.fullmatch(known[0][1]):
+        return None
+    name, kind = known[0]
+    return name, kind not in ("float", "double")
 
 
-def number_message(interface: str, number: tuple[float, int]) -> tuple[Any, Mapping[str, Any]]:
+def number_message(interface: str, number: tuple[float, int], field: str = "") -> tuple[Any, Mapping[str, Any]]:
     """Build a message of a type from a planned number, and return it with its fields; integer types round.
 
     Raises:
         ValueError: The type has no numeric field.
     """
-    found = numeric_field(interface)
+    found = numeric_field(interface, field)
     if found is None:
         raise ValueError(interface)
     name, whole = found

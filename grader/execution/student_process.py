@@ -59,6 +59,9 @@ LAST_BYTES = 16_000
 TEXT_CHARACTERS = 4000
 #: Real seconds that a process has to end by itself after the stop signal.
 GRACE_S = 0.2
+#: Real seconds to wait for the exit code of a process that has closed its connection, as it does when it ends: a busy
+#: machine takes long from one to the other. Only a program that closes the connection and lives on takes all of it.
+CLOSED_S = 5.0
 #: Real seconds without a report after which a process is given up; the host's own watchdog acts sooner.
 SILENCE_S = 90.0
 
@@ -137,6 +140,7 @@ class NodeProcess:
     grader_failed: str = ""
     written: tuple[WrittenFile, ...] = ()
     reached: list[str] = field(default_factory=list)
+    _closed: bool = False  # whether it has closed its end of the connection
     _pending: bytes = b""
     _streams: dict[str, bytearray] = field(default_factory=lambda: {"stdout": bytearray(), "stderr": bytearray()})
     _kept: dict[str, int] = field(default_factory=lambda: {"stdout": 0, "stderr": 0})
@@ -246,9 +250,9 @@ class NodeProcess:
             return True
         return False
 
-    def last_report(self) -> None:
-        """Wait briefly for what a process reports when it is told to stop at the end of a recording."""
-        deadline = time.monotonic() + GRACE_S
+    def last_report(self, seconds: float) -> None:
+        """Wait for what a process reports when it is told to stop at the end of a recording, at most so long."""
+        deadline = time.monotonic() + seconds
         while (left_s := deadline - time.monotonic()) > 0 and len(self._pending) <= REPORT_BYTES:
             for descriptor, _ in self._poll.poll(left_s * 1000):
                 stream = self._sources[descriptor]
@@ -309,9 +313,10 @@ class NodeProcess:
         try:
             received = self.line.recv(1 << 16)
         except OSError:
-            return False
+            received = b""
         self._pending += received
-        return bool(received)
+        self._closed = not received
+        return not self._closed
 
     def _read(self, stream: str) -> bool:
         """Read from a stream without blocking; return whether there may be more output."""
@@ -408,7 +413,7 @@ class NodeProcess:
 
     def death(self, t_ns: int) -> Fault:
         """End a process that died or stopped reporting, and return its fault."""
-        ended = self._ends()
+        ended = self._ends(CLOSED_S if self._closed else GRACE_S)
         self._end_now()
         code = self.process.wait()
         if self.stopped:
@@ -436,10 +441,10 @@ class NodeProcess:
             with contextlib.suppress(OSError):
                 os.killpg(self.process.pid, signal.SIGKILL)
 
-    def _ends(self) -> bool:
-        """Wait briefly for the process to end by itself; return whether it did."""
+    def _ends(self, seconds: float = GRACE_S) -> bool:
+        """Wait for the process to end by itself, at most so long; return whether it did."""
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self.process.wait(GRACE_S)
+            self.process.wait(seconds)
         return self.process.returncode is not None
 
     def kill(self) -> None:

@@ -43,12 +43,14 @@ class TopicPeers(ABC):
         self._streams: dict[str, str] = {}
         #: Those of them whose type does not depend on the students' nodes.
         self._fixed: set[str] = set()
+        #: The field of each stream of numbers that holds them.
+        self._fields: dict[str, str] = {}
 
     def do(self, event: TopicEvent, now_ns: int) -> None:
         """Execute one event of a stimulus."""
         topic = event.topic
         if isinstance(event, PublishNumber):
-            message, value = number_message(self._streams[topic], event.number)
+            message, value = number_message(self._streams[topic], event.number, self._fields[topic])
             self._publish(Delivery(now_ns, topic, self._streams[topic], value), message)
         elif isinstance(event, PublishRecorded):
             self._publish(Delivery(now_ns, topic, self._streams[topic], event.value, event.cdr), event.cdr)
@@ -65,6 +67,7 @@ class TopicPeers(ABC):
                 self._offer(event.stream)
             elif isinstance(event, Appear):
                 (self._fixed.add if event.fixed else self._fixed.discard)(topic)
+                self._fields[topic] = event.field
                 self._advertise(topic, event.type)
             self._recorder.add(Mark(now_ns, "stream_starts", topic))
 
@@ -73,7 +76,7 @@ class TopicPeers(ABC):
         current, asked = self._streams[topic], [interface for interface, _ in self._asked(topic)]
         if topic in self._fixed or not asked or current in asked:
             return
-        if any(numeric_field(interface) is not None for interface in asked):
+        if any(self._carries(interface, topic) for interface in asked):
             self._observer.withdraw(topic)
             self._advertise(topic, current)
 
@@ -83,12 +86,16 @@ class TopicPeers(ABC):
     def _advertise(self, topic: str, default: str) -> bool:
         """Create a publisher as the students' subscriptions ask for it, with type and durability; return if latched."""
         asked = self._asked(topic)
-        usable = [interface for interface, _ in asked if interface == default or numeric_field(interface) is not None]
+        usable = [interface for interface, _ in asked if interface == default or self._carries(interface, topic)]
         interface = usable[0] if usable and topic not in self._fixed else default
         latched = any(late for found, late in asked if found == interface)
         self._observer.advertise(topic, interface, latched=latched)
         self._streams[topic] = interface
         return latched
+
+    def _carries(self, interface: str, topic: str) -> bool:
+        """Return whether a message type has the field for the numbers of a topic."""
+        return numeric_field(interface, self._fields.get(topic, "")) is not None
 
     def _publish(self, delivery: Delivery, message: Any) -> None:
         self._recorder.add(delivery)

@@ -31,6 +31,7 @@ from grader.execution.beside import files_beside, is_loose, whole_submission
 from grader.execution.codec import beside_trace, from_json, observation_to_json, trace_to_json
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.execution.launching import Launched, evaluated, expanded, renamed, unstarted
+from grader.execution.machine import load_per_processor
 from grader.execution.notes import Places
 from grader.execution.output_watch import OutputWatch
 from grader.execution.plan import Plan
@@ -51,6 +52,9 @@ from grader.student_host.starter import CONNECTED
 if TYPE_CHECKING:
     from grader.execution.runner import Runner
 
+#: Real seconds that a program has, on an idle machine, to end after the stop signal and to report what it wrote. Hardly
+#: any needs a tenth of it; only one that goes on regardless takes so long.
+LAST_REPORT_S = 2.0
 #: How often a run on the wall clock is tried if the machine is too busy, before the scenario is undecided.
 WALL_TRIES = 3
 #: The kernel's limits for the worker, if its resource monitor is too slow: mapped memory, and processor time beyond the
@@ -412,7 +416,7 @@ def end_in_order(students: list[NodeProcess]) -> None:
     for student in running:
         student.tell({"stop": True})
     for student in running:
-        student.last_report()
+        student.last_report(LAST_REPORT_S * load_per_processor())
 
 
 def stop(students: list[NodeProcess]) -> None:

@@ -11,7 +11,7 @@ from grader.core.chart import Band, Case, Chart, Level, Look, Moment, Panel, Poi
 from grader.core.dataclass import dataclass
 from grader.core.quantities import seconds
 from grader.core.trace import LogRecord, OutputLine, Request, Response, Trace
-from grader.judging.output import printed_lines
+from grader.judging.logs.outputs import printed_lines
 from grader.judging.texts import clean
 from grader.judging.values import Reading
 from grader.judging.wording import quote

@@ -30,7 +30,7 @@ from grader.core.trace import GraphSnapshot, Request, Response, Trace
 from grader.judging.authored import is_authored, mistake_of
 from grader.judging.charts import Lanes, marked_moments, time_chart
 from grader.judging.findings import fault_sentence
-from grader.judging.output import printed_lines
+from grader.judging.logs.outputs import printed_lines
 from grader.judging.plots import chart_of, shows_graph
 from grader.judging.recorded_values import recorded_values
 from grader.judging.values import on_student_topic

@@ -22,12 +22,22 @@ from grader.core.report import (
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import EXPORT_NOTEBOOK, Run, Submission, is_notebook
 from grader.core.trace import ClockKind, Fault, GraphSnapshot, StartWay, Trace, same_node_name
-from grader.judging.diagnosis import diagnose, placed
+from grader.judging.diagnosis import cases_of, clues_for, diagnose, placed, rules_of
+from grader.judging.diagnosis.rules import Clue, Rule
 from grader.judging.figures import excerpts_for, illustrated
 from grader.judging.findings import FAULT_KEY, SEND_LATER, fault_evidence
 from grader.judging.run_check import Answer, check_name, run_check
 from grader.judging.values import HIDDEN_TOPICS, on_student_topic
 from grader.judging.wording import listed, quote
+
+
+@dataclass(frozen=True, slots=True)
+class TriedRules:
+    """A criterion that lost points, and every rule that explains it."""
+
+    criterion: str  # as `exercise/criterion`
+    verdict: Verdict  # without a cause
+    clues: tuple[tuple[Rule, Clue], ...]  # in the order of the rules: reports show the first
 
 
 def judge_run(
@@ -83,14 +93,13 @@ def judge_exercise(
     already reported is blocked, and loses no points of its own. If a check raises, or a recording failed, the criterion
     is undecided.
     """
-    answers: dict[str, Answer] = {c.id: run_check(c, exercise, traces, submission, sources) for c in exercise.criteria}
-    verdicts = VerdictBuilder(exercise, answers, submission).verdicts()
+    verdicts, facts = _verdicts(exercise, traces, submission, sources)
     recorded = [(s.id, traces[s.id]) for s in exercise.scenarios if s.id in traces]
     reasons = [t.clock_reason for _, t in recorded if t.clock is ClockKind.WALL]
     mistakes: list[AuthorMistake] = []
     if sources is not None:
-        facts = {id_: a.finding.facts for id_, a in answers.items() if a.finding is not None}
-        verdicts = diagnose(verdicts, exercise, traces, submission, sources, facts, mistakes)
+        cases = cases_of(verdicts, exercise, traces, submission, sources, facts)
+        verdicts = diagnose(verdicts, cases, rules_of(exercise), mistakes) if any(cases) else verdicts
     notes = (f"the rubric has a mistake: {mistake}" for mistake in dict.fromkeys(mistakes))
     return replace(
         not_graded_yet(exercise),
@@ -101,6 +110,31 @@ def judge_exercise(
         notes=(*variant_notes(exercise.variant), *_notes(recorded, submission, sources), *notes),
         graph=_graph(exercise, traces),
         starts=tuple(dict.fromkeys(start for _, t in recorded for start in t.starts)),
+    )
+
+
+def _verdicts(
+    exercise: Exercise, traces: Mapping[str, Trace], submission: Submission, sources: Mapping[str, str] | None
+) -> tuple[tuple[Verdict, ...], Mapping[str, object]]:
+    """Return the verdicts without causes, in rubric order, and what each criterion's check hands to hint rules."""
+    answers: dict[str, Answer] = {c.id: run_check(c, exercise, traces, submission, sources) for c in exercise.criteria}
+    facts = {id_: answer.finding.facts for id_, answer in answers.items() if answer.finding is not None}
+    return VerdictBuilder(exercise, answers, submission).verdicts(), facts
+
+
+def tried_rules(exercise: Exercise, run: Run, mistakes: list[AuthorMistake]) -> tuple[TriedRules, ...]:
+    """Return every rule that applies to a recorded run of an exercise, by the criteria that lost points.
+
+    Mistakes in the exercise's own rules are appended to `mistakes`.
+    """
+    traces = {scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id}
+    verdicts, facts = _verdicts(exercise, traces, run.submission, run.sources)
+    cases = cases_of(verdicts, exercise, traces, run.submission, run.sources, facts)
+    rules = rules_of(exercise) if any(cases) else ()
+    return tuple(
+        TriedRules(f"{exercise.id}/{case.criterion.id}", case.verdict, tuple(clues_for(case, rules, mistakes)))
+        for case in cases
+        if case is not None
     )
 
 

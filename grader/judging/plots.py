@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from itertools import islice
-from typing import Any
+from typing import Any, Protocol
 
 from grader.core.chart import Band, Case, Chart, Level, Look, Panel, Series, Tone
 from grader.core.dataclass import dataclass
@@ -33,12 +33,13 @@ from grader.judging.values import (
     as_number,
     as_rule,
     delivered,
+    number_path,
     published,
     rules_text,
     shown,
     value_at,
 )
-from grader.judging.wording import listed, number, quote, unit_of
+from grader.judging.wording import in_unit, listed, number, quote
 
 #: Maximum number of panels of a chart, of panels for one topic, of lines in a panel, and of rows for texts.
 _MOST_PANELS, _MOST_GROUPS, _MOST_LINES, _MOST_WORDS = 6, 3, 6, 5
@@ -77,6 +78,8 @@ class Plot:
         bands: Accepted ranges of the first field.
         expected: What the first field should have been.
         most: Maximum number of panels.
+        number: Path of the field that goes by the name of the topic.
+        unit: Unit of that field.
     """
 
     topic: str
@@ -86,6 +89,8 @@ class Plot:
     bands: tuple[Band, ...] = ()
     expected: tuple[Reading, ...] = ()
     most: int = _MOST_GROUPS
+    number: str = "data"
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,6 +238,7 @@ def _topic_panels(plot: Plot, items: Sequence[Item], verb: str, *, several: bool
     timed = [(item.t_ns, item.value) for item in items]
     how = {"came": "received on", "published": "published on"}[verb]
     head = f"{counted(len(items), 'message')} {how} {plot.topic}"
+    plot = replace(plot, number=number_path(items[0].value) or plot.number) if items else plot
     return value_panels(plot, timed, head, plot.topic if several else "", steps=verb == "came")
 
 
@@ -343,7 +349,7 @@ def _label(path: str) -> str:
 
 def _name(plot: Plot, path: str) -> str:
     """Return the name of a field in a legend: a topic with a single field goes by its own name."""
-    return plot.topic if path in ("data", "temperature") else _label(path)
+    return plot.topic if path == plot.number else _label(path)
 
 
 def _values(path: str, timed: Sequence[_Timed]) -> list[tuple[int, object]]:
@@ -373,9 +379,9 @@ def _lines(plot: Plot, readings: Mapping[str, Sequence[Reading]], *, steps: bool
 def _panel(  # noqa: PLR0913
     plot: Plot, group: str, paths: Sequence[str], lines: Sequence[Series], prefix: str, *, first: bool
 ) -> Panel:
-    alone = paths in (["data"], ["temperature"])
+    alone = list(paths) == [plot.number]
     title = plot.topic if alone else f"{prefix} {_label(group)}".strip() or "value"
-    unit = unit_of(plot.topic).strip() if alone else _UNITS.get(group.rpartition(".")[2], "")
+    unit = plot.unit if alone else _UNITS.get(group.rpartition(".")[2], "")
     levels, bands = _ruled({path: plot.rules[path] for path in paths if path in plot.rules})
     if first:
         levels, bands = [*plot.levels, *levels], [*plot.bands, *bands]
@@ -571,3 +577,30 @@ def _part(value: Mapping[str, object], name: str) -> Mapping[str, object]:
 def said_of(value: Mapping[str, object]) -> str:
     """Return the content of a message as text: `order = 3, name = 'a'`."""
     return ", ".join(f"{quote(str(name), 40)} = {shown(inner)}" for name, inner in islice(value.items(), 12))
+
+
+class Switching(Protocol):
+    """A check on a controller that switches at a threshold."""
+
+    @property
+    def input(self) -> str:
+        """Topic of the numbers."""
+
+    @property
+    def output(self) -> str:
+        """Topic of the answers."""
+
+    @property
+    def threshold(self) -> float:
+        """Where the answer changes."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of the input."""
+
+
+def threshold_drawing(check: Switching, expected: Sequence[Reading]) -> Drawing:
+    """Return the inputs of a controller with its threshold, above its answers with the expected ones."""
+    level = Level(check.threshold, f"{number(check.threshold)}{in_unit(check.unit)}", name="threshold")
+    heard = Plot(check.input, levels=(level,), unit=check.unit)
+    return Drawing((heard, Plot(check.output, expected=tuple(expected))))

@@ -9,7 +9,8 @@ from dataclasses import field
 from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.core.trace import ClockKind, Delivery, LogRecord, OutputLine, Trace
-from grader.judging.output import printed_lines, student_records
+from grader.judging.logs.matching import AS_SENT, chance
+from grader.judging.logs.outputs import printed_lines, student_records
 from grader.judging.texts import (
     SLACK_M,
     Pair,
@@ -240,8 +241,6 @@ _POSITION_SHARE = 0.5
 #: Streams longer than this need more than one or two logs.
 _LONG_STREAM_NS = 5 * NS_PER_S
 _FEWEST_IN_LONG_STREAM = 3
-#: A printed number may show positions within this many units of its last digit, with a margin.
-_UNITS_SHOWN = 2
 #: Up to this many templates are normal for a program with several wordings; more suggest that it varies its text.
 _FEW_WORDINGS = 3
 #: Maximum share of right templates that chance may explain.
@@ -329,10 +328,10 @@ def _luck(group: Group, track: Track) -> float:
         return 0.0
     first, second = group.pair or group.pairs[0]
     steps = [(e.numbers[first].step, e.numbers[second].step) for e in group.entries]
-    chance = min(1.0, _UNITS_SHOWN * max(x for x, _ in steps) / track.spans[0])
-    chance *= min(1.0, _UNITS_SHOWN * max(y for _, y in steps) / track.spans[1])
+    both = chance(max(x for x, _ in steps), track.spans[0], AS_SENT)
+    both *= chance(max(y for _, y in steps), track.spans[1], AS_SENT)
     told = {(e.numbers[first].value, e.numbers[second].value) for e in group.entries}
-    return float(len(group.pairs) * chance ** len(told))
+    return float(len(group.pairs) * both ** len(told))
 
 
 def _needed(track: Track) -> int:

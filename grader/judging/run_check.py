@@ -13,7 +13,7 @@ from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import Submission
 from grader.core.trace import Fault, FaultKind, Request, Response, Trace
 from grader.judging.authored import breach, is_authored, mistake_in, mistake_of
-from grader.judging.checks import name_of_check
+from grader.judging.checks import CHECKS
 from grader.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
 from grader.judging.installation import EXTRAS, INTERFACES, lacking_package, lacking_python
 from grader.judging.launched import excuses
@@ -57,7 +57,8 @@ class Answer:
 
 def check_name(criterion: Criterion) -> str:
     """Return the name of a criterion's check in rubrics."""
-    return criterion.check_name or name_of_check(criterion.check)
+    known = (name for name, kind in CHECKS.items() if type(criterion.check) is kind)
+    return criterion.check_name or next(known, type(criterion.check).__name__)
 
 
 def run_check(

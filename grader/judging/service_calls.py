@@ -10,7 +10,7 @@ from itertools import pairwise
 from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_MS
 from grader.core.trace import ClockKind, LogRecord, Request, Response, Trace
-from grader.judging.output import Output, number_in, shape_of, written
+from grader.judging.logs.outputs import Output, number_in, shape_of, written
 from grader.judging.values import JITTER_NS, number_at, text_at, value_at
 from grader.judging.wording import number
 

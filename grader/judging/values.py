@@ -23,7 +23,8 @@ EXACT = 1e-6
 #: Largest difference between two clock readings of one moment.
 JITTER_NS = {ClockKind.VIRTUAL: 0, ClockKind.WALL: 50 * NS_PER_MS}
 _NUMERIC_TYPE = re.compile(
-    r"(std_msgs|example_interfaces)/msg/(Float(32|64)|U?Int(8|16|32|64)|Char)|sensor_msgs/msg/Temperature"
+    r"(std_msgs|example_interfaces)/msg/(Float(32|64)|U?Int(8|16|32|64)|Char)"
+    r"|sensor_msgs/msg/(FluidPressure|Illuminance|RelativeHumidity|Temperature)"
 )
 
 
@@ -46,6 +47,11 @@ class Held:
     start_ns: int
     stop_ns: int
     value: float
+
+    @property
+    def t_ns(self) -> int:
+        """When it came."""
+        return self.start_ns
 
 
 class FewSuffice:
@@ -82,13 +88,21 @@ def as_number(value: object) -> float | None:
         return math.inf if value > 0 else -math.inf
 
 
-def number_of(message: Message | Delivery) -> float | None:
-    """Return the number in a message's field `data` or `temperature`, or None."""
-    for key in ("data", "temperature"):
-        found = as_number(message.value.get(key))
-        if found is not None:
-            return found
-    return None
+def number_path(value: Mapping[str, object]) -> str:
+    """Return the path of the number that a message stands for; empty if it stands for none.
+
+    That is `data`, or else its only number apart from a variance, as in `sensor_msgs/msg/FluidPressure`.
+    """
+    if as_number(value.get("data")) is not None:
+        return "data"
+    found = [name for name, inner in value.items() if name != "variance" and as_number(inner) is not None]
+    return found[0] if len(found) == 1 else ""
+
+
+def number_of(message: Message | Delivery, field: str = "") -> float | None:
+    """Return the number in a field of a message, by default the one that it stands for, or None."""
+    path = field or number_path(message.value)
+    return number_at(message.value, path) if path else None
 
 
 def carries_number(type_: str) -> bool:
@@ -116,20 +130,20 @@ def delivered(trace: Trace, topic: str) -> tuple[Delivery, ...]:
 
 
 @per_trace
-def published_numbers(trace: Trace, topic: str) -> tuple[Reading, ...]:
-    """Return the numbers that the student's nodes published on a topic during the observation."""
-    return _readings(published(trace, topic))
+def published_numbers(trace: Trace, topic: str, field: str = "") -> tuple[Reading, ...]:
+    """Return the numbers that the student's nodes published on a topic during the observation; see `number_of`."""
+    return _readings(published(trace, topic), field)
 
 
 @per_trace
-def delivered_numbers(trace: Trace, topic: str) -> tuple[Reading, ...]:
-    """Return the numbers that the grader published on a topic during the observation."""
-    return _readings(delivered(trace, topic))
+def delivered_numbers(trace: Trace, topic: str, field: str = "") -> tuple[Reading, ...]:
+    """Return the numbers that the grader published on a topic during the observation; see `number_of`."""
+    return _readings(delivered(trace, topic), field)
 
 
-def _readings(messages: Iterable[Message | Delivery]) -> tuple[Reading, ...]:
+def _readings(messages: Iterable[Message | Delivery], field: str) -> tuple[Reading, ...]:
     """Return the numbers of those messages that hold one."""
-    found = ((m.t_ns, number_of(m)) for m in messages)
+    found = ((m.t_ns, number_of(m, field)) for m in messages)
     return tuple(Reading(t_ns, value) for t_ns, value in found if value is not None)
 
 
@@ -139,12 +153,12 @@ def last_of_instant(series: Sequence[Reading]) -> tuple[Reading, ...]:
 
 
 @per_trace
-def held(trace: Trace, topic: str, *, heard_from_ns: int = 0) -> tuple[Held, ...]:
+def held(trace: Trace, topic: str, field: str = "", *, heard_from_ns: int = 0) -> tuple[Held, ...]:
     """Return the numbers that the grader published on a topic, merging equal neighbours.
 
     Numbers sent before `heard_from_ns`, without a subscriber, are left out, unless that would leave none.
     """
-    sent = delivered_numbers(trace, topic)
+    sent = delivered_numbers(trace, topic, field)
     received = [r for r in sent if r.t_ns >= heard_from_ns] or sent
     starts: list[Reading] = []
     for reading in received:

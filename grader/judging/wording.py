@@ -41,9 +41,9 @@ def quote(text: str, length: int = QUOTE_LENGTH) -> str:
     return line if len(line) <= length else line[: length - 1] + "…"
 
 
-def unit_of(topic: str) -> str:
-    """Return the unit of a topic's numbers with a leading space; empty if the name does not show it."""
-    return " °C" if "temperature" in topic.lower() else ""
+def in_unit(unit: str) -> str:
+    """Return what follows a number that has a unit: the unit after a space; empty if it has none."""
+    return f" {unit}" if unit else ""
 
 
 def nearest(name: str, candidates: Iterable[str]) -> str | None:

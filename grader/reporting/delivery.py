@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
 import shutil
-import stat
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -17,6 +15,7 @@ from typing import TextIO
 from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError
 from grader.core.report import Report
+from grader.files import beside, is_special, target_of, write_whole
 from grader.reporting.audience import ANYBODY, Readers
 from grader.reporting.escape import encoded
 from grader.reporting.formats import FORMATS, PageLayout, check_surroundings, rendered
@@ -24,55 +23,16 @@ from grader.reporting.formats import FORMATS, PageLayout, check_surroundings, re
 
 def check_writable(path: Path) -> None:
     """Raise OSError if a report cannot be written to a path; what is there is not changed."""
-    target = _target(path)
-    if _is_special(target):
+    target = target_of(path)
+    if is_special(target):
         return
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if target.exists() and not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
-    descriptor, probe = _beside(target)
+    descriptor, probe = beside(target)
     os.close(descriptor)
     probe.unlink()
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file atomically: a reader finds the old content or all of the new; no temporary file is left behind.
-
-    A symbolic link stays a link, and an existing file keeps its mode. Special files, such as /dev/null or a pipe, are
-    written to directly.
-    """
-    target = _target(path)
-    if _is_special(target):
-        target.write_bytes(data)
-        return
-    descriptor, fresh = _beside(target)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        if target.exists():
-            fresh.chmod(stat.S_IMODE(target.stat().st_mode))
-        fresh.replace(target)
-    except BaseException:
-        with suppress(OSError):
-            fresh.unlink()
-        raise
-
-
-def _target(path: Path) -> Path:
-    return Path(os.path.realpath(path))
-
-
-def _is_special(path: Path) -> bool:
-    return path.exists() and not path.is_file() and not path.is_dir()
-
-
-def _beside(target: Path) -> tuple[int, Path]:
-    """Create an empty file in the target's folder, with the mode that the user's umask allows."""
-    fresh = target.parent / f".grade-{secrets.token_hex(8)}.tmp"
-    return os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666), fresh
 
 
 _FILE_WIDTH = 100

@@ -1,4 +1,4 @@
-"""Renders explanations of criteria and checks, and the values of one student's variant, as text and as JSON."""
+"""Renders explanations of criteria, checks and hint rules, and the values of one student's variant."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
 from grader.core.exercise import Exercise, Variant, written
-from grader.core.report import CheckExplanation, CriterionExplanation, Parameter
+from grader.core.report import CheckExplanation, CriterionExplanation, Parameter, RuleExplanation, RuleTrial
 from grader.reporting.escape import json_value, markdown, markdown_code, shown
 
 EXPLANATION_SCHEMA = "grader/explanation/v1"
+RULES_SCHEMA = "grader/rules/v1"
 _LABEL = 12
 #: Widest column of parameters with their values.
 _VALUE = 32
@@ -34,6 +35,42 @@ def explanations_to_json(found: Sequence[CriterionExplanation | CheckExplanation
         for e in found
     ]
     return json.dumps({"schema": EXPLANATION_SCHEMA, "explanations": rows}, indent=2) + "\n"
+
+
+def render_rules(found: Sequence[RuleExplanation], *, width: int) -> str:
+    """Return hint rules as text: priority, name, what they explain, and the mistake that they look for."""
+    lines: list[str] = []
+    for rule in found:
+        where = f" ({shown(rule.file)})" if rule.file else ""
+        lines += _wrapped(f"{rule.priority:>6}  ", f"{shown(rule.name)}{where}: {_explains(rule)}", width, after=10)
+        lines += _wrapped(" " * 10, shown(rule.about), width, after=10) if rule.about else []
+    return "\n".join([*lines, "", "The rule with the lowest number is asked first, and the first that applies wins.\n"])
+
+
+def _explains(rule: RuleExplanation) -> str:
+    parts = [", ".join(map(shown, rule.checks)) or "any check"]
+    parts += [f"problem {rule.problem}"] if rule.problem else []
+    parts += ["after a fault"] if rule.fault else []
+    parts += ["with or without a fault"] if rule.fault is None else []
+    return "; ".join(parts)
+
+
+def render_trials(found: Sequence[RuleTrial], *, width: int) -> str:
+    """Return the rules that apply to a recording as text, by criterion; reports show the first of each."""
+    lines: list[str] = []
+    for trial in found:
+        words = f"{trial.outcome.replace('_', ' ')}. {shown(trial.reason, limit=2000)}"
+        lines += _wrapped("", f"{shown(trial.criterion)}: {words}", width, after=2)
+        for name, priority, place, hint in trial.rules:
+            where = f"{shown(place)}: " if place else ""
+            lines += _wrapped(f"{priority:>6}  {shown(name)}: ", f"{where}{shown(hint, limit=2000)}", width, after=10)
+        lines += [""] if trial.rules else ["        no rule applies", ""]
+    return "\n".join(lines) if found else "No criterion lost points, so that no rule is asked.\n"
+
+
+def rules_to_json(found: Sequence[RuleExplanation] | Sequence[RuleTrial]) -> str:
+    """Return hint rules, or their trial on a recording, as JSON text."""
+    return json.dumps({"schema": RULES_SCHEMA, "rules": [asdict(one) for one in found]}, indent=2) + "\n"
 
 
 def list_checks(found: Sequence[CriterionExplanation | CheckExplanation], *, width: int) -> str:

@@ -9,12 +9,14 @@ from __future__ import annotations
 import copyreg
 import dataclasses
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from types import ModuleType
 from typing import Any
 
 from grader.core.author_files import run
+from grader.core.dataclass import dataclass
+from grader.core.exercise import HintRule
 
 
 def module_of(path: str, content: bytes) -> ModuleType:
@@ -28,12 +30,30 @@ def module_of(path: str, content: bytes) -> ModuleType:
 
 @cache
 def rules_in(path: str, content: bytes) -> tuple[Any, ...]:
-    """Return the rules of a file in the order of its text, which other processes can recreate."""
+    """Return the rules of a file in the order of its text."""
     from grader.judging.diagnosis.rules import Rule  # noqa: PLC0415  takes 50 ms, and most rubrics have no rules
 
-    copyreg.pickle(Rule, _reduced_rule)
     rules = (value for value in vars(module_of(path, content)).values() if isinstance(value, Rule))
-    return tuple(dataclasses.replace(rule, file=(path, content)) for rule in dict.fromkeys(rules))
+    return tuple(dataclasses.replace(rule, file=path) for rule in dict.fromkeys(rules))
+
+
+@dataclass(frozen=True, slots=True)
+class OwnHints:
+    """The hint rules of a rubric, by the path and the text of each file that holds some.
+
+    A file runs when its rules are first asked for: they need all of diagnosis, which takes 50 ms to import.
+    """
+
+    files: tuple[tuple[str, bytes], ...] = ()
+
+    def __iter__(self) -> Iterator[HintRule]:
+        """Yield the rules in the order of the files and of their text."""
+        for path, content in self.files:
+            yield from rules_in(path, content)
+
+    def __add__(self, others: OwnHints) -> OwnHints:
+        """Return these rules and others."""
+        return OwnHints(self.files + others.files)
 
 
 def _reduced(value: Any) -> tuple[Any, ...]:
@@ -45,13 +65,3 @@ def _reduced(value: Any) -> tuple[Any, ...]:
 
 def _remade(path: str, content: bytes, name: str, given: Mapping[str, object]) -> Any:
     return getattr(module_of(path, content), name)(**given)
-
-
-def _reduced_rule(rule: Any) -> tuple[Any, ...]:
-    """Return how another process recreates a rule of a rubric's own; it has to run the file first."""
-    path, content = rule.file
-    return _remade_rule, (path, content, rule.id)
-
-
-def _remade_rule(path: str, content: bytes, id_: str) -> Any:
-    return next(rule for rule in rules_in(path, content) if rule.id == id_)

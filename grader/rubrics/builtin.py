@@ -36,8 +36,8 @@ class Header:
 @cache
 def builtin_exercises() -> tuple[Exercise, ...]:
     """Return the built-in exercises, ordered by number; raises RubricError without any."""
-    state = state_of([*_paths(), *_recorded(), *shipped("rubrics").glob("*/*.py")])
-    return compiled("rubrics", state + state_of_package(), _read_exercises)
+    beside = sorted(shipped("rubrics").rglob("*.py"))  # checks and hint rules that a rubric names
+    return compiled("rubrics", state_of([*_paths(), *_recorded(), *beside]) + state_of_package(), _read_exercises)
 
 
 def _read_exercises() -> tuple[Exercise, ...]:

@@ -11,9 +11,9 @@ from functools import cache
 from pathlib import Path
 
 from grader.core.dataclass import dataclass
-from grader.core.exercise import HintRule
 from grader.core.shipped import shipped
 from grader.judging.checks import CHECKS
+from grader.rubrics.author_modules import OwnHints
 from grader.rubrics.own_checks import load, load_hints, own_files
 
 #: The names of both files in the folder of an exercise.
@@ -34,11 +34,11 @@ def known_checks() -> Mapping[str, type]:
     return {**CHECKS, **{name: kind for shared in _exercises() for name, kind in shared.checks.items()}}
 
 
-def hints_of(names: Iterable[str]) -> tuple[HintRule, ...]:
+def hints_of(names: Iterable[str]) -> OwnHints:
     """Return the hint rules of the exercises that some of these checks come from, in the order of the exercises."""
     asked = set(names)
     folders = [shared.folder for shared in _exercises() if asked & shared.checks.keys()]
-    return tuple(rule for folder in folders for rule in _hints(folder))
+    return sum(map(_hints, folders), OwnHints())
 
 
 @cache
@@ -48,6 +48,6 @@ def _exercises() -> tuple[_Shared, ...]:
 
 
 @cache
-def _hints(folder: Path) -> tuple[HintRule, ...]:
+def _hints(folder: Path) -> OwnHints:
     there = (folder / HINT_FILE).is_file()
-    return load_hints(own_files(folder / HINT_FILE, [HINT_FILE]), known_checks()) if there else ()
+    return load_hints(own_files(folder / HINT_FILE, [HINT_FILE]), known_checks()) if there else OwnHints()

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
-from grader.core.exercise import Check, Criterion, Exercise, HintRule, Variant
+from grader.core.exercise import Check, Criterion, Exercise, Variant
 from grader.core.limits import Limits
 from grader.core.quantities import duration
 from grader.core.rubric_files import rubric_file
@@ -35,6 +35,7 @@ from grader.core.scenario import (
     shortest,
 )
 from grader.judging.checks import CHECKS
+from grader.rubrics.author_modules import OwnHints
 from grader.rubrics.draws import Draw, First
 from grader.rubrics.exercise_checks import hints_of, known_checks
 from grader.rubrics.interfaces import Interfaces, interface_mistakes
@@ -243,7 +244,7 @@ class _Brought:
     own: frozenset[str]  # the names of its own checks
     simulations: Mapping[str, OwnSimulation]
     provided: Mapping[str, str]
-    hints: tuple[HintRule, ...]
+    hints: OwnHints
 
 
 def read_rubric(
@@ -364,7 +365,7 @@ def _exercise(
         by_request=rubric.exercise.by_request,
         bonus=rubric.exercise.bonus or Fraction(0),
         interfaces=tuple(str(path.parent / folder) for folder in rubric.interfaces),
-        hints=(*brought.hints, *hints_of({criterion.check_name for criterion in criteria} - brought.own)),
+        hints=brought.hints + hints_of({criterion.check_name for criterion in criteria} - brought.own),
     )
 
 

@@ -58,7 +58,7 @@ _LIMITS = {
     "message_bytes": "message_size",
 }
 _STIMULI: Mapping[str, type[Shape]] = {
-    "numbers": part_model(NumberStream, "NumbersShape", start=0),
+    "numbers": part_model(NumberStream, "NumbersShape", start=0, field=None),
     "recorded": part_model(RecordedStream, "RecordedShape", start=0),
     "odometry": OdometryShape,
     "messages": part_model(MessageStream, "MessagesShape", period=NS_PER_S, stop=None),

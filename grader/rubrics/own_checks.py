@@ -18,9 +18,9 @@ from typing import Any
 from grader.core.author_files import line_of, words_of
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
-from grader.core.exercise import HintRule, Outcome, ProblemKind
+from grader.core.exercise import Outcome, ProblemKind
 from grader.interfaces.definitions import files_in
-from grader.rubrics.author_modules import module_of, rules_in
+from grader.rubrics.author_modules import OwnHints, module_of, rules_in
 from grader.rubrics.check_parameters import choice_model, simulation_shape
 from grader.rubrics.mistakes import nearest
 from grader.rubrics.types import BESIDE
@@ -140,7 +140,7 @@ def load(files: Sequence[OwnFile], known: Mapping[str, type]) -> dict[str, type]
     """Run check files, and return their checks by name, none of which is in `known`; raises RubricError."""
     found: dict[str, type] = {}
     for file in files:
-        table = _table(file, TABLE, lambda f: vars(module_of(str(f.path.resolve()), f.content)).get(TABLE))
+        table = _table(file, TABLE, lambda f: vars(module_of(*_told(f))).get(TABLE))
         problems = list(_problems(file, table, {**known, **found}, _no_check))
         if problems:
             raise RubricError("\n".join(problems))
@@ -160,8 +160,8 @@ def load_simulations(files: Sequence[OwnFile]) -> dict[str, OwnSimulation]:
     return found
 
 
-def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> tuple[HintRule, ...]:
-    """Run files with hint rules, and return their rules in the order of the files and of their text.
+def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> OwnHints:
+    """Run files with hint rules, and return their rules.
 
     Args:
         files: The files; one may hold checks too.
@@ -172,26 +172,29 @@ def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> tuple[Hin
             does not exist, or cannot be asked.
     """
     if not files:
-        return ()
-    from grader.judging.diagnosis import RULES  # noqa: PLC0415  takes 50 ms, and most rubrics have no rules
+        return OwnHints()
+    from grader.judging.diagnosis import RULES  # noqa: PLC0415  most rubrics have no rules
 
     taken = {rule.id for rule in RULES}
-    found: list[HintRule] = []
+    problems: list[str] = []
     for file in files:
-        rules, where = _ran(file, lambda f: rules_in(str(f.path.resolve()), f.content)), shown(str(file.path), 500)
+        rules, where = _ran(file, lambda f: rules_in(*_told(f))), shown(str(file.path), 500)
         if not rules:
             text = f"{where}:1: expected hint rules, which are functions with @hint_rule(...) above them, found none"
             raise RubricError(text)
-        problems = []
         for rule in rules:
             wrong = "expected a new name, found one that is taken" if rule.id in taken else _no_rule(rule, known)
             line = getattr(getattr(rule.function, "__code__", None), "co_firstlineno", 1)
             problems += [f"{where}:{line}: `{shown(rule.id)}`: {wrong}"] if wrong else []
             taken.add(rule.id)
-        if problems:
-            raise RubricError("\n".join(problems))
-        found += rules
-    return tuple(found)
+    if problems:
+        raise RubricError("\n".join(problems))
+    return OwnHints(tuple(map(_told, files)))
+
+
+def _told(file: OwnFile) -> tuple[str, bytes]:
+    """Return where a file is, and its text."""
+    return str(file.path.resolve()), file.content
 
 
 def _no_rule(rule: Any, known: Mapping[str, type]) -> str:
@@ -302,7 +305,7 @@ def _no_check(kind: object) -> str:
 def _no_simulation(kind: object) -> str:
     """Return why something is not a simulation; empty if it is one."""
     if not isinstance(kind, type) or not issubclass(kind, Simulation):
-        return "expected a class derived from grader.simulation.Simulation, found something else"
+        return "expected a class derived from grader.api.Simulation, found something else"
     if "__dataclass_fields__" not in vars(kind):
         return "expected a dataclass, found another class: write @dataclass above it"
     return _no_parameters(lambda: simulation_shape("own", kind))

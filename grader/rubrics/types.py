@@ -173,17 +173,15 @@ ActionType = Annotated[
 ]
 PythonFile = Annotated[
     str,
-    MatchingText(
-        r"[^/\\\x00-\x1f]+\.py", "a file name such as fan_controller.py, without folders", "fan_controller.py"
-    ),
+    MatchingText(r"[^/\\\x00-\x1f]+\.py", "a file name such as my_node.py, without folders", "my_node.py"),
 ]
 #: A program that the student hands in: a file, or an executable that the entry points of a package name.
 ProgramName = Annotated[
     str,
     MatchingText(
         r"[^/\\\x00-\x1f]+\.py|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-][A-Za-z0-9_.-]*",
-        "a file name such as fan_controller.py, without folders, or an executable such as my_package/talker",
-        "fan_controller.py",
+        "a file name such as my_node.py, without folders, or an executable such as my_package/talker",
+        "my_node.py",
     ),
 ]
 #: What the student hands in: programs and parameter files.
@@ -191,8 +189,8 @@ HandedIn = Annotated[
     str,
     MatchingText(
         r"[^/\\\x00-\x1f]+\.(?:py|ya?ml)|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-][A-Za-z0-9_.-]*",
-        "a file name such as fan_controller.py, without folders, or an executable such as my_package/talker",
-        "fan_controller.py",
+        "a file name such as my_node.py, without folders, or an executable such as my_package/talker",
+        "my_node.py",
     ),
 ]
 #: A launch file or parameter file of the rubric's own, beside it.

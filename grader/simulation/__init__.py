@@ -1,6 +1,6 @@
 """Participants of a scenario that react: simulated robots, for rubrics that grade closed loops.
 
-    from grader.simulation import DifferentialDrive, Moment, Simulation
+    from grader.api import DifferentialDrive, Moment, Simulation
 
 A rubric uses one as a stimulus: `simulation: {differential_drive: {x: {between: [-1, 1]}}}`. The author of a rubric
 writes another as a class in a file that the rubric lists under `simulations`.

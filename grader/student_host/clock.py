@@ -54,6 +54,10 @@ class VirtualClock:
         #: Whether a pause or a timer's period has begun since the last report, so that the work before it delays what
         #: follows; and whether one did before which the program had not looked at a clock.
         self.paused = self.counted = False
+        #: Returns how long it is until each of the program's timers is due: it may poll them.
+        self.timers_due_in_ns: Callable[[], list[int]] = list
+        #: The latest instant at which time did not pass because a timer was due.
+        self._spared_ns = 0
         #: Lets the time pass that the program has worked, if that is part of the recording.
         self.charge: Callable[[], None] = lambda: None
         #: Returns the system clock in nanoseconds since 1970, once rclpy is there to read it.
@@ -127,9 +131,15 @@ class VirtualClock:
             self._yield()
 
     def _yield(self) -> None:
+        """Let a step pass, but not beyond the next timer: a program that polls it calls it on time."""
+        waits_ns = self.timers_due_in_ns()
+        if 0 in waits_ns and self._spared_ns != self.now_ns:  # it is about to be called, if the program polls it
+            self._spared_ns, self._allowed = self.now_ns, LOOKS
+            return
         self._yielding = self.paused = True
+        step_ns = STEP_NS if self._looked_at else LONG_STEP_NS
         try:
-            self.let_time_pass(self.now_ns + (STEP_NS if self._looked_at else LONG_STEP_NS))
+            self.let_time_pass(self.now_ns + min((wait for wait in waits_ns if 0 < wait < step_ns), default=step_ns))
         finally:
             self._yielding = self._looked_at = False
 

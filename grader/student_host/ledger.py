@@ -331,6 +331,11 @@ class Ledger:
         """Return whether any message was taken ahead of time and is still kept."""
         return len(self._kept) > 0 and any(self._kept.values())
 
+    def may_be_pushed_out(self) -> bool:
+        """Return whether this process has sent messages, not announced yet, after others that are still kept."""
+        kept = (subscription.topic_name for subscription, messages in self._kept.items() if messages)
+        return bool(self.sent) and any(self.sent[f"topic {topic}"] for topic in kept)
+
     def expects_anything(self) -> bool:
         """Return whether any message is expected."""
         return len(self._expected) > 0 and any(count > 0 for count in self._expected.values())

@@ -198,8 +198,17 @@ def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Cal
                 joiners.remove(green_thread)
         join_thread(self)
 
+    alive = threading.Thread.is_alive
+
+    def is_alive(self: threading.Thread) -> bool:
+        # Its last Python code has run. Python calls it alive until the operating system has ended it too, in real time.
+        if getattr(self, "_grader_finished", False):
+            join_thread(self)
+        return alive(self)
+
     threading.Thread._bootstrap_inner = bootstrap_inner  # type: ignore[attr-defined]
     threading.Thread.join = join  # type: ignore[method-assign]
+    threading.Thread.is_alive = is_alive  # type: ignore[method-assign]
 
     report_threads(report_fault)
 

@@ -5,30 +5,28 @@ from __future__ import annotations
 import statistics
 from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from grader.api import (
     EXACT,
     FAULT_KEY,
     JITTER_NS,
     NS_PER_MS,
-    NS_PER_S,
     AnswerFacts,
     AnswerRow,
     ClockKind,
     Drawing,
     Endpoint,
     Fault,
+    FieldOf,
     Finding,
     HarnessError,
     Held,
-    Level,
     LogRecord,
     OutputLine,
-    Plot,
     Problem,
     ProblemKind,
     Reading,
@@ -44,6 +42,8 @@ from grader.api import (
     first_fault,
     heard_from_ns,
     held,
+    in_unit,
+    lag_ns,
     last_of_instant,
     met,
     moment,
@@ -55,7 +55,9 @@ from grader.api import (
     quote,
     seconds,
     span,
+    steps_behind,
     student_endpoints,
+    threshold_drawing,
     unmet_policy,
     within,
 )
@@ -94,6 +96,9 @@ class ThresholdResponse:
         above: Answer expected above the threshold.
         otherwise: Answer expected at or below it.
         side: The side that this criterion judges.
+        input_field: Path of the number in the input; by default `data`, or else its only number.
+        output_field: The same in the answers.
+        unit: Unit of the input, for reasons and charts, e.g. `m`.
     """
 
     roles: ClassVar[Roles] = Roles(hears=("input",), speaks=("output",))
@@ -103,29 +108,34 @@ class ThresholdResponse:
     above: float
     otherwise: float
     side: Literal["above", "at_or_below"]
+    input_field: Annotated[str, FieldOf("input")] = ""
+    output_field: Annotated[str, FieldOf("output")] = ""
+    unit: str = ""
 
     @property
     def expected(self) -> str:
-        limit = f"{number(self.threshold)}{_unit(self.input)}"
+        limit = f"{number(self.threshold)}{in_unit(self.unit)}"
         side, answer = ("above", self.above) if self.side == "above" else ("at or below", self.otherwise)
         return f"{number(answer)} on {self.output} for every {self.input} {side} {limit}"
 
     def judge(self, trace: Trace) -> Finding:
-        inputs = held(trace, self.input, heard_from_ns=heard_from_ns(trace, self.input))
+        inputs = held(trace, self.input, self.input_field, heard_from_ns=heard_from_ns(trace, self.input))
         messages = published(trace, self.output)
         if not messages:
             return self._once(self._silent(trace))
         mine = [h for h in inputs if (h.value > self.threshold) == (self.side == "above")]
         if not mine:
             return self._nothing_asked(trace)
-        every = published_numbers(trace, self.output)
+        every = published_numbers(trace, self.output, self.output_field)
         answers = last_of_instant(every)
         if not answers:
             type_ = messages[0].type
             reason, problem = f"{self.output}: {quote(type_)} carries no number", ProblemKind.NO_NUMBER
             return self._once(not_met(reason, {"type": type_}, problem=problem))
         grace_ns = _grace(answers)
-        prompt = answers if _answers_at_once(trace, self.input, answers) else ()
+        prompt = (
+            answers if _answers_at_once(delivered_numbers(trace, self.input, self.input_field), trace, answers) else ()
+        )
         found = [self._violation(h, every, trace, grace_ns) or self._behind(h, prompt) for h in mine]
         violations = [v for v in found if v is not None]
         evidence = self._evidence(inputs, answers)
@@ -136,7 +146,7 @@ class ThresholdResponse:
         reason = (
             f"{self.output}: {number(self._expected(mine[0].value))} for each of {counted(len(mine), 'value')} {side} "
         )
-        reason += f"{number(self.threshold)}{_unit(self.input)} ({numbers(h.value for h in mine)})"
+        reason += f"{number(self.threshold)}{in_unit(self.unit)} ({numbers(h.value for h in mine)})"
         return met(reason, evidence)
 
     def _once(self, finding: Finding) -> Finding:
@@ -202,7 +212,7 @@ class ThresholdResponse:
     ) -> Finding:
         first = violations[0]
         answers = last_of_instant(every)
-        unit = _unit(self.input)
+        unit = in_unit(self.unit)
         wanted = number(self._expected(first.held.value))
         found = "no answer" if first.got is None else number(first.got)
         brief = f"{self.output}: {found} for {number(first.held.value)}{unit} on {self.input}, expected {wanted}"
@@ -215,7 +225,7 @@ class ThresholdResponse:
             cause = f"; {' and '.join(map(number, sorted(both)))} are published at one instant"
             hint = f"publish one answer to each number on {self.input}"
             return not_met(reason + cause, evidence, hint=hint, problem=ProblemKind.CONTRADICTION, brief=brief)
-        lag = _lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
+        lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
         if lag is not None:
             reason += f"; the answers are right for what was published {span(lag)} before"
             hint = f"answer the newest message on {self.input}"
@@ -229,7 +239,7 @@ class ThresholdResponse:
         self, violations: Sequence[_Violation], inputs: Sequence[Held], answers: Sequence[Reading]
     ) -> tuple[str, str]:
         """Return an addition to the reason, and a hint; both may be empty."""
-        limit = f"{number(self.threshold)}{_unit(self.input)}"
+        limit = f"{number(self.threshold)}{in_unit(self.unit)}"
         rule = f"publish {number(self.above)} above {limit} and {number(self.otherwise)} at or below it"
         logic = self._logic(inputs, answers)
         if logic:
@@ -286,9 +296,9 @@ class ThresholdResponse:
 
     def drawing(self, trace: Trace) -> Drawing:
         """Return the inputs of the controller with its threshold, and its answers with the expected ones."""
-        expected = [Reading(h.start_ns, self._expected(h.value)) for h in held(trace, self.input)]
+        expected = [Reading(h.start_ns, self._expected(h.value)) for h in held(trace, self.input, self.input_field)]
         expected += [Reading(trace.stop_ns, r.value) for r in expected[-1:]]
-        return _threshold_drawing(self.input, self.output, self.threshold, expected)
+        return threshold_drawing(self, expected)
 
 
 def _deaf(subscriptions: Sequence[Endpoint]) -> str:
@@ -296,9 +306,9 @@ def _deaf(subscriptions: Sequence[Endpoint]) -> str:
     return " with transient_local durability, which a volatile publisher does not offer" if latched else ""
 
 
-def _answers_at_once(trace: Trace, topic: str, answers: Sequence[Reading]) -> bool:
+def _answers_at_once(sent: Sequence[Reading], trace: Trace, answers: Sequence[Reading]) -> bool:
     """Return whether a controller answers each input at its own instant, which only virtual time can tell."""
-    asked = {r.t_ns for r in delivered_numbers(trace, topic)}
+    asked = {r.t_ns for r in sent}
     prompt = sum(a.t_ns in asked for a in answers)
     enough = trace.clock is ClockKind.VIRTUAL and prompt >= _FEWEST_AT_ONCE and 2 * prompt >= len(asked)
     return enough and prompt >= _SHARE_AT_ONCE * len(answers)
@@ -364,6 +374,9 @@ class AnswersTogether:
         threshold: Where the answer changes; the threshold itself is not above.
         above: Answer expected above the threshold.
         otherwise: Answer expected at or below it.
+        input_field: Path of the number in the input; by default `data`, or else its only number.
+        output_field: The same in the answers.
+        unit: Unit of the input, for reasons and charts, e.g. `m`.
     """
 
     roles: ClassVar[Roles] = Roles(hears=("input",), speaks=("input", "output"))
@@ -372,23 +385,29 @@ class AnswersTogether:
     threshold: float
     above: float
     otherwise: float
+    input_field: Annotated[str, FieldOf("input")] = ""
+    output_field: Annotated[str, FieldOf("output")] = ""
+    unit: str = ""
 
     @property
     def expected(self) -> str:
-        limit = f"{number(self.threshold)}{_unit(self.input)}"
+        limit = f"{number(self.threshold)}{in_unit(self.unit)}"
         answers = f"{number(self.above)} above {limit}, {number(self.otherwise)} otherwise"
         return f"every {self.input} of the one node answered by the other on {self.output}: {answers}"
 
     def judge(self, trace: Trace) -> Finding:
         sent, answered = published(trace, self.input), published(trace, self.output)
-        for topic, messages in ((self.input, sent), (self.output, answered)):
+        for topic, field, messages in (
+            (self.input, self.input_field, sent),
+            (self.output, self.output_field, answered),
+        ):
             if not messages:
                 return self._silent(trace, topic)
-            if len(published_numbers(trace, topic)) < len(messages):
+            if len(published_numbers(trace, topic, field)) < len(messages):
                 type_, problem = messages[0].type, Problem(ProblemKind.NO_NUMBER, (topic,))
                 return not_met(f"{topic}: {quote(type_)} carries no number", {"type": type_}, problem=problem)
-        inputs = published_numbers(trace, self.input)
-        answers = last_of_instant(published_numbers(trace, self.output))
+        inputs = published_numbers(trace, self.input, self.input_field)
+        answers = last_of_instant(published_numbers(trace, self.output, self.output_field))
         evidence = self._evidence(inputs, answers)
         return (
             self._contradictory(trace, inputs, evidence)
@@ -429,7 +448,7 @@ class AnswersTogether:
     def _contradictory(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, int]) -> Finding | None:
         """Return a finding if different answers of one instant fit no current input."""
         times, jitter_ns = [r.t_ns for r in inputs], JITTER_NS[trace.clock]
-        for one, following in pairwise(published_numbers(trace, self.output)):
+        for one, following in pairwise(published_numbers(trace, self.output, self.output_field)):
             recent = _recent(inputs, times, one.t_ns, jitter_ns)
             # at the instant of the first input, a timer may have fired before it
             if one.t_ns != following.t_ns or one.value == following.value or not recent or one.t_ns == times[0]:
@@ -438,7 +457,7 @@ class AnswersTogether:
                 continue
             both = " and ".join(map(number, sorted((one.value, following.value))))
             reason = f"{moment(one.t_ns)}, {self.output}: {both} at one instant for {number(recent[-1].value)}"
-            reason += f"{_unit(self.input)} on {self.input}, expected {number(self._expected(recent[-1].value))} only"
+            reason += f"{in_unit(self.unit)} on {self.input}, expected {number(self._expected(recent[-1].value))} only"
             hint = f"publish one answer to each number on {self.input}"
             known = evidence | {"first_wrong_s": seconds(one.t_ns)}
             return not_met(reason, known, hint=hint, problem=self._wrong)
@@ -456,7 +475,7 @@ class AnswersTogether:
                 continue
             if not recent or any(within(answer.value, self._expected(r.value), EXACT) for r in recent):
                 continue
-            value, unit = recent[-1].value, _unit(self.input)
+            value, unit = recent[-1].value, in_unit(self.unit)
             reason = f"{moment(answer.t_ns)}, {self.output}: {number(answer.value)} for {number(value)}{unit} on "
             reason += f"{self.input}, expected {number(self._expected(value))}"
             return self._behind(reason, inputs, answers, evidence | {"first_wrong_s": seconds(answer.t_ns)})
@@ -466,7 +485,7 @@ class AnswersTogether:
         self, reason: str, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: Mapping[str, float]
     ) -> Finding:
         """Return that an answer is wrong, and by how much the answers lag if that explains all of them."""
-        behind = _steps_behind(inputs, answers, lambda got, value: within(got, self._expected(value), EXACT))
+        behind = steps_behind(inputs, answers, lambda got, value: within(got, self._expected(value), EXACT))
         if not behind:
             return not_met(reason, evidence, problem=self._wrong)
         reason += f"; the answers fit the input of {counted(behind, 'message')} earlier"
@@ -537,11 +556,11 @@ class AnswersTogether:
         fixed = Problem(ProblemKind.NEVER_CHANGES, (self.input, self.output))
         if len({r.value for r in inputs}) == 1:
             reason = f"{self.output}: never changes, because {self.input} is {number(inputs[0].value)}"
-            return not_met(f"{reason}{_unit(self.input)} all the time", evidence, problem=fixed)
+            return not_met(f"{reason}{in_unit(self.unit)} all the time", evidence, problem=fixed)
         if len(set(expected)) == 1 and _stays(inputs):
             low, high = min(r.value for r in inputs), max(r.value for r in inputs)
             reason = f"{self.output}: never changes, because {self.input} stays between {number(low)} and "
-            return not_met(f"{reason}{number(high)}{_unit(self.input)}", evidence, problem=fixed)
+            return not_met(f"{reason}{number(high)}{in_unit(self.unit)}", evidence, problem=fixed)
         # a timer of 1 s may miss rare inputs; a controller that answers every other input may not
         often = 0 if 2 * len(answers) >= len(inputs) else _RARE * len(inputs)
         asked = {w for w, count in Counter(expected).items() if count > often}
@@ -550,7 +569,7 @@ class AnswersTogether:
         if not lacking:
             return None
         reason = f"{self.output}: never {number(lacking[0])}, though {self.input} was on both sides of "
-        return not_met(f"{reason}{number(self.threshold)}{_unit(self.input)}", evidence, problem=self._wrong)
+        return not_met(f"{reason}{number(self.threshold)}{in_unit(self.unit)}", evidence, problem=self._wrong)
 
     def _all_well(self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, int]) -> Finding:
         reason = (
@@ -560,8 +579,10 @@ class AnswersTogether:
 
     def drawing(self, trace: Trace) -> Drawing:
         """Return the messages between the student's two nodes, with the threshold and the expected answers."""
-        expected = [Reading(r.t_ns, self._expected(r.value)) for r in published_numbers(trace, self.input)]
-        return _threshold_drawing(self.input, self.output, self.threshold, expected)
+        expected = [
+            Reading(r.t_ns, self._expected(r.value)) for r in published_numbers(trace, self.input, self.input_field)
+        ]
+        return threshold_drawing(self, expected)
 
 
 def _usual_gap(answers: Sequence[Reading]) -> int:
@@ -637,66 +658,6 @@ def _file_of(trace: Trace, endpoint: Endpoint) -> str:
     written: list[LogRecord | OutputLine | Fault] = [*trace.records(), *trace.lines(), *trace.faults()]
     named = (o.process for o in written if o.process.removesuffix(".py") == bare.rsplit(".", 1)[-1])
     return next(named, "")
-
-
-#: Step between the lags that are tried, and the longest lag.
-_STEP_NS = 100 * NS_PER_MS
-_LONGEST_NS = 8 * NS_PER_S
-#: Maximum number of inputs that an answer may lag behind.
-_FURTHEST_BEHIND = 25
-#: Minimum share of answers that must fit for a lag to be reported.
-_SURE_BEHIND = 0.97
-#: Fewer answers than this may fit by chance.
-_FEWEST_ANSWERS = 10
-#: Whether an answer (first) is right for an input (second).
-_Right = Callable[[float, float], bool]
-
-
-def _lag_ns(inputs: Sequence[Reading], answers: Sequence[Reading], right: _Right) -> int | None:
-    """Return by how much the answers lag behind the inputs that they are right for; None if they do not."""
-    found: int | None = None
-    for lag in range(0, _LONGEST_NS + 1, _STEP_NS):
-        fits = _fits(inputs, answers, right, lag)
-        if fits and lag == 0:
-            return None
-        if fits:
-            found = lag
-        elif found is not None:
-            break
-    return found
-
-
-def _fits(inputs: Sequence[Reading], answers: Sequence[Reading], right: _Right, lag: int) -> bool:
-    times = [r.t_ns for r in inputs]
-    asked = [
-        (a.value, inputs[bisect_right(times, a.t_ns - lag) - 1].value) for a in answers if a.t_ns - lag >= times[0]
-    ]
-    changes = len({got for got, _ in asked}) > 1
-    return len(asked) >= _FEWEST_ANSWERS and changes and all(right(got, value) for got, value in asked)
-
-
-def _steps_behind(inputs: Sequence[Reading], answers: Sequence[Reading], right: _Right) -> int:
-    """Return how many inputs back the input is that nearly every answer is right for; 0 if there is none."""
-    times = [r.t_ns for r in inputs]
-    newest = [(a.value, bisect_right(times, a.t_ns) - 1) for a in answers]
-    for behind in range(_FURTHEST_BEHIND + 1):
-        asked = [(got, inputs[place - behind].value) for got, place in newest if place >= behind]
-        if len(asked) < _FEWEST_ANSWERS or len({got for got, _ in asked}) < 2:
-            return 0
-        if sum(right(got, value) for got, value in asked) >= _SURE_BEHIND * len(asked):
-            return behind
-    return 0
-
-
-def _unit(topic: str) -> str:
-    """Return the unit of a topic's numbers with a leading space; empty if the name does not show it."""
-    return " °C" if "temperature" in topic.lower() else ""
-
-
-def _threshold_drawing(input_: str, output: str, threshold: float, expected: Sequence[Reading]) -> Drawing:
-    """Return the inputs of a controller with its threshold, above its answers with the expected ones."""
-    level = Level(threshold, f"{number(threshold)}{_unit(input_)}", name="threshold")
-    return Drawing((Plot(input_, levels=(level,)), Plot(output, expected=tuple(expected))))
 
 
 CHECKS = {"threshold_response": ThresholdResponse, "answers_together": AnswersTogether}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from grader.api import (
     EXACT,
@@ -28,7 +28,6 @@ from grader.api import (
     last_name,
     made,
     made_for,
-    name_of_check,
     names_in,
     number,
     number_in_code,
@@ -432,7 +431,9 @@ def _answered_once(controller: _Controller) -> Clue | None:
             function = source.function_of(call)
             stores = [s for name in names for s in source.stores(name) if source.function_of(s) is function]
             if stores and function is not None and is_flag(test.test):
-                hint = f"'if {source.code(test.test, 40)}' lets one answer through: answer each temperature"
+                hint = (
+                    f"'if {source.code(test.test, 40)}' lets one answer through: answer each message on {check.input}"
+                )
                 return Clue(hint, source.place(test), key="answered_once")
     return None
 
@@ -518,7 +519,8 @@ def _slow_timer(controller: _Controller) -> Clue | None:
         worth = constant(source, item.period)
         inside = set(runs(source, item))
         if worth is not None and worth.value > 1.25 and all(c in inside for c in calls):
-            hint = f"{timer_code(source, item)} answers every {number(worth.value)} s only: answer each temperature"
+            slow = f"{timer_code(source, item)} answers every {number(worth.value)} s only"
+            hint = f"{slow}: answer each message on {check.input}"
             return Clue(hint, source.place(worth.origin), key="slow_timer")
     return None
 
@@ -540,7 +542,6 @@ def _never_crosses(case: Case) -> Clue | None:
     """All drawn values are on one side of the controller's threshold."""
     check = case.check
     owners = [s for s in case.sources.values() if made_for(s, "publisher", check.input) is not None]
-    siblings: tuple[Any, ...] = case.siblings
     calls = draws(owners[0]) if len(owners) == 1 else []
     if len(calls) != 1 or last_name(calls[0].func) not in ("uniform", "randint") or len(calls[0].args) != 2:
         return None
@@ -549,7 +550,7 @@ def _never_crosses(case: Case) -> Clue | None:
     if len(known) < 2 or min(known) <= check.threshold < max(known):
         return None
     hint = f"{owners[0].code(calls[0])} stays on one side of {number(check.threshold)}"
-    asked = next((c for c in siblings if name_of_check(c) == "random_in_range" and c.topic == check.input), None)
+    asked = next((c for c in case.asked("random_in_range") if c.topic == check.input), None)
     hint += f": the values go from {number(asked.low)} to {number(asked.high)}" if asked is not None else ""
     return Clue(hint, owners[0].place(calls[0]), key="draw")
 
@@ -565,9 +566,8 @@ def _follows(case: Case) -> Clue | None:
     fixed = problem.kind is ProblemKind.NEVER_CHANGES
     stopped = problem.kind is ProblemKind.STOPPED and check.input in problem.topics
     answered = problem.kind is ProblemKind.WRONG_ANSWER or (quiet and check.output in problem.topics)
-    lost: dict[str, Any] = dict(case.lost)
-    for id_, other in lost.items():
-        kind = name_of_check(other)
+    for id_, criterion in case.lost.items():
+        kind, other = criterion.check_name, cast("Any", criterion.check)
         controller = kind == ALONE and other.output == check.output
         sensor = kind == "random_in_range" and other.topic == check.input
         pace = kind == "topic_rate" and other.topic == check.input

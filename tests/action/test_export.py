@@ -5,11 +5,13 @@ import importlib.metadata
 import io
 import json
 import re
+import sys
 import zipfile
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from packaging.requirements import Requirement
 from stand_in_runner import ROOT
 
 from grader import packaging
@@ -104,7 +106,10 @@ def test_pins_hold_what_the_package_needs_and_nothing_of_its_developers() -> Non
 def test_the_pins_of_the_action_name_all_that_is_needed_now() -> None:
     """A requirement that is new has to be pinned as well: grade export constraints > integrations/constraints.txt."""
     kept = (ROOT / "integrations" / "constraints.txt").read_text().splitlines()
-    assert {line.split("==")[0] for line in kept} == {line.split("==")[0] for line in pins().splitlines()}
+    pinned = {each.name for each in map(Requirement, kept) if each.marker is None or each.marker.evaluate()}
+    needed = {line.split("==")[0] for line in pins().splitlines()}
+    # The file was written with Python 3.11; a newer one needs less.
+    assert needed == pinned if sys.version_info[:2] == (3, 11) else needed <= pinned
 
 
 def test_an_installation_that_does_not_know_its_requirements_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -204,7 +204,7 @@ class Arena:
 
     def processes_left(self) -> list[str]:
         """Return the command lines of processes that nobody waits for any more; they get a moment to be ended."""
-        deadline = time.monotonic() + 5.0
+        deadline = time.monotonic() + 60.0
         while processes := self._orphans():
             if time.monotonic() > deadline:
                 for pid in processes:

@@ -84,7 +84,7 @@ def test_rules_are_asked_in_the_order_of_their_priorities(tmp_path: Path) -> Non
     ids = [rule.id for rule in rules_of(read_rubric(write(tmp_path, HINTS + more)))]
     known = [rule.id for rule in RULES]
     assert ids == ["earliest", "slow_pump", *known[:-1], "as_late", known[-1], "latest"]
-    assert read_rubric(tmp_path / "pump.yaml").hints[0].priority == FIRST
+    assert next(iter(read_rubric(tmp_path / "pump.yaml").hints)).priority == FIRST
     assert rules_of(read_rubric(write_rubric(tmp_path))) is RULES
 
 
@@ -191,7 +191,7 @@ def test_a_rule_that_fails_costs_only_its_hint(tmp_path: Path, body: str, told: 
 
 def rule_of(path: Path) -> tuple[Rule, Any]:
     exercise: Any = read_rubric(path)
-    return exercise.hints[0], exercise.criteria[0].check
+    return next(iter(exercise.hints)), exercise.criteria[0].check
 
 
 def test_a_rule_is_tried_without_a_node(tmp_path: Path) -> None:

@@ -60,9 +60,9 @@ def test_labels_lie_apart(browser: Browser, tmp_path: Path, width: int) -> None:
         figures=(CHART,),
     )
     file.write_text(render_html(report(judged)), encoding="utf-8")
-    page = browser.new_page(viewport={"width": width, "height": 900})
+    page = browser.new_context(viewport={"width": width, "height": 900}).new_page()
     page.goto(file.as_uri())
-    page.wait_for_selector("html[data-ready=yes]", timeout=20_000)
+    page.wait_for_selector("html[data-ready=yes]")
     labels = {text: box for text, *box in page.evaluate(BOXES)}
     page.close()
     assert {"a", "b", "/odom begins", "exception"} <= set(labels)

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -52,12 +53,16 @@ def test_a_killed_class_is_finished_by_the_same_command(class_: Path, tmp_path: 
     first.kill()
     first.communicate()
     assert done.startswith(("[2/4] ada: 30/30", "[2/4] bob: 20/30"))  # two are graded at a time
-    result = results / "students" / done.split()[1].rstrip(":") / "result.json"
-    before = result.stat().st_mtime_ns
+    # Another one may have been done before the class was killed.
+    before = {path: path.stat().st_mtime_ns for path in results.glob("students/*/result.json")}
+    assert {"dan", done.split()[1].rstrip(":")} <= {path.parent.name for path in before}
 
     second = run(class_, "-o", results, *ONE)
-    assert "to grade: 2, done before: 2" in second.stderr
-    assert result.stat().st_mtime_ns == before
+    counted = re.search(r"^to grade: (\d), done before: (\d)", second.stderr, re.MULTILINE)
+    assert counted is not None, second.stderr
+    assert sum(map(int, counted.groups())) == 4
+    assert int(counted[2]) >= len(before)
+    assert {path: path.stat().st_mtime_ns for path in before} == before
     assert second.returncode == 1, second.stderr  # one submission cannot be used
 
     undisturbed = tmp_path / "other"

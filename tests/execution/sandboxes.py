@@ -159,7 +159,7 @@ def start(command: Command) -> Iterator[subprocess.Popen[str]]:
 def finish(command: Command) -> subprocess.CompletedProcess[str]:
     """Run a command to its end."""
     with start(command) as process:
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=600)
         process.wait()
     return subprocess.CompletedProcess(command.argv, process.returncode, out, err)
 

@@ -209,20 +209,26 @@ def test_later_endpoints_are_told_when_they_appear(run: Callable[..., Trace], cl
     """Each of three publishers at its time, and what has gone is still counted; a program may act on nothing else."""
     later = """
     node = Node("later")
+    told = []
+    node.create_subscription(Int32, "/refused", lambda m: told.append(m.data), 10)
     for number in range(3):
         time.sleep(1)
         publisher = node.create_publisher(Int32, "/count", BEST_EFFORT)
         time.sleep(0.5)
+        while len(told) <= number:
+            rclpy.spin_once(node, timeout_sec=0.01)
         node.destroy_publisher(publisher)
     """
     waiting = """
     node = Node("waiting")
     answer = node.create_publisher(Int32, "/refused", 10)
     events = SubscriptionEventCallbacks(incompatible_qos=lambda e: answer.publish(Int32(data=e.total_count)))
+    while answer.get_subscription_count() < 2:
+        time.sleep(0.01)
     node.create_subscription(Int32, "/count", lambda _: None, 10, event_callbacks=events)
     rclpy.spin(node)
     """
-    trace = run(waiting, later, clock=clock, duration_ns=6 * NS_PER_S)
+    trace = run(waiting, later, clock=clock, duration_ns=10 * NS_PER_S)
     assert [message.value["data"] for message in trace.messages("/refused")] == [1, 2, 3]
     if clock == "virtual":
         assert [round(message.t_ns / NS_PER_S, 3) for message in trace.messages("/refused")] == [1.0, 2.5, 4.0]

@@ -20,8 +20,10 @@ class Writer:
 
     pipe: tuple[int, int] = field(default_factory=os.pipe)
     ended: bool = False
+    asked: threading.Event = field(default_factory=threading.Event)
 
     def descriptors(self) -> tuple[int, ...]:
+        self.asked.set()
         return () if self.ended else self.pipe[:1]
 
 
@@ -40,9 +42,10 @@ def test_output_wakes_until_it_is_read(writer: Writer) -> None:
         assert not woken.wait(0.2)
         for _ in range(2):
             os.write(writer.pipe[1], b"x")
-            assert woken.wait(10)
+            assert woken.wait(60)
             os.read(writer.pipe[0], 1)
-            threading.Event().wait(0.2)  # in which it may have looked before the read
+            writer.asked.clear()
+            assert writer.asked.wait(60)  # whatever it noticed before the read, it has told by now
             woken.clear()
             assert not woken.wait(0.2)
 

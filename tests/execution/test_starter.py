@@ -9,7 +9,6 @@ import platform
 import re
 import resource
 import signal
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -225,7 +224,7 @@ def test_a_folder_of_a_forked_process_has_a_size_and_ends_with_it(tier: str, tmp
         pytest.skip(fault.message)
     folders = [text.replace("|", "/") for text in (*printed(trace), *printed(calm))]
     assert ["grade-student-" in folder for folder in folders] == [True, True]
-    assert wait_until(lambda: not any(Path(folder).exists() for folder in folders), 10)
+    assert wait_until(lambda: not any(Path(folder).exists() for folder in folders), 60)
 
 
 def test_a_program_does_not_see_the_starter(run: Callable[..., Trace]) -> None:
@@ -399,21 +398,9 @@ def test_a_process_that_is_killed_is_told_as_killed(run: Callable[..., Trace]) -
     assert (fault.kind, fault.signal) == (FaultKind.KILLED, "SIGKILL")
 
 
-def settled() -> list[int]:
-    """Return the descendants of this process when none has come or gone for a while, at the latest after 10 s."""
-    deadline = time.monotonic() + 10
-    found, since = sorted(below()), time.monotonic()
-    while time.monotonic() < min(since + 0.5, deadline):
-        time.sleep(0.02)
-        now = sorted(below())
-        if now != found:
-            found, since = now, time.monotonic()
-    return found
-
-
 def test_nothing_is_left_of_a_process(run: Callable[..., Trace]) -> None:
     """Neither what it started nor its sandbox, nor an entry in the kernel's list of processes."""
     run(hostile())
-    before = settled()
+    before = below()  # with what is about to end of the first recording
     run(hostile())
-    assert settled() == before
+    assert wait_until(lambda: below() <= before, 60), below() - before

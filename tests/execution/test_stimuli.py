@@ -54,6 +54,10 @@ def test_streams_are_merged_by_time_and_keep_their_order() -> None:
         (FLOAT, ("data", False)),
         ("std_msgs/msg/Float64", ("data", False)),
         ("sensor_msgs/msg/Temperature", ("temperature", False)),
+        ("sensor_msgs/msg/FluidPressure", ("fluid_pressure", False)),
+        ("sensor_msgs/msg/Range", None),
+        ("geometry_msgs/msg/Point", None),
+        ("builtin_interfaces/msg/Time", None),
         *((f"std_msgs/msg/{sign}Int{bits}", ("data", True)) for sign in ("", "U") for bits in (8, 16, 32, 64)),
         ("std_msgs/msg/String", None),
         ("std_msgs/msg/Bool", None),
@@ -73,7 +77,7 @@ def test_streams_are_merged_by_time_and_keep_their_order() -> None:
     ],
 )
 def test_types_that_carry_a_number(interface: str, field: tuple[str, bool] | None) -> None:
-    """Any numeric type of std_msgs and a temperature; nothing else, and nothing outside message packages."""
+    """Any numeric type of std_msgs, and what a sensor measures if that is one number; nothing outside packages."""
     assert numeric_field(interface) == field
 
 

@@ -286,7 +286,7 @@ def vars_of(observation: Any) -> list[Any]:
 # --- real processes ---------------------------------------------------------------------------------------------------
 
 BEGIN = """
-import json, os, signal, socket, sys
+import json, os, signal, socket, sys, time
 line = socket.socket(fileno=int(sys.argv[1]))
 def report(**fields): line.sendall(json.dumps(fields).encode() + b"\\n")
 """
@@ -389,6 +389,42 @@ def test_an_end_without_a_word_has_its_reason(
     assert (death.t_ns, death.process, death.kind, death.text) == (9, "a.py", kind, text)
     student.drain()
     assert [line.text for line in student.output(9, final=True)] == ["last words"]
+
+
+def test_an_end_has_its_reason_however_long_it_takes(start: Callable[[str], NodeProcess]) -> None:
+    """A busy machine may need more than the time that a process is given to end by itself."""
+    student = start(f"line.close(); time.sleep({2 * module.GRACE_S}); os.abort()")
+    assert student.report() is None
+    assert student.death(9).text == "ended by SIGABRT"
+
+
+def test_a_process_that_closes_its_connection_and_lives_on_is_ended(
+    start: Callable[[str], NodeProcess], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It could never be asked again."""
+    monkeypatch.setattr(module, "CLOSED_S", 0.1)
+    student = start("line.close(); signal.pause()")
+    assert student.report() is None
+    assert student.death(9).text == "stopped: it no longer answered the grader"
+
+
+def test_what_a_program_reports_at_its_end_is_waited_for(start: Callable[[str], NodeProcess]) -> None:
+    """A busy machine takes long to end it; what comes after its exit is nobody's."""
+    told = "report(kind='written', files=[dict(name='log.txt', content='eA==')]); report(kind='exited', code=0)"
+    student = start(f"line.makefile().readline(); time.sleep(0.5); {told}; report(kind='reached', what='x')")
+    student.tell({"stop": True})
+    student.last_report(60)
+    assert [(file.name, file.content) for file in student.written] == [("log.txt", "eA==")]
+    assert student.reached == []
+
+
+def test_a_program_that_goes_on_after_the_stop_is_not_waited_for(start: Callable[[str], NodeProcess]) -> None:
+    """It is ended without its last report."""
+    student = start("line.makefile().readline(); signal.pause()")
+    student.tell({"stop": True})
+    student.last_report(0.1)
+    student.kill()
+    assert student.process.returncode == -signal.SIGKILL
 
 
 def test_a_dead_process_can_be_told_anything(start: Callable[[str], NodeProcess]) -> None:

@@ -104,6 +104,11 @@ for command in line.makefile("r"):
             said = json.dumps({"trace": trace(asked["plan"], "alone")}).encode()
         except FileExistsError:
             said = json.dumps({"trace": trace(asked["plan"], "not alone")}).encode()
+    elif behaviour == "meets the others":
+        os.mkdir(os.path.join(folder, f"here-{asked['plan']['scenario']}"))
+        while sum(name.startswith("here-") for name in os.listdir(folder)) < 3:
+            time.sleep(0.005)
+        said = json.dumps({"trace": trace(asked["plan"], f"worker {number}")}).encode()
     elif behaviour == "dies":
         os._exit(1)
     elif behaviour == "dies in its sentence":
@@ -214,10 +219,10 @@ def test_a_warm_worker_is_used_first_and_again(make: Callable[..., tuple[Recorde
 
 def test_every_warm_worker_is_used(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """None is started and forgotten: one is started, and the others are forks of it."""
-    recorder, stage = make("rests", workers=3)
+    recorder, stage = make("meets the others", workers=3)
     recorder.warm_up(5)
-    traces = recorder.record(jobs(*"abcdefgh"), nothing)
-    assert {note(trace).partition(",")[0] for trace in traces} == {"worker 0", "worker 1", "worker 2"}
+    traces = recorder.record(jobs(*"abc"), nothing)
+    assert {note(trace) for trace in traces} == {"worker 0", "worker 1", "worker 2"}
     assert len(stage.pids()) == 3
 
 
@@ -236,7 +241,14 @@ def test_what_begins_first_takes_longest(make: Callable[..., tuple[Recorder, Sta
     lengths = {"a": 1, "b": 5, "c": 2, "d": 9, "e": 3}
     long = [Job(name, replace(plan(name), duration_ns=length)) for name, length in lengths.items()]
     steps: list[str] = []
-    assert [trace.scenario for trace in make("rests", workers=2)[0].record(long, steps.append)] == [*lengths]
+    both = threading.Barrier(2)
+
+    def begins(step: str) -> None:
+        steps.append(step)
+        if step in "bd":  # neither is over before the other begins
+            both.wait(60)
+
+    assert [trace.scenario for trace in make("answers", workers=2)[0].record(long, begins)] == [*lengths]
     assert {*steps[:2]} == {"b", "d"}
     steps.clear()
     make("answers")[0].record(long, steps.append)
@@ -244,13 +256,18 @@ def test_what_begins_first_takes_longest(make: Callable[..., tuple[Recorder, Sta
 
 
 def test_recordings_on_the_wall_clock_are_made_one_at_a_time(make: Callable[..., tuple[Recorder, Stage]]) -> None:
-    """In real time they would disturb each other, unless they are said not to; in virtual time they do not."""
+    """In real time they would disturb each other."""
     recorder, _ = make("wants to be alone", workers=3)
     on_the_wall = [Job(name, plan(name, "wall")) for name in "abcdef"]
     assert {note(trace) for trace in recorder.record(on_the_wall, nothing)} == {"alone"}
-    parallel = [replace(job, parallel=True) for job in on_the_wall]
-    assert {note(trace) for trace in recorder.record(parallel, nothing)} == {"alone", "not alone"}
-    assert {note(trace) for trace in recorder.record(jobs(*"abcdef"), nothing)} == {"alone", "not alone"}
+
+
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+def test_other_recordings_are_made_at_the_same_time(make: Callable[..., tuple[Recorder, Stage]], clock: str) -> None:
+    """In virtual time, and on the wall clock if they are said not to disturb each other: none ends until all began."""
+    recorder, _ = make("meets the others", workers=3)
+    together = [Job(name, plan(name, clock), parallel=clock == "wall") for name in "abc"]
+    assert {note(trace) for trace in recorder.record(together, nothing)} == {"worker 0", "worker 1", "worker 2"}
 
 
 def test_workers_outlive_the_call_that_started_them(make: Callable[..., tuple[Recorder, Stage]]) -> None:
@@ -578,7 +595,7 @@ def test_callers_at_the_same_time_wear_workers_and_lose_no_place(make: Callable[
     for caller in callers:
         caller.start()
     for caller in callers:
-        caller.join(60)
+        caller.join(600)
     assert not any(caller.is_alive() for caller in callers)
 
 
@@ -651,6 +668,8 @@ def test_a_worker_that_took_all_its_time_is_not_tried_again(
     """A second try would take as long."""
     monkeypatch.setattr(module, "MARGIN_S", 0.2)
     recorder, stage = make("hangs", "answers")
+    recorder.warm_up(1)
+    wait_for(lambda: len(stage.pids()) == 1)
     short = replace(plan(), limits=Limits(wall_ns=1))
     (trace,) = recorder.record([Job("alone", short)], nothing)
     assert trace.harness_problem == "worker: expected a trace of alone, found none (it did not answer in time)"

@@ -354,7 +354,8 @@ def test_a_gap_over_millions_of_messages_does_not_fill_the_grader(run: Callable[
         (name, FaultKind.KILLED, "stopped: what the nodes sent took the grader's own process to 300 MiB of memory")
         for name in ("a.py", "b.py")
     }
-    assert most_bytes < 400 << 20, "30 million sequence numbers take 2.4 GiB"
+    # It is ended at 300 MiB, at the next look, which comes after 50 ms; a busy machine may be late with it.
+    assert most_bytes < 1200 << 20, "30 million sequence numbers take 2.4 GiB"
     assert len(run(hostile()).messages("/cmd_vel")) == 199, "the next scenario has a fresh worker"
 
 

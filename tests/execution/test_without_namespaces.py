@@ -334,7 +334,7 @@ def _living(marker: str) -> list[str]:
     return [argument for argument in _lines(marker) if argument == marker]
 
 
-def _soon(true: Callable[[], object], seconds: float = 10.0) -> bool:
+def _soon(true: Callable[[], object], seconds: float = 60.0) -> bool:
     import time
 
     deadline = time.monotonic() + seconds

@@ -28,14 +28,14 @@ from grader.core.exercise import Outcome
 from grader.core.report import ExerciseReport, Verdict
 from grader.core.trace import Start, StartWay, Trace
 from grader.judging import judge_run
-from grader.judging.diagnosis import CAUSE_KEY, RULES, diagnose
+from grader.judging.diagnosis import CAUSE_KEY, RULES
 from grader.judging.diagnosis.rules import FIRST, Case, Rule, in_order
-from grader.rubrics.exercise_checks import hints_of, known_checks
+from grader.rubrics.builtin import builtin_exercises
 from grader.submissions.sources import source_text
 
 HERE = Path(__file__).parent
-#: The rules of the grader and of the exercises that come with it.
-EVERY: tuple[Any, ...] = in_order((*RULES, *hints_of(known_checks())))  # type: ignore[arg-type]
+#: The rules of the grader, and of the exercises that come with it.
+EVERY: list[Any] = [*RULES, *(rule for exercise in builtin_exercises() for rule in exercise.hints)]
 Row = Mapping[str, Any]
 CRASHES = rows("crashes.yaml")
 BEHAVIOURS = rows("behaviours.yaml")
@@ -121,11 +121,13 @@ def test_no_cause_is_found_in_the_words_of_a_reason(row: Row, monkeypatch: pytes
     """Without any reason the hints and places are the same."""
     traces = crash_traces(row) if "fault" in row else behaviour_traces(row)
     known = [replace(v, reason="") for v in explained(row, traces).verdicts]
+    build = judge_run._verdicts
 
-    def without_reasons(verdicts: tuple[Verdict, ...], *others: Any) -> tuple[Verdict, ...]:
-        return diagnose(tuple(replace(v, reason="") for v in verdicts), *others)
+    def without_reasons(*given: Any) -> tuple[tuple[Verdict, ...], Mapping[str, object]]:
+        verdicts, facts = build(*given)
+        return tuple(replace(v, reason="") for v in verdicts), facts
 
-    monkeypatch.setattr(judge_run, "diagnose", without_reasons)
+    monkeypatch.setattr(judge_run, "_verdicts", without_reasons)
     assert list(explained(row, traces).verdicts) == known
 
 
@@ -157,7 +159,7 @@ def test_every_rule_is_shown_to_work() -> None:
 def test_the_rules_are_asked_in_the_order_that_is_written_down() -> None:
     """Wherever a rule is defined: its priority alone decides."""
     order = (HERE / "diagnosis" / "order.txt").read_text("utf-8").split()
-    assert [rule.id for rule in EVERY] == [*order, "follows"]
+    assert [rule.id for rule in in_order(EVERY)] == [*order, "follows"]
     priorities = [rule.priority for rule in EVERY]
     assert len(set(priorities)) == len(priorities)
     assert min(priorities) >= 1000 > FIRST

@@ -15,7 +15,7 @@ from grader.core.exercise import Problem, ProblemKind
 from grader.judging.checks.fields import RandomInRange
 from grader.judging.checks.received import LogsReceived
 
-RANGE = RandomInRange("/temperature", 20, 30)
+RANGE = RandomInRange("/temperature", 20, 30, unit="°C")
 LOGS = LogsReceived("temperature_sensor.py", "/fan_speed")
 
 

@@ -225,8 +225,12 @@ def by_name(workspace: Path, into: Path, programs: tuple[str, ...]) -> Found:
 
 def by_package_folder(workspace: Path, into: Path, programs: tuple[str, ...]) -> Found:
     """`grade observe PACKAGE_FOLDER` for each package."""
-    folders = [next(workspace.rglob(f"{name}/package.xml")).parent for name in packages(programs)]
-    return observed(tuple(folder for folder in folders if "install" not in folder.parts), into)
+    made = {"build", "install"}
+    found = {
+        name: (path.parent for path in sorted(workspace.rglob(f"{name}/package.xml"))) for name in packages(programs)
+    }
+    own = [[path.parent for path in paths if not made.intersection(path.parts)] for paths in found]
+    return observed(tuple(folders[0] for folders in own if folders), into)
 
 
 def packages(programs: tuple[str, ...]) -> list[str]:

@@ -2,17 +2,83 @@
 
 from __future__ import annotations
 
-from program_description import End, Ending, Every, Node, Process, Program, Spinning, Timer
+from program_description import (
+    Await,
+    Client,
+    End,
+    Ending,
+    Every,
+    Fixed,
+    Group,
+    Heard,
+    Node,
+    Process,
+    Program,
+    Publish,
+    Runs,
+    Say,
+    Server,
+    Spinning,
+    Statement,
+    Subscription,
+    Timer,
+)
+
+#: Says what it hears.
+SAYS: tuple[Statement, ...] = (Say(Heard()),)
 
 
-def alone(node: Node, spinning: Spinning = Spinning.SPIN, **other: int) -> Program:
+def alone(node: Node, spinning: Spinning = Spinning.SPIN) -> Program:
     """Return a program of one node."""
-    return Program((Process((node,), spinning, **other),), 2000)
+    return Program((Process((node,), spinning),), 2000)
 
 
 COUNTER_EXAMPLES: dict[str, Program] = {
     # The grader was not told how late it was, and recorded the end at the last time that it knew.
     "leaves_at_once_after_saying_nothing": alone(
         Node("n0", 1, (Timer("t00", 50, (Every(3, (End(Ending.LEAVE_AT_ONCE),)),)),), ())
+    ),
+    # A loop that polls without blocking, and looks at no clock, let 10 ms pass at a time, and its timers were late.
+    "polls_a_timer_without_blocking": alone(
+        Node("n0", 1, (Timer("t00", 4, (Say(Runs()),)), Timer("t01", 125, (Say(Runs()),))), ()), Spinning.ONCE
+    ),
+    # A coroutine that waits makes each call of spin_once return at once.
+    "polls_a_timer_beside_a_coroutine": alone(
+        Node(
+            "n0",
+            1,
+            (Timer("t00", 4, (Say(Runs()),)), Timer("t01", 100, (Await("c00", Fixed(1)),), group=1)),
+            (),
+            clients=(Client("c00", "p"),),
+            groups=(Group.EXCLUSIVE,),
+        ),
+        Spinning.ONCE,
+    ),
+    # Of three messages, the eighth in a row was announced on its own, and handed over although the last one had pushed
+    # it out of the queue.
+    "queue_of_one_for_three_messages_of_its_own": alone(
+        Node(
+            "n0",
+            1,
+            (Timer("t00", 100, tuple(Publish("a", Fixed(number)) for number in range(3))),),
+            (Subscription("s00", "a", 1, SAYS),),
+        )
+    ),
+    "queue_of_two_for_three_messages_of_its_own": alone(
+        Node(
+            "n0",
+            1,
+            (Timer("t00", 100, tuple(Publish("a", Fixed(number)) for number in range(3))),),
+            (Subscription("s00", "a", 2, SAYS),),
+        )
+    ),
+    # The model did not know that a response wakes every client of the service.
+    "client_that_has_not_asked_is_woken": Program(
+        (
+            Process((Node("n0", 1, (), (), clients=(Client("c00", "p"),)),), Spinning.ONCE, timeout_ms=333, turns=3),
+            Process((Node("n1", 1, (), (), clients=(Client("c10", "p"),)),), Spinning.UNTIL, turns=1),
+            Process((Node("n2", 1, (), (), servers=(Server("v20", "p", (), Fixed(3)),)),), Spinning.SPIN),
+        ),
+        2000,
     ),
 }

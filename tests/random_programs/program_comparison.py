@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from statistics import median
 from typing import Any
 
-from program_description import Program
+from program_description import Program, Spinning
 from program_model import Expected, expected_of
 from program_text import file_of
 
@@ -16,6 +18,10 @@ from grader.execution.recording_session import RecordingSession
 from grader.execution.supervisor import Job
 
 NS_PER_MS = 1_000_000
+#: By how much a time on the wall clock may be wrong, beyond the late start of its process.
+TOLERANCE_NS = 60 * NS_PER_MS
+#: Processes with several threads.
+SEVERAL = (Spinning.THREAD, Spinning.MULTI)
 #: How many entries before and after the first difference are shown.
 AROUND = 3
 #: What Python says when a program fails; faults are compared instead.
@@ -82,6 +88,21 @@ def problems(trace: Trace) -> list[str]:
     return [*trace.notes, *([trace.harness_problem] if trace.harness_problem else [])]
 
 
+def by_source(told: Entries, program: Program) -> dict[str, Sequence[tuple[int, str]]]:
+    """Take the log and output of a process with several threads apart by the names of their callbacks.
+
+    In which order threads do something at one instant is not promised.
+    """
+    apart: dict[str, list[tuple[int, str]]] = {}
+    several = {f"p{n}.py" for n, process in enumerate(program.processes) if process.spinning in SEVERAL}
+    for name, entries in told.items():
+        kind, _, process = name.partition(" of ")
+        for t_ns, text in entries:
+            split = process in several and kind != "end"
+            apart.setdefault(f"{name}, {text.split()[0]}" if split else name, []).append((t_ns, text))
+    return dict(apart)
+
+
 def differences(expected: Entries, found: Entries) -> list[str]:
     """Return the first difference of each topic, log, output and end."""
     told = []
@@ -100,8 +121,36 @@ def _shown(entries: Sequence[tuple[int, str]]) -> str:
     return "; ".join(f"{t / NS_PER_MS:g} ms {text}" for t, text in entries) or "nothing"
 
 
+def differences_of(program: Program, trace: Trace) -> list[str]:
+    """Return how a recording in virtual time differs from the model of its program."""
+    expected, did = told_by_model(expected_of(program)), told_by_trace(trace)
+    return [*problems(trace), *differences(by_source(expected, program), by_source(did, program))]
+
+
 def compared(session: RecordingSession, program: Program, folder: Path) -> list[str]:
     """Record a program in virtual time, and return how it differs from its model, with its files."""
-    trace = recorded(session, program, folder)
-    found = [*problems(trace), *differences(told_by_model(expected_of(program)), told_by_trace(trace))]
+    found = differences_of(program, recorded(session, program, folder))
     return [*found, *(file_of(process) for process in program.processes)] if found else []
+
+
+def on_the_wall_clock(session: RecordingSession, program: Program, folder: Path) -> list[str]:
+    """Record a program of one process on the wall clock, and return how it differs from its model.
+
+    Each callback must say and send the same in the same order, as far as the recording goes: a process starts some
+    tenths of a second late. All its times are shifted by the median of the differences, and must then be within
+    `TOLERANCE_NS`. What several callbacks do at one instant may come in another order.
+    """
+    trace = recorded(session, program, folder, "wall")
+    every = Program(tuple(replace(p, spinning=Spinning.THREAD) for p in program.processes), program.duration_ms)
+    expected, did = (by_source(told, every) for told in (told_by_model(expected_of(program)), told_by_trace(trace)))
+    pairs = [(m, d) for name in expected for m, d in zip(expected[name], did.get(name, ()), strict=False)]
+    late_ns = round(median(d[0] - m[0] for m, d in pairs)) if pairs else 0
+    told = [f"{trace.harness_problem}"] if trace.harness_problem else []
+    for name in sorted({*expected, *did}):
+        must = [(t + late_ns, text) for t, text in expected.get(name, ())]
+        found = did.get(name, ())
+        surely = sum(t < trace.stop_ns - TOLERANCE_NS for t, _ in must)
+        same = all(m[1] == d[1] and abs(m[0] - d[0]) <= TOLERANCE_NS for m, d in zip(must, found, strict=False))
+        if not (same and surely <= len(found) <= len(must)):
+            told.append(f"{name}: must be {_shown(must[:12])}, was {_shown(found[:12])}")
+    return told

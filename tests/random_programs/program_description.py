@@ -5,6 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+#: What a main thread that sends something does first, so that all processes have started by then.
+FIRST_NAP_MS = 20
+#: What a main thread beside another one does before the program ends, so that this is not an instant at which the other
+#: one has something to do.
+LAST_NAP_MS = 7
+
 
 @dataclass(frozen=True, slots=True)
 class Fixed:
@@ -30,7 +36,12 @@ class Kept:
     slot: int
 
 
-Value = Fixed | Runs | Heard | Kept
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """The number in the parameter of the node."""
+
+
+Value = Fixed | Runs | Heard | Kept | Parameter
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +113,34 @@ class Ask:
     then: tuple[Statement, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Await:
+    """Call a service in a coroutine, and go on when the response is there; then `Heard` is the number in it."""
+
+    client: str
+    value: Value
+
+
+@dataclass(frozen=True, slots=True)
+class SetParameter:
+    """Set the parameter of the node; its callback refuses negative numbers, and logs the others."""
+
+    value: Value
+
+
+@dataclass(frozen=True, slots=True)
+class CallAndWait:
+    """In the main thread while another one spins: call a service and wait for the response; then as for `Await`."""
+
+    client: str
+    value: Value
+
+
+@dataclass(frozen=True, slots=True)
+class SleepRate:
+    """In the main thread while another one spins: sleep on the rate of the loop."""
+
+
 class Ending(Enum):
     """How a program ends itself."""
 
@@ -127,17 +166,34 @@ class Every:
     then: tuple[Statement, ...]
 
 
-Statement = Publish | Say | Write | Nap | Keep | Cancel | Reset | Pace | Ask | End | Every
+Statement = (
+    Publish
+    | Say
+    | Write
+    | Nap
+    | Keep
+    | Cancel
+    | Reset
+    | Pace
+    | Ask
+    | Await
+    | SetParameter
+    | CallAndWait
+    | SleepRate
+    | End
+    | Every
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Timer:
-    """A timer with its callback."""
+    """A timer with its callback; of the groups of the node, 0 is the one that it has without being told."""
 
     name: str
     period_ms: int
     body: tuple[Statement, ...]
     starts: bool = True
+    group: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +204,7 @@ class Subscription:
     topic: str
     depth: int
     body: tuple[Statement, ...]
+    group: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +215,7 @@ class Server:
     service: str
     body: tuple[Statement, ...]
     answer: Value
+    group: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,11 +224,19 @@ class Client:
 
     name: str
     service: str
+    group: int = 0
+
+
+class Group(Enum):
+    """A kind of callback group."""
+
+    EXCLUSIVE = "MutuallyExclusiveCallbackGroup"
+    REENTRANT = "ReentrantCallbackGroup"
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A node; its entities are created in the order of these fields."""
+    """A node; its entities are created in the order of these fields. `groups` are those beside its own, from 1."""
 
     name: str
     slots: int
@@ -178,14 +244,28 @@ class Node:
     subscriptions: tuple[Subscription, ...]
     servers: tuple[Server, ...] = ()
     clients: tuple[Client, ...] = ()
+    groups: tuple[Group, ...] = ()
 
 
 class Spinning(Enum):
-    """How the main thread of a process runs its callbacks."""
+    """How a process runs its callbacks."""
 
     SPIN = "rclpy.spin"
     EXECUTOR = "a SingleThreadedExecutor"
     ONCE = "spin_once in a loop"
+    THREAD = "an executor in a thread, and a loop in the main thread"
+    UNTIL = "spin_until_future_complete for one call after the other"
+    MULTI = "a MultiThreadedExecutor"
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """What the main thread does for so many turns, in the first node, beside a thread that spins."""
+
+    name: str
+    turns: int
+    body: tuple[Statement, ...]
+    rate_ms: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,13 +276,17 @@ class Process:
         nodes: Its nodes, in the order of their creation.
         spinning: How it runs their callbacks.
         timeout_ms: For `ONCE`, the time-out of each call.
-        turns: For `ONCE`, how often it is called before the program returns; 0 for ever.
+        turns: For `ONCE`, how often it is called before the program returns, 0 for ever; for `UNTIL`, how many calls.
+        loop: For `THREAD`, what the main thread does.
+        threads: For `MULTI`, how many threads the executor has.
     """
 
     nodes: tuple[Node, ...]
     spinning: Spinning
     timeout_ms: int = 0
     turns: int = 0
+    loop: Loop | None = None
+    threads: int = 0
 
 
 @dataclass(frozen=True, slots=True)

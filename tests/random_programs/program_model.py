@@ -16,18 +16,25 @@ from typing import Any
 
 import simpy
 from program_description import (
+    FIRST_NAP_MS,
+    LAST_NAP_MS,
     Ask,
+    Await,
+    CallAndWait,
     Cancel,
     Client,
     End,
     Ending,
     Every,
     Fixed,
+    Group,
     Heard,
     Keep,
+    Kept,
     Nap,
     Node,
     Pace,
+    Parameter,
     Process,
     Program,
     Publish,
@@ -35,6 +42,8 @@ from program_description import (
     Runs,
     Say,
     Server,
+    SetParameter,
+    SleepRate,
     Spinning,
     Statement,
     Subscription,
@@ -51,8 +60,8 @@ CONTINUING, TURNS = 1, 10
 #: How late a pause ends in a program that has looked at a clock. Every node has.
 LATE_NS = 1_000
 #: How much later each further look at a clock is within an instant, and how often rclpy looks while it makes a node: it
-#: stamps the events of two parameters.
-LOOK_NS, LOOKS_OF_A_NODE = 1_000, 2
+#: stamps the events of two parameters, and of the program's own.
+LOOK_NS, LOOKS_OF_A_NODE = 1_000, 3
 #: Every so many messages of a process in a row, all others take what has arrived before the next one is sent.
 FLUSH = 8
 
@@ -78,8 +87,8 @@ class Expected:
 class Leave(BaseException):
     """Unwinds a process that ends."""
 
-    def __init__(self, ended: Ended, *, caught: bool) -> None:
-        self.ended, self.caught = ended, caught
+    def __init__(self, ended: Ended, how: Ending) -> None:
+        self.ended, self.how = ended, how
 
 
 ENDINGS = {
@@ -111,6 +120,7 @@ class World:
         self.expected = Expected()
         self.subscribed: dict[str, list[Queue]] = {}
         self.served: dict[str, list[Queue]] = {}
+        self.asked: dict[str, list[Queue]] = {}
         self.processes = [ProcessModel(self, number, process) for number, process in enumerate(program.processes)]
         for process in self.processes:
             process.begin()
@@ -155,9 +165,11 @@ class ProcessModel:
             self.end(leave.ended)
 
     def end(self, ended: Ended) -> None:
+        """Note the end; no thread goes on."""
         self.ended, self.ok = True, False
         self.world.expected.ends[self.number] = self.world.now, ended
-        for queues in (*self.world.subscribed.values(), *self.world.served.values()):
+        world = self.world
+        for queues in (*world.subscribed.values(), *world.served.values(), *world.asked.values()):
             queues[:] = [queue for queue in queues if queue.process is not self]
 
     def turn_at(self, t_ns: int) -> None:
@@ -169,6 +181,8 @@ class ProcessModel:
     def take_turn(self, t_ns: int) -> None:
         """Wake every thread whose time has come."""
         self.turns.discard(t_ns)
+        if self.ended:
+            return
         news, self.news = self.news, None
         while self.alarms and self.alarms[0][0] <= self.world.now:
             event = heapq.heappop(self.alarms)[2]
@@ -185,6 +199,12 @@ class ProcessModel:
         heapq.heappush(self.alarms, (t_ns, next(self.numbers), event))
         self.turn_at(t_ns)
         yield event
+
+    def wake(self) -> None:
+        """Let an executor of another thread look for work again."""
+        if self.news is not None and not self.news.triggered:
+            self.news.succeed()
+            self.news = None
 
     def look(self) -> int:
         """Return the time that a look at a clock shows."""
@@ -209,24 +229,69 @@ class ProcessModel:
         if self.sent >= FLUSH:
             self.sent = 0
             yield from self.pause(self.world.now)
-        deliver()
+        if not self.ended:
+            deliver()
 
     def main(self) -> Steps:
         """Do what the main function of the file does."""
         nodes = [NodeModel(self, node) for node in self.process.nodes]
-        spinning = self.process.spinning
-        executor = Executor(self, nodes if spinning is Spinning.EXECUTOR else nodes[:1])
-        if spinning is Spinning.ONCE:
-            turns = self.process.turns
-            while self.ok:
-                yield from executor.spin_once(self.process.timeout_ms * NS_PER_MS)
-                turns -= 1
-                if turns == 0:
-                    break
-        else:
-            while self.ok:
-                yield from executor.spin_once(None)
+        match self.process.spinning:
+            case Spinning.ONCE:
+                yield from self.in_turns(Executor(self, nodes[:1]))
+            case Spinning.UNTIL:
+                yield from self.until_answered(Executor(self, nodes[:1]), nodes[0])
+            case Spinning.THREAD:
+                yield from self.beside_a_thread(nodes)
+            case Spinning.SPIN:
+                yield from Executor(self, nodes[:1]).spin()
+            case Spinning.EXECUTOR:
+                yield from Executor(self, nodes).spin()
+            case Spinning.MULTI:
+                yield from PoolExecutor(self, nodes).spin()
         self.write("main 0")
+
+    def in_turns(self, executor: Executor) -> Steps:
+        """Call spin_once, which adds the node to the executor and removes it again, and so wakes the executor twice.
+
+        One that goes on for ever and never blocks lets time pass until there is something to do: it is the same as one
+        that blocks.
+        """
+        turns = self.process.turns
+        while self.ok:
+            if turns:
+                executor.wake()
+            yield from executor.spin_once(self.process.timeout_ms * NS_PER_MS if turns else None)
+            if turns == 1:
+                break
+            turns -= 1 if turns else 0
+
+    def until_answered(self, executor: Executor, node: NodeModel) -> Steps:
+        client = next(iter(node.clients))
+        yield from self.pause(self.end_of(FIRST_NAP_MS * NS_PER_MS))
+        for turn in range(self.process.turns):
+            future = FutureModel(executor)
+            future.callbacks.append(nothing)
+            yield from node.request(client, turn, future)
+            executor.wake()
+            while self.ok and not future.done:
+                future.callbacks.append(nothing)
+                yield from executor.spin_once(None, future)
+            if not future.done:
+                raise AssertionError("a program that calls in turns has no other end")
+            self.write(f"until {future.value}")
+
+    def beside_a_thread(self, nodes: list[NodeModel]) -> Steps:
+        loop, node = self.process.loop, nodes[0]
+        assert loop is not None
+        if loop.rate_ms:
+            node.add_rate(loop.rate_ms)
+        self.world.environment.process(Executor(self, nodes).spin())
+        yield from self.pause(self.end_of(FIRST_NAP_MS * NS_PER_MS))
+        scope = Scope(loop.name, loop.name)
+        for turn in range(loop.turns):
+            node.runs[loop.name] = turn + 1
+            yield from node.run(loop.body, scope)
+        yield from self.pause(self.end_of(LAST_NAP_MS * NS_PER_MS))
 
     def say(self, text: str) -> None:
         self.world.expected.logs.setdefault(self.number, []).append((self.world.now, text))
@@ -238,18 +303,14 @@ class ProcessModel:
 class TimerModel:
     """A timer of rcl."""
 
-    def __init__(self, world: World, timer: Timer) -> None:
-        self.world, self.timer = world, timer
-        self.period = timer.period_ms * NS_PER_MS
+    def __init__(self, world: World, period_ms: int, *, starts: bool = True) -> None:
+        self.world = world
+        self.period = period_ms * NS_PER_MS
         self.next = world.now + self.period
-        self.cancelled = not timer.starts
+        self.cancelled = not starts
 
-    @property
     def is_ready(self) -> bool:
         return not self.cancelled and self.next <= self.world.now
-
-    def still_ready(self) -> bool:
-        return self.is_ready
 
     def call(self) -> None:
         """Move on by a period, and beyond what has been missed."""
@@ -262,11 +323,93 @@ class TimerModel:
         self.next, self.cancelled = self.world.now + self.period, False
 
 
+class GroupModel:
+    """A callback group: an exclusive one runs one callback at a time."""
+
+    def __init__(self, kind: Group) -> None:
+        self.kind, self.active = kind, 0
+
+    @property
+    def is_free(self) -> bool:
+        return self.kind is Group.REENTRANT or not self.active
+
+
+class FutureModel:
+    """What a call of a service will be answered with.
+
+    Args:
+        executor: Whose tasks the callbacks become.
+    """
+
+    def __init__(self, executor: Executor | None = None) -> None:
+        self.executor = executor
+        self.done, self.value = False, 0
+        self.callbacks: list[Callable[[], Steps]] = []
+
+    def set(self, executor: Executor, value: int) -> None:
+        self.done, self.value = True, value
+        for callback in self.callbacks:
+            executor.add_task(Task(callback()))
+
+
+def nothing() -> Steps:
+    """Do nothing, as a task."""
+    return
+    yield
+
+
+#: What a coroutine yields when it waits for a future.
+SUSPENDED = object()
+
+
+@dataclass(eq=False, slots=True)
+class Task:
+    """A callback or coroutine that an executor runs, perhaps in several parts."""
+
+    steps: Steps
+    done: bool = False
+    running: bool = False
+
+    def advance(self) -> Steps:
+        """Run it until it has ended or waits for a future."""
+        if self.done or self.running:
+            return
+        self.running = True
+        for event in self.steps:
+            if event is SUSPENDED:
+                self.running = False
+                return
+            yield event
+        self.done, self.running = True, False
+
+
+@dataclass(eq=False, slots=True)
+class Entity:
+    """What an executor waits for.
+
+    Attributes:
+        group: Its callback group.
+        is_ready: Whether there is anything to do.
+        take: Takes what there is to do, and returns how it is done.
+        claimed: Whether an executor is about to take it.
+    """
+
+    group: GroupModel
+    is_ready: Callable[[], bool]
+    take: Callable[[], Steps]
+    is_timer: bool = False
+    claimed: bool = False
+
+    def can_run(self) -> bool:
+        return not self.claimed and self.group.is_free
+
+
 @dataclass(slots=True)
 class Scope:
-    """The callback that runs: its name, the number that it was called with."""
+    """The callback that runs: its name, what it logs under, and the number that it was called with."""
 
     name: str
+    label: str
     heard: int = 0
 
 
@@ -274,36 +417,121 @@ class NodeModel:
     """A node's entities and variables, and what its callbacks do."""
 
     def __init__(self, process: ProcessModel, node: Node) -> None:
-        self.process, self.world, self.node = process, process.world, node
         for _ in range(LOOKS_OF_A_NODE):
             process.look()
+        self.process, self.world, self.node = process, process.world, node
         self.kept = [0] * max(1, node.slots)
+        self.parameter = 0
         self.runs: dict[str, int] = {}
-        self.timers = {timer.name: TimerModel(self.world, timer) for timer in node.timers}
+        self.groups = [GroupModel(Group.EXCLUSIVE), *map(GroupModel, node.groups)]
+        self.timers = {t.name: TimerModel(self.world, t.period_ms, starts=t.starts) for t in node.timers}
         self.subscriptions = [self.queue(sub, sub.depth) for sub in node.subscriptions]
         self.servers = [self.queue(server, 10) for server in node.servers]
         self.clients = {client.name: self.queue(client, 10) for client in node.clients}
-        self.pending: dict[int, Ask] = {}
-        self.requests = count(1)
         for queue in self.subscriptions:
             self.world.subscribed.setdefault(queue.owner.topic, []).append(queue)
         for queue in self.servers:
             self.world.served.setdefault(queue.owner.service, []).append(queue)
+        for queue in self.clients.values():
+            self.world.asked.setdefault(queue.owner.service, []).append(queue)
+        self.executor: Executor | None = None
+        self.rate: TimerModel | None = None
+        self.rate_set = False
+        self.waiting: simpy.Event | None = None
+        #: Timers, subscriptions, clients and servers: the order in which an executor goes through what is ready.
+        self.entities = [
+            *(self.timer_entity(timer) for timer in node.timers),
+            *(self.entity(queue, self.take_message) for queue in self.subscriptions),
+            *(self.entity(queue, self.take_response) for queue in self.clients.values()),
+            *(self.entity(queue, self.take_request) for queue in self.servers),
+        ]
 
     def queue(self, owner: Subscription | Server | Client, depth: int) -> Queue:
         return Queue(owner, self.process, deque(maxlen=depth))
 
-    def value(self, value: Value, scope: Scope) -> int:
-        if isinstance(value, Fixed):
-            return value.number
-        if isinstance(value, Runs):
-            return self.runs[scope.name]
-        return scope.heard if isinstance(value, Heard) else self.kept[value.slot]
+    def timer_entity(self, timer: Timer) -> Entity:
+        model = self.timers[timer.name]
 
-    def call(self, name: str, body: tuple[Statement, ...], heard: int = 0) -> Steps:
+        def take() -> Steps:
+            model.call()
+            return self.call(timer.name, timer.body)
+
+        return Entity(self.groups[timer.group], model.is_ready, take, is_timer=True)
+
+    def entity(self, queue: Queue, take: Callable[[Queue], Steps]) -> Entity:
+        return Entity(self.groups[queue.owner.group], lambda: bool(queue.messages), lambda: take(queue))
+
+    def add_rate(self, period_ms: int) -> None:
+        """Add the timer of a rate, which is in a group of its own."""
+        rate = TimerModel(self.world, period_ms)
+
+        def take() -> Steps:
+            rate.call()
+            self.rate_set = True
+            if self.waiting is not None:
+                self.waiting.succeed()
+                self.waiting = None
+            return nothing()
+
+        self.rate = rate
+        self.entities.insert(len(self.timers), Entity(GroupModel(Group.REENTRANT), rate.is_ready, take, is_timer=True))
+
+    def sleep_rate(self) -> Steps:
+        """Wait for the rate, which may have been due while nobody was waiting."""
+        if not self.rate_set:
+            self.waiting = simpy.Event(self.world.environment)
+            yield self.waiting
+        self.rate_set = False
+
+    def take_message(self, queue: Queue) -> Steps:
+        return self.call(queue.owner.name, queue.owner.body, queue.messages.popleft())
+
+    def take_response(self, queue: Queue) -> Steps:
+        client, future, value = queue.messages.popleft()
+
+        def steps() -> Steps:
+            if client is queue:
+                assert self.executor is not None
+                future.set(self.executor, value)
+            yield from nothing()
+
+        return steps()
+
+    def take_request(self, queue: Queue) -> Steps:
+        value, client, future = queue.messages.popleft()
+        server = queue.owner
+
+        def steps() -> Steps:
+            scope = Scope(server.name, server.name, value)
+            yield from self.call(server.name, server.body, value, scope)
+            answer = self.value(server.answer, scope)
+
+            def deliver() -> None:
+                # The middleware wakes every client of the service; those that have not asked find nothing.
+                for each in self.world.asked.get(server.service, ()):
+                    each.put((client, future, answer))
+
+            yield from self.process.send(deliver)
+
+        return steps()
+
+    def value(self, value: Value, scope: Scope) -> int:
+        match value:
+            case Fixed(number):
+                return number
+            case Runs():
+                return self.runs[scope.name]
+            case Heard():
+                return scope.heard
+            case Kept(slot):
+                return self.kept[slot]
+            case Parameter():
+                return self.parameter
+
+    def call(self, name: str, body: tuple[Statement, ...], heard: int = 0, scope: Scope | None = None) -> Steps:
         """Run a callback."""
         self.runs[name] = self.runs.get(name, 0) + 1
-        yield from self.run(body, Scope(name, heard))
+        yield from self.run(body, scope or Scope(name, name, heard))
 
     def run(self, body: tuple[Statement, ...], scope: Scope) -> Steps:
         for one in body:
@@ -317,13 +545,15 @@ class NodeModel:
                 yield from self.process.send(lambda: self.publish(topic, number))
             case Nap(ms):
                 yield from self.process.pause(self.process.end_of(ms * NS_PER_MS))
-            case Ask():
-                yield from self.ask(one, scope)
+            case SleepRate():
+                yield from self.sleep_rate()
             case Every(runs, then):
                 if self.runs[scope.name] % runs == 0:
                     yield from self.run(then, scope)
             case End(how):
                 self.leave(how)
+            case Ask() | Await() | CallAndWait():
+                yield from self.ask(one, scope)
             case _:
                 self.do_at_once(one, scope)
 
@@ -331,11 +561,13 @@ class NodeModel:
         """Do one statement that neither waits nor sends."""
         match one:
             case Say(value):
-                self.process.say(f"{scope.name} {self.value(value, scope)}")
+                self.process.say(f"{scope.label} {self.value(value, scope)}")
             case Write(value):
-                self.process.write(f"{scope.name} {self.value(value, scope)}")
+                self.process.write(f"{scope.label} {self.value(value, scope)}")
             case Keep(slot, value, adds):
                 self.kept[slot] = self.value(value, scope) + (self.kept[slot] if adds else 0)
+            case SetParameter(value):
+                self.set_parameter(self.value(value, scope))
             case Cancel(timer):
                 self.timers[timer].cancelled = True
             case Reset(timer):
@@ -345,35 +577,64 @@ class NodeModel:
             case _:
                 raise AssertionError(one)
 
+    def set_parameter(self, number: int) -> None:
+        """Ask the callback, and keep the number; rclpy stamps an event of each change."""
+        if number >= 0:
+            self.process.say(f"parameter {number}")
+            self.parameter = number
+            self.process.look()
+
     def publish(self, topic: str, number: int) -> None:
         self.world.expected.topics.setdefault(topic, []).append((self.world.now, number))
         for queue in self.world.subscribed.get(topic, ()):
             queue.put(number)
 
-    def ask(self, one: Ask, scope: Scope) -> Steps:
-        number, value = next(self.requests), self.value(one.value, scope)
-        client = self.clients[one.client]
-        self.pending[number] = one
+    def request(self, client: str, value: int, future: FutureModel) -> Steps:
+        """Send a request to the server, if there is one."""
+        queue = self.clients[client]
 
         def deliver() -> None:
-            for server in self.world.served.get(client.owner.service, ()):
-                server.put((value, client, number, scope.name))
+            for server in self.world.served.get(queue.owner.service, ()):
+                server.put((value, queue, future))
 
         yield from self.process.send(deliver)
+
+    def ask(self, one: Ask | Await | CallAndWait, scope: Scope) -> Steps:
+        """Call a service, and go on at once, when the coroutine is resumed, or when another thread has the response."""
+        future = FutureModel()
+        yield from self.request(one.client, self.value(one.value, scope), future)
+        if isinstance(one, Ask):
+            inner, then = Scope(scope.name, f"{scope.name}.{one.client}"), one.then
+
+            def answered() -> Steps:
+                inner.heard = future.value
+                yield from self.run(then, inner)
+
+            future.callbacks.append(answered)
+            return
+        if isinstance(one, Await):
+            while not future.done:
+                yield SUSPENDED  # type: ignore[misc]
+        else:
+            arrived = simpy.Event(self.world.environment)
+
+            def unblock() -> Steps:
+                arrived.succeed()
+                yield from nothing()
+
+            future.callbacks.append(unblock)
+            yield arrived
+        scope.heard = future.value
 
     def leave(self, how: Ending) -> None:
         if how is Ending.SHUTDOWN:
             self.process.ok = False
             return
-        raise Leave(ENDINGS[how], caught=how is Ending.RAISE)
+        raise Leave(ENDINGS[how], how)
 
 
 class TimeUpError(Exception):
     """An executor has waited long enough."""
-
-
-#: Something to run: a callback of a node.
-Work = Callable[[], Steps]
 
 
 class Executor:
@@ -381,14 +642,31 @@ class Executor:
 
     def __init__(self, process: ProcessModel, nodes: list[NodeModel]) -> None:
         self.process, self.world, self.nodes = process, process.world, nodes
-        self.tasks: list[Work] = []
-        self.looking: Iterator[simpy.Event | Work] | None = None
+        self.tasks: list[Task] = []
+        self.looking: Iterator[simpy.Event | Task] | None = None
+        self.condition: FutureModel | None = None
+        self.guard = False
+        for node in nodes:
+            node.executor = self
 
-    def spin_once(self, timeout_ns: int | None) -> Steps:
-        """Run one callback, or wait until the time-out."""
+    def spin(self) -> Steps:
+        """Run callbacks until the context is shut down."""
+        while self.process.ok:
+            yield from self.spin_once(None)
+
+    def add_task(self, task: Task) -> None:
+        self.tasks.append(task)
+        self.wake()
+
+    def wake(self) -> None:
+        self.guard = True
+        self.process.wake()
+
+    def spin_once(self, timeout_ns: int | None, condition: FutureModel | None = None) -> Steps:
+        """Run one callback, or wait until the time-out or until a future is done."""
         while True:
-            if self.looking is None:
-                self.looking = self.look(timeout_ns)
+            if self.looking is None or self.condition is not condition:
+                self.looking, self.condition = self.look(timeout_ns, condition), condition
             try:
                 found = next(self.looking)
                 while isinstance(found, simpy.Event):
@@ -396,88 +674,112 @@ class Executor:
                     found = next(self.looking)
             except StopIteration:
                 self.looking = None
+                if condition is not None and condition.done:
+                    return
                 continue
             except TimeUpError:
                 self.looking = None
                 return
-            yield from found()
+            yield from self.execute(found)
             return
 
-    def look(self, timeout_ns: int | None) -> Iterator[simpy.Event | Work]:
+    def execute(self, task: Task) -> Steps:
+        yield from task.advance()
+
+    def look(self, timeout_ns: int | None, condition: FutureModel | None) -> Iterator[simpy.Event | Task]:
         """Yield events to wait for, and what is ready: tasks first, then all that was ready at one look."""
         deadline = None if timeout_ns is None else self.process.end_of(timeout_ns)
         found = False
-        while not found:
-            tasks, self.tasks = self.tasks, []
-            for task in reversed(tasks):
-                found = True
-                yield task
-            while not (ready := self.ready()) and not found and not (timed_out := self.over(deadline)):
-                yield self.process.await_news(self.next_moment(deadline))
-            timed_out = self.over(deadline)
-            for is_still, work in ready:
-                if is_still():
+        while not found and not (condition is not None and condition.done):
+            for task in reversed(list(self.tasks)):
+                if not task.done and not task.running:
                     found = True
-                    yield work
+                    yield task
+            self.tasks = [task for task in self.tasks if not task.done]
+            while not (ready := self.ready()) and not self.guard and not self.is_over(deadline):
+                yield self.process.await_news(self.next_moment(deadline))
+            self.guard = False
+            timed_out = self.is_over(deadline)
+            for entity in ready:
+                if (not entity.is_timer or entity.is_ready()) and entity.group.is_free:
+                    found = True
+                    yield self.claim(entity)
             if timed_out:
                 raise TimeUpError
 
-    def over(self, deadline: int | None) -> bool:
+    def is_over(self, deadline: int | None) -> bool:
         return deadline is not None and self.world.now >= deadline
 
     def next_moment(self, deadline: int | None) -> int | None:
-        moments = [t.next for node in self.nodes for t in node.timers.values() if not t.cancelled]
+        timers = (t for n in self.nodes for t in (*n.timers.values(), n.rate) if t is not None and not t.cancelled)
+        moments = [timer.next for timer in timers if timer.next > self.world.now]
         return min([*moments, *([deadline] if deadline is not None else [])], default=None)
 
-    def ready(self) -> list[tuple[Callable[[], bool], Work]]:
-        """Return what is ready now, in the order of rclpy: by node, and of a node timers, subscriptions, clients."""
-        found: list[tuple[Callable[[], bool], Work]] = []
-        for node in self.nodes:
-            found += [(t.still_ready, self.timer(node, t)) for t in node.timers.values() if t.is_ready]
-            found += [(always, self.message(node, q)) for q in node.subscriptions if q.messages]
-            found += [(always, self.response(node, q)) for q in node.clients.values() if q.messages]
-            found += [(always, self.request(node, q)) for q in node.servers if q.messages]
-        return found
+    def ready(self) -> list[Entity]:
+        """Return what is ready now, in the order of rclpy: by node, and of a node by the kind of entity."""
+        return [e for node in self.nodes for e in node.entities if e.can_run() and e.is_ready()]
 
-    def timer(self, node: NodeModel, timer: TimerModel) -> Work:
-        def work() -> Steps:
-            timer.call()
-            yield from node.call(timer.timer.name, timer.timer.body)
+    def claim(self, entity: Entity) -> Task:
+        """Make a task of what an entity has to do."""
+        entity.claimed = True
+        task = Task(self.handle(entity))
+        self.tasks.append(task)
+        return task
 
-        return work
-
-    def message(self, node: NodeModel, queue: Queue) -> Work:
-        def work() -> Steps:
-            yield from node.call(queue.owner.name, queue.owner.body, queue.messages.popleft())
-
-        return work
-
-    def response(self, node: NodeModel, queue: Queue) -> Work:
-        """A response completes a future, whose callbacks become tasks."""
-
-        def work() -> Steps:
-            number, value, name = queue.messages.popleft()
-            then = node.pending.pop(number).then
-            self.tasks.append(lambda: node.run(then, Scope(name, value)))
+    def handle(self, entity: Entity) -> Steps:
+        """Take what there is to do and do it, unless a callback of the same group has begun in between."""
+        if not entity.group.is_free:
+            entity.claimed = False
+            self.wake()
             return
-            yield
-
-        return work
-
-    def request(self, node: NodeModel, queue: Queue) -> Work:
-        def work() -> Steps:
-            value, client, number, name = queue.messages.popleft()
-            server = queue.owner
-            yield from node.call(server.name, server.body, value)
-            answer = node.value(server.answer, Scope(server.name, value))
-            yield from self.process.send(lambda: client.put((number, answer, name)))
-
-        return work
+        entity.group.active += 1
+        steps = entity.take()
+        entity.claimed = False
+        self.wake()
+        try:
+            yield from steps
+        finally:
+            entity.group.active -= 1
+            self.wake()
 
 
-def always() -> bool:
-    """Return True: what was there stays there."""
-    return True
+class PoolExecutor(Executor):
+    """A MultiThreadedExecutor of rclpy: it hands what it finds to threads, in turn."""
+
+    def __init__(self, process: ProcessModel, nodes: list[NodeModel]) -> None:
+        super().__init__(process, nodes)
+        self.submitted: deque[Task] = deque()
+        self.idle: list[simpy.Event] = []
+        self.started = 0
+
+    def execute(self, task: Task) -> Steps:
+        self.submitted.append(task)
+        if self.idle:
+            self.idle.pop().succeed()
+        elif self.started < self.process.process.threads:
+            self.started += 1
+            self.world.environment.process(self.work())
+        yield from nothing()
+
+    def left_by(self, task: Task) -> Generator[simpy.Event, Any, Leave | None]:
+        """Run a task, and return how it would end the program; of a thread of a pool, sys.exit ends the task only."""
+        try:
+            yield from task.advance()
+        except Leave as leave:
+            return leave
+        return None
+
+    def work(self) -> Steps:
+        """Do what was submitted, one after the other, for ever."""
+        while True:
+            while self.submitted:
+                left = yield from self.left_by(self.submitted.popleft())
+                if left is not None and left.how is Ending.LEAVE_AT_ONCE:
+                    self.process.end(left.ended)
+                    return
+            event = simpy.Event(self.world.environment)
+            self.idle.append(event)
+            yield event
 
 
 def expected_of(program: Program) -> Expected:

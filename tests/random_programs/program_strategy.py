@@ -6,21 +6,31 @@ come before services.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
 from hypothesis import strategies as st
 from program_description import (
+    LAST_NAP_MS,
     Ask,
+    Await,
+    CallAndWait,
     Cancel,
     Client,
     End,
     Ending,
     Every,
     Fixed,
+    Group,
     Heard,
     Keep,
     Kept,
+    Loop,
     Nap,
     Node,
     Pace,
+    Parameter,
     Process,
     Program,
     Publish,
@@ -28,6 +38,8 @@ from program_description import (
     Runs,
     Say,
     Server,
+    SetParameter,
+    SleepRate,
     Spinning,
     Statement,
     Subscription,
@@ -42,115 +54,247 @@ PERIODS = (50, 100, 100, 125, 200, 250, 300, 470)
 NAPS = (7, 30, 50, 100, 120, 260)
 DURATION_MS = 2000
 SLOTS = 2
+NUMBERS, FEW, MANY, SOME = st.integers(-3, 9), st.integers(2, 9), st.integers(0, 4), st.integers(0, 2)
 
 
-def values(*, heard: bool) -> st.SearchStrategy[Value]:
-    """Draw a value; with a number that was heard only where there is one."""
-    return st.one_of(
-        st.integers(-3, 9).map(Fixed),
-        st.just(Runs()),
-        *([st.just(Heard())] if heard else []),
-        st.integers(0, SLOTS - 1).map(Kept),
-    )
+#: Ends that work in a callback whose spin waits for something else as well, in the threads of a pool, and in the main
+#: thread beside another one.
+HARD_ENDS = (Ending.RAISE, Ending.EXIT, Ending.EXIT_WELL, Ending.LEAVE_AT_ONCE)
+ENDS_OF_POOL = (Ending.EXIT, Ending.LEAVE_AT_ONCE)
+MAIN_ENDS = HARD_ENDS
 
 
-class Draw:
-    """Draws what callbacks of one node do.
+@dataclass(frozen=True, slots=True)
+class Room:
+    """What the callbacks of one group, or a loop, may use, so that no two threads use the same.
 
-    Args:
-        timers: The names of its timers.
-        clients: Its clients.
-        several: Whether the process has other callbacks that must go on while one of them sleeps.
+    Attributes:
+        topics: Where they publish.
+        slots: The variables that they use.
+        timers: The timers that they control.
+        clients: The clients that they ask with.
+        ends: How they may end the program.
+        shared: Whether other threads run beside them, so that what is done with an answer may only be logged.
+        awaits: Whether they may be coroutines.
+        waits: Whether they may wait in the main thread while another one spins.
     """
 
-    def __init__(self, timers: tuple[str, ...], clients: tuple[Client, ...]) -> None:
-        self.timers, self.clients = timers, clients
+    topics: str
+    slots: tuple[int, ...]
+    timers: tuple[str, ...]
+    clients: tuple[Client, ...]
+    ends: tuple[Ending, ...] = tuple(Ending)
+    shared: bool = False
+    awaits: bool = True
+    waits: bool = False
 
-    def statements(self, channels: str, *, heard: bool, deep: bool) -> st.SearchStrategy[tuple[Statement, ...]]:
+    def value(self, draw: st.DrawFn, *, heard: bool) -> Value:
+        """Draw a value; with a number that was heard only where there is one."""
+        kinds: list[type] = [Fixed, Runs, *([Heard] if heard else []), *([Kept] if self.slots else [])]
+        kind = draw(st.sampled_from(kinds if self.shared else [*kinds, Parameter]))
+        if kind is Fixed:
+            return Fixed(draw(NUMBERS))
+        made: Value = Kept(draw(st.sampled_from(self.slots))) if kind is Kept else kind()
+        return made
+
+    def statements(
+        self, draw: st.DrawFn, channels: str, *, heard: bool, deep: bool = True, rate: bool = False
+    ) -> tuple[Statement, ...]:
         """Draw what a callback does; it sends on these channels only."""
-        value = values(heard=heard)
-        kinds: list[st.SearchStrategy[Statement]] = [
-            st.builds(Say, value),
-            st.builds(Write, value),
-            st.builds(Keep, st.integers(0, SLOTS - 1), value, st.booleans()),
-            st.builds(Nap, st.sampled_from(NAPS)),
-        ]
-        if topics := [c for c in channels if c in TOPICS]:
-            kinds += [st.builds(Publish, st.sampled_from(topics), value)] * 3
-        if self.timers:
-            timers = st.sampled_from(self.timers)
-            kinds += [st.builds(Cancel, timers), st.builds(Reset, timers)]
-            kinds += [st.builds(Pace, timers, st.sampled_from(PERIODS))]
-        asked = [client for client in self.clients if client.service in channels]
-        if asked and deep:
-            kinds += [self.question(client, channels, value) for client in asked]
+        topics = [c for c in channels if c in self.topics]
+        asked = [client.name for client in self.clients if client.service in channels]
+        kinds: list[type] = [Say, Write, Nap, *([Keep] if self.slots else []), *([Publish] * 3 if topics else [])]
+        kinds += [Cancel, Reset, Pace] if self.timers else []
+        kinds += [*([] if self.shared else [SetParameter]), *([SleepRate] * 2 if rate else [])]
         if deep:
-            inner = self.statements(channels, heard=heard, deep=False)
-            ends = st.sampled_from(Ending).map(lambda how: (End(how),))
-            kinds += [st.builds(Every, st.integers(2, 5), inner)]
-            kinds += [st.builds(lambda n, i, e: Every(n, i + e), st.integers(3, 9), inner, ends)]
-        return st.lists(st.one_of(kinds), max_size=4 if deep else 2).map(tuple)
+            kinds += [*([Ask] if asked else []), *([Await] if asked and self.awaits else [])]
+            kinds += [*([CallAndWait] if asked and self.waits else []), Every, *([End] if self.ends else [])]
 
-    def question(self, client: Client, channels: str, value: st.SearchStrategy[Value]) -> st.SearchStrategy[Statement]:
-        """Draw a call of a service, and what is done with the answer."""
-        later = channels[channels.index(client.service) + 1 :]
-        return st.builds(Ask, st.just(client.name), value, self.statements(later, heard=True, deep=False))
+        def nested() -> tuple[Statement, ...]:
+            return self.statements(draw, channels, heard=heard, deep=False)
+
+        def number() -> Value:
+            return self.value(draw, heard=heard)
+
+        def of(names: Sequence[Any]) -> Any:
+            return draw(st.sampled_from(names))
+
+        def ask() -> Ask:
+            client = of(asked)
+            return Ask(client, number(), self.then(draw, client, channels))
+
+        make: dict[type, Callable[[], Statement]] = {
+            Say: lambda: Say(number()),
+            Write: lambda: Write(number()),
+            Nap: lambda: Nap(of(NAPS)),
+            Keep: lambda: Keep(of(self.slots), number(), draw(st.booleans())),
+            Publish: lambda: Publish(of(topics), number()),
+            Cancel: lambda: Cancel(of(self.timers)),
+            Reset: lambda: Reset(of(self.timers)),
+            Pace: lambda: Pace(of(self.timers), of(PERIODS)),
+            SetParameter: lambda: SetParameter(number()),
+            SleepRate: SleepRate,
+            Ask: ask,
+            Await: lambda: Await(of(asked), number()),
+            CallAndWait: lambda: CallAndWait(of(asked), number()),
+            Every: lambda: Every(draw(FEW), nested()),
+            End: lambda: Every(draw(FEW), (*nested(), *self.ending(draw))),
+        }
+        return tuple(make[of(kinds)]() for _ in range(draw(MANY if deep else SOME)))
+
+    def ending(self, draw: st.DrawFn) -> tuple[Statement, ...]:
+        """Draw an end of the program; in the main thread beside another one not at an instant of that one."""
+        return (*((Nap(LAST_NAP_MS),) if self.waits else ()), End(draw(st.sampled_from(self.ends))))
+
+    def then(self, draw: st.DrawFn, name: str, channels: str) -> tuple[Statement, ...]:
+        """Draw what is done with an answer."""
+        service = next(client.service for client in self.clients if client.name == name)
+        if self.shared:
+            alone = replace(self, topics="", slots=(), timers=())
+            return alone.statements(draw, "", heard=True, deep=False)
+        return self.statements(draw, channels[channels.index(service) + 1 :], heard=True, deep=False)
+
+
+def after(channel: str) -> str:
+    """Return the channels that a callback may send on that something on a channel starts."""
+    everything = TOPICS + SERVICES
+    return everything[everything.index(channel) + 1 :]
 
 
 @st.composite
-def nodes(draw: st.DrawFn, number: int, served: frozenset[str]) -> Node:
-    """Draw a node; it serves no service that another one does."""
-    everything = TOPICS + SERVICES
-    timers = tuple(f"t{number}{n}" for n in range(draw(st.integers(0, 3))))
+def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tuple[Node, Loop | None]:
+    """Draw a node, and what the main thread does beside a thread that spins; no service has two servers."""
+    several = spinning is Spinning.MULTI
+    groups = tuple(draw(st.lists(st.sampled_from(Group), min_size=int(several), max_size=2)))
+    timers = [(f"t{number}{n}", draw(st.integers(0, len(groups)))) for n in range(draw(st.integers(0, 3)))]
     topics = draw(st.lists(st.sampled_from(TOPICS), max_size=2))
-    services = draw(st.lists(st.sampled_from(SERVICES), max_size=1).map(lambda s: [x for x in s if x not in served]))
-    asked = draw(st.lists(st.sampled_from(SERVICES), max_size=2, unique=True))
-    clients = tuple(Client(f"c{number}{n}", service) for n, service in enumerate(asked))
-    does = Draw(timers, clients)
+    services = [s for s in draw(st.lists(st.sampled_from(SERVICES), max_size=1)) if s not in taken.served]
+    taken.served |= set(services)
+    wanted = draw(
+        st.lists(st.sampled_from(SERVICES), min_size=int(spinning is Spinning.UNTIL), max_size=2, unique=True)
+    )
+    asked = [s for s in wanted if s not in taken.asked or not taken.several]
+    taken.asked |= set(asked)
+    clients = [Client(f"c{number}{n}", s, draw(st.integers(0, len(groups)))) for n, s in enumerate(asked)]
+    ends = {Spinning.THREAD: (), Spinning.MULTI: ENDS_OF_POOL, Spinning.UNTIL: HARD_ENDS}.get(spinning, tuple(Ending))
+    rooms = [Room(TOPICS, tuple(range(SLOTS)), tuple(name for name, _ in timers), tuple(clients), ends)]
+    beside = Room("", (), (), ())
+    kinds = (Group.EXCLUSIVE, *groups)
+    if several:
+        owners = [draw(st.integers(0, len(groups))) for _ in (*TOPICS, *clients)]
+        rooms = [
+            Room(
+                "".join(t for t, owner in zip(TOPICS, owners, strict=False) if owner == group),
+                (group,),
+                # Callbacks that overlap could change a timer at the instant at which it is due.
+                tuple(name for name, its in timers if its == group and kinds[group] is Group.EXCLUSIVE),
+                tuple(c for c, owner in zip(clients, owners[len(TOPICS) :], strict=True) if owner == group),
+                ends,
+                shared=True,
+                awaits=kinds[group] is Group.EXCLUSIVE,
+            )
+            for group in range(len(kinds))
+        ]
+    elif spinning is Spinning.THREAD:
+        owners = [draw(st.booleans()) for _ in (*TOPICS, *clients)]
+        own, others = (
+            (
+                "".join(t for t, owner in zip(TOPICS, owners, strict=False) if owner is side),
+                tuple(c for c, owner in zip(clients, owners[len(TOPICS) :], strict=True) if owner is side),
+            )
+            for side in (True, False)
+        )
+        rooms = [Room(others[0], (0,), rooms[0].timers, others[1], (), shared=True)]
+        beside = Room(own[0], (1,), (), own[1], MAIN_ENDS, shared=True, awaits=False, waits=True)
+    room = rooms if several else rooms * (len(groups) + 1)
 
-    def after(channel: str) -> st.SearchStrategy[tuple[Statement, ...]]:
-        return does.statements(everything[everything.index(channel) + 1 :], heard=True, deep=True)
+    def callback(group: int, channels: str, *, heard: bool = True) -> tuple[Statement, ...]:
+        return room[group].statements(draw, channels, heard=heard)
 
-    return Node(
+    of = [draw(st.integers(0, len(groups))) for _ in (*topics, *services)]
+    node = Node(
         name=f"n{number}",
-        slots=SLOTS,
+        slots=SLOTS + 1,
         timers=tuple(
             Timer(
                 name,
                 draw(st.sampled_from(PERIODS)),
-                draw(does.statements(everything, heard=False, deep=True)),
+                callback(group, TOPICS + SERVICES, heard=False),
                 starts=draw(st.sampled_from((True, True, True, False))),
+                group=group,
             )
-            for name in timers
+            for name, group in timers
         ),
         subscriptions=tuple(
-            Subscription(f"s{number}{n}", topic, draw(st.sampled_from((1, 2, 10))), draw(after(topic)))
+            Subscription(
+                f"s{number}{n}", topic, draw(st.sampled_from((1, 2, 10))), callback(of[n], after(topic)), of[n]
+            )
             for n, topic in enumerate(topics)
         ),
         servers=tuple(
-            Server(f"v{number}{n}", service, draw(after(service)), draw(values(heard=True)))
-            for n, service in enumerate(services)
+            Server(
+                f"v{number}{n}",
+                service,
+                callback(group, after(service)),
+                room[group].value(draw, heard=True),
+                group,
+            )
+            for n, (service, group) in enumerate(zip(services, of[len(topics) :], strict=True))
         ),
-        clients=clients,
+        clients=tuple(clients),
+        groups=groups,
     )
+    if spinning is not Spinning.THREAD:
+        return node, None
+    rate = draw(st.sampled_from((0, 50, 100, 250)))
+    body = beside.statements(draw, TOPICS + SERVICES, heard=True, rate=bool(rate))
+    pause: Statement = SleepRate() if rate else Nap(draw(st.sampled_from(NAPS)))
+    return node, Loop("m", draw(st.sampled_from((3, 12, 100))), (*body, pause), rate)
+
+
+@dataclass(slots=True)
+class Taken:
+    """What other nodes of the program have already.
+
+    Attributes:
+        served: The services that have a server.
+        asked: The services that have a client.
+        several: Whether any process has several threads, so that the order of requests at one instant is open.
+    """
+
+    served: set[str]
+    asked: set[str]
+    several: bool
 
 
 @st.composite
 def programs(draw: st.DrawFn) -> Program:
-    """Draw a program."""
+    """Draw a program; only its first process may have several threads, so that nothing runs between their messages."""
     made: list[Process] = []
-    served: frozenset[str] = frozenset()
+    taken = Taken(set(), set(), several=False)
     number = 0
-    for _ in range(draw(st.integers(1, 3))):
-        spinning = draw(st.sampled_from(Spinning))
-        own = []
+    for place in range(draw(st.integers(1, 3))):
+        threaded = (Spinning.THREAD, Spinning.MULTI)
+        spinning = draw(st.sampled_from([kind for kind in Spinning if place == 0 or kind not in threaded]))
+        taken.several |= spinning in threaded
+        own: list[Node] = []
+        loop = None
         for _ in range(draw(st.integers(1, 2)) if spinning is Spinning.EXECUTOR else 1):
-            node = draw(nodes(number, served))
-            served |= {server.service for server in node.servers}
+            node, loop = draw(nodes(number, taken, spinning))
             number += 1
             own.append(node)
-        once = spinning is Spinning.ONCE
-        timeout = draw(st.sampled_from((10, 50, 100, 333))) if once else 0
-        turns = draw(st.sampled_from((0, 3, 12))) if once else 0
-        made.append(Process(tuple(own), spinning, timeout, turns))
+        if spinning is Spinning.UNTIL and not own[0].clients:
+            spinning = Spinning.SPIN
+        turns = draw(st.sampled_from({Spinning.ONCE: (0, 3, 12), Spinning.UNTIL: (1, 5)}.get(spinning, (0,))))
+        timeouts = (10, 50, 100, 333) if turns else (0, 0, 50, 333)  # only one that goes on for ever may never block
+        made.append(
+            Process(
+                tuple(own),
+                spinning,
+                timeout_ms=draw(st.sampled_from(timeouts)) if spinning is Spinning.ONCE else 0,
+                turns=turns,
+                loop=loop,
+                threads=draw(st.integers(2, 4)) if spinning is Spinning.MULTI else 0,
+            )
+        )
     return Program(tuple(made), DURATION_MS)

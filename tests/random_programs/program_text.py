@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 from program_description import (
+    FIRST_NAP_MS,
+    LAST_NAP_MS,
     Ask,
+    Await,
+    CallAndWait,
     Cancel,
     End,
     Ending,
@@ -13,14 +18,18 @@ from program_description import (
     Fixed,
     Heard,
     Keep,
+    Loop,
     Nap,
     Node,
     Pace,
+    Parameter,
     Process,
     Publish,
     Reset,
     Runs,
     Say,
+    SetParameter,
+    SleepRate,
     Spinning,
     Statement,
     Value,
@@ -28,13 +37,18 @@ from program_description import (
 )
 
 INDENT = "    "
+WITH_VALUE = (Publish, Say, Write, Keep, Ask, Await, SetParameter, CallAndWait)
 HEAD = """import os
 import sys
+import threading
 import time
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from std_msgs.msg import Int64
 from test_msgs.srv import BasicTypes
 """
@@ -50,8 +64,8 @@ ENDINGS = {
 def file_of(process: Process) -> str:
     """Return the text of the file of a process."""
     lines = [HEAD]
-    for node in process.nodes:
-        lines += ["", *class_of(node)]
+    for number, node in enumerate(process.nodes):
+        lines += ["", *class_of(node, None if number else process.loop)]
     return "\n".join([*lines, "", *main_of(process), ""])
 
 
@@ -64,96 +78,133 @@ def sent_on(statements: Iterable[Statement]) -> Iterator[str]:
             yield from sent_on(one.then)
 
 
-def bodies(node: Node) -> Iterator[tuple[Statement, ...]]:
-    """Yield what each callback of a node does."""
+def bodies(node: Node, loop: Loop | None = None) -> Iterator[tuple[Statement, ...]]:
+    """Yield what each callback of a node does, and the loop of the main thread."""
+    if loop is not None:
+        yield loop.body
     yield from (timer.body for timer in node.timers)
     yield from (sub.body for sub in node.subscriptions)
     yield from (server.body for server in node.servers)
 
 
-def class_of(node: Node) -> Iterator[str]:
+def class_of(node: Node, loop: Loop | None) -> Iterator[str]:
     """Yield the lines of the class of a node."""
     yield f"class {node.name.capitalize()}(Node):"
     yield f"{INDENT}def __init__(self):"
-    made = [f'super().__init__("{node.name}")', f"self.kept = [0] * {max(1, node.slots)}"]
-    topics = sorted({topic for body in bodies(node) for topic in sent_on(body)})
-    made += [f'self.to_{topic} = self.create_publisher(Int64, "/{topic}", 50)' for topic in topics]
-    for timer in node.timers:
-        given = "" if timer.starts else ", autostart=False"
-        made += [f"self.{timer.name}_runs = 0"]
-        made += [f"self.{timer.name} = self.create_timer({timer.period_ms / 1000}, self.on_{timer.name}{given})"]
-    for sub in node.subscriptions:
-        made += [f"self.{sub.name}_runs = 0"]
-        made += [f'self.create_subscription(Int64, "/{sub.topic}", self.on_{sub.name}, {sub.depth})']
-    for server in node.servers:
-        made += [f"self.{server.name}_runs = 0"]
-        made += [f'self.create_service(BasicTypes, "/{server.service}", self.on_{server.name})']
-    made += [f'self.{client.name} = self.create_client(BasicTypes, "/{client.service}")' for client in node.clients]
-    yield from (INDENT * 2 + line for line in made)
+    yield from (INDENT * 2 + line for line in made_by(node, loop))
+    yield from method("parameter", "parameters", (), result=ON_PARAMETER)
     for timer in node.timers:
         yield from method(timer.name, "", timer.body)
     for sub in node.subscriptions:
         yield from method(sub.name, "message", sub.body, heard="message.data")
     for server in node.servers:
-        yield from method(server.name, "request, response", server.body, heard="request.int64_value")
-        answer = value_of(server.answer, server.name, "request.int64_value")
-        yield f"{INDENT * 2}response.int64_value = {answer}"
-        yield f"{INDENT * 2}return response"
+        answer = value_of(server.answer, server.name)
+        result = (f"response.int64_value = {answer}", "return response")
+        yield from method(server.name, "request, response", server.body, heard="request.int64_value", result=result)
 
 
-def method(name: str, arguments: str, body: tuple[Statement, ...], heard: str = "0") -> Iterator[str]:
+ON_PARAMETER = (
+    "fine = parameters[0].value >= 0",
+    "if fine:",
+    f'{INDENT}self.get_logger().info(f"parameter {{parameters[0].value}}")',
+    "return SetParametersResult(successful=fine)",
+)
+
+
+def made_by(node: Node, loop: Loop | None) -> Iterator[str]:
+    """Yield the lines that make a node's entities."""
+    yield f'super().__init__("{node.name}")'
+    yield f"self.kept = [0] * {max(1, node.slots)}"
+    yield 'self.declare_parameter("number", 0)'
+    yield "self.add_on_set_parameters_callback(self.on_parameter)"
+    for number, group in enumerate(node.groups, 1):
+        yield f"self.group{number} = {group.value}()"
+    yield "self.runs = {}"
+    topics = sorted({topic for body in bodies(node, loop) for topic in sent_on(body)})
+    for topic in topics:
+        yield f'self.to_{topic} = self.create_publisher(Int64, "/{topic}", 50)'
+    for timer in node.timers:
+        given = in_group(timer.group) + ("" if timer.starts else ", autostart=False")
+        yield f"self.{timer.name} = self.create_timer({timer.period_ms / 1000}, self.on_{timer.name}{given})"
+    for sub in node.subscriptions:
+        given = in_group(sub.group)
+        yield f'self.create_subscription(Int64, "/{sub.topic}", self.on_{sub.name}, {sub.depth}{given})'
+    for server in node.servers:
+        given = in_group(server.group)
+        yield f'self.create_service(BasicTypes, "/{server.service}", self.on_{server.name}{given})'
+    for client in node.clients:
+        given = in_group(client.group)
+        yield f'self.{client.name} = self.create_client(BasicTypes, "/{client.service}"{given})'
+
+
+def in_group(group: int) -> str:
+    """Return the argument for a callback group, with the comma before it."""
+    return f", callback_group=self.group{group}" if group else ""
+
+
+def method(
+    name: str, arguments: str, body: tuple[Statement, ...], heard: str = "0", result: tuple[str, ...] = ()
+) -> Iterator[str]:
     """Yield the lines of a callback."""
     yield ""
-    yield f"{INDENT}def on_{name}(self{', ' if arguments else ''}{arguments}):"
-    yield f"{INDENT * 2}self.{name}_runs += 1"
-    yield from (INDENT * 2 + line for line in lines_of(body, name, heard))
+    kind = "async def" if awaits(body) else "def"
+    yield f"{INDENT}{kind} on_{name}(self{', ' if arguments else ''}{arguments}):"
+    first = (f'self.runs["{name}"] = self.runs.get("{name}", 0) + 1', f"heard = {heard}")
+    yield from (INDENT * 2 + line for line in (*first, *lines_of(body, name), *result))
 
 
-def value_of(value: Value, name: str, heard: str) -> str:
+def awaits(body: Iterable[Statement]) -> bool:
+    """Return whether statements wait for a response as a coroutine does."""
+    return any(isinstance(one, Await) or (isinstance(one, Every) and awaits(one.then)) for one in body)
+
+
+def value_of(value: Value, name: str) -> str:
     """Return an expression for a value in a callback."""
     if isinstance(value, Fixed):
         return str(value.number)
     if isinstance(value, Runs):
-        return f"self.{name}_runs"
-    return heard if isinstance(value, Heard) else f"self.kept[{value.slot}]"
+        return f"self.runs['{name}']"
+    if isinstance(value, Parameter):
+        return "self.get_parameter('number').value"
+    return "heard" if isinstance(value, Heard) else f"self.kept[{value.slot}]"
 
 
-def lines_of(body: Iterable[Statement], name: str, heard: str) -> Iterator[str]:
-    """Yield the lines of statements in a callback."""
+def lines_of(body: Iterable[Statement], name: str, label: str = "") -> Iterator[str]:
+    """Yield the lines of statements in a callback, which logs under its name or a label of its own."""
     for one in body:
-        yield from statement(one, name, heard)
+        yield from statement(one, name, label or name)
 
 
-def statement(one: Statement, name: str, heard: str) -> Iterator[str]:
+def statement(one: Statement, name: str, label: str) -> Iterator[str]:
     """Yield the lines of one statement."""
-    if isinstance(one, (Every, Ask)):
-        yield from nested(one, name, heard)
+    if isinstance(one, Every):
+        yield f"if self.runs['{name}'] % {one.runs} == 0:"
+        yield from (INDENT + line for line in (*lines_of(one.then, name, label), "pass"))
         return
-    texts = {
-        Publish: lambda s: f"self.to_{s.topic}.publish(Int64(data={value_of(s.value, name, heard)}))",
-        Say: lambda s: f'self.get_logger().info(f"{name} {{{value_of(s.value, name, heard)}}}")',
-        Write: lambda s: f'print("{name}", {value_of(s.value, name, heard)}, flush=True)',
+    value = value_of(one.value, name) if isinstance(one, WITH_VALUE) else ""
+    request = f"BasicTypes.Request(int64_value={value})"
+    if isinstance(one, Ask):
+        inner = lines_of(one.then, name, f"{name}.{one.client}")
+        yield "def answered(future):"
+        yield from (INDENT + line for line in ("heard = future.result().int64_value", *inner))
+        yield f"self.{one.client}.call_async({request}).add_done_callback(answered)"
+        return
+    texts: dict[type, Callable[[Any], str]] = {
+        Publish: lambda s: f"self.to_{s.topic}.publish(Int64(data={value}))",
+        Say: lambda s: f'self.get_logger().info(f"{label} {{{value}}}")',
+        Write: lambda s: f'print("{label}", {value}, flush=True)',
         Nap: lambda s: f"time.sleep({s.ms / 1000})",
-        Keep: lambda s: f"self.kept[{s.slot}] {'+=' if s.adds else '='} {value_of(s.value, name, heard)}",
+        Keep: lambda s: f"self.kept[{s.slot}] {'+=' if s.adds else '='} {value}",
         Cancel: lambda s: f"self.{s.timer}.cancel()",
         Reset: lambda s: f"self.{s.timer}.reset()",
         Pace: lambda s: f"self.{s.timer}.timer_period_ns = {s.period_ms * 1_000_000}",
+        Await: lambda s: f"heard = (await self.{s.client}.call_async({request})).int64_value",
+        CallAndWait: lambda s: f"heard = self.{s.client}.call({request}).int64_value",
+        SetParameter: lambda s: f'self.set_parameters([Parameter("number", value={value})])',
+        SleepRate: lambda s: "self.rate.sleep()",
         End: lambda s: ENDINGS[s.how],
     }
     yield texts[type(one)](one)
-
-
-def nested(one: Every | Ask, name: str, heard: str) -> Iterator[str]:
-    """Yield the lines of a statement that holds others."""
-    if isinstance(one, Every):
-        yield f"if self.{name}_runs % {one.runs} == 0:"
-        yield from (INDENT + line for line in (*lines_of(one.then, name, heard), "pass"))
-        return
-    yield f"request = BasicTypes.Request(int64_value={value_of(one.value, name, heard)})"
-    inner = tuple(lines_of(one.then, name, "future.result().int64_value"))
-    yield "def answered(future):"
-    yield from (INDENT + line for line in (*inner, "pass"))
-    yield f"self.{one.client}.call_async(request).add_done_callback(answered)"
 
 
 def main_of(process: Process) -> Iterator[str]:
@@ -171,18 +222,60 @@ def steps_of(process: Process) -> Iterator[str]:
     """Yield the lines of `main`."""
     yield "rclpy.init()"
     yield f"nodes = [{', '.join(f'{node.name.capitalize()}()' for node in process.nodes)}]"
-    if process.spinning is Spinning.SPIN:
-        yield "rclpy.spin(nodes[0])"
-    elif process.spinning is Spinning.EXECUTOR:
-        yield "executor = SingleThreadedExecutor()"
-        yield "for node in nodes:"
-        yield f"{INDENT}executor.add_node(node)"
-        yield "executor.spin()"
-    else:
-        yield f"turns = {process.turns}"
-        yield "while rclpy.ok():"
-        yield f"{INDENT}rclpy.spin_once(nodes[0], timeout_sec={process.timeout_ms / 1000})"
-        yield f"{INDENT}turns -= 1"
-        yield f"{INDENT}if turns == 0:"
-        yield f"{INDENT * 2}break"
+    yield from RUNNING[process.spinning](process)
     yield 'print("main", 0, flush=True)'
+
+
+def with_executor(process: Process, executor: str = "SingleThreadedExecutor()") -> Iterator[str]:
+    """Yield the lines that spin all nodes in an executor."""
+    yield f"executor = {executor}"
+    yield "for node in nodes:"
+    yield f"{INDENT}executor.add_node(node)"
+    yield "executor.spin()"
+
+
+def in_turns(process: Process) -> Iterator[str]:
+    """Yield the lines that call spin_once."""
+    yield f"turns = {process.turns}"
+    yield "while rclpy.ok():"
+    yield f"{INDENT}rclpy.spin_once(nodes[0], timeout_sec={process.timeout_ms / 1000})"
+    yield f"{INDENT}turns -= 1"
+    yield f"{INDENT}if turns == 0:"
+    yield f"{INDENT * 2}break"
+
+
+def until_answered(process: Process) -> Iterator[str]:
+    """Yield the lines that call a service several times, and spin until each response is there."""
+    client = process.nodes[0].clients[0].name
+    yield f"time.sleep({FIRST_NAP_MS / 1000})"
+    yield f"for turn in range({process.turns}):"
+    yield f"{INDENT}future = nodes[0].{client}.call_async(BasicTypes.Request(int64_value=turn))"
+    yield f"{INDENT}rclpy.spin_until_future_complete(nodes[0], future)"
+    yield f'{INDENT}print("until", future.result().int64_value, flush=True)'
+
+
+def beside_a_thread(process: Process) -> Iterator[str]:
+    """Yield the lines of a loop in the main thread, beside a thread that spins."""
+    loop = process.loop
+    assert loop is not None
+    yield "self = nodes[0]"
+    if loop.rate_ms:
+        yield f"self.rate = self.create_rate({1000 / loop.rate_ms})"
+    yield from list(with_executor(process))[:-1]
+    yield "threading.Thread(target=executor.spin, daemon=True).start()"
+    yield "heard = 0"
+    yield f"time.sleep({FIRST_NAP_MS / 1000})"
+    yield f"for turn in range({loop.turns}):"
+    yield f'{INDENT}self.runs["{loop.name}"] = turn + 1'
+    yield from (INDENT + line for line in lines_of(loop.body, loop.name))
+    yield f"time.sleep({LAST_NAP_MS / 1000})"
+
+
+RUNNING: dict[Spinning, Callable[[Process], Iterator[str]]] = {
+    Spinning.SPIN: lambda process: iter(("rclpy.spin(nodes[0])",)),
+    Spinning.EXECUTOR: with_executor,
+    Spinning.ONCE: in_turns,
+    Spinning.UNTIL: until_answered,
+    Spinning.THREAD: beside_a_thread,
+    Spinning.MULTI: lambda process: with_executor(process, f"MultiThreadedExecutor({process.threads})"),
+}

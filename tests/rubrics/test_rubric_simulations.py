@@ -155,7 +155,7 @@ def test_a_mistake_in_the_rubric_is_told_with_its_place(tmp_path: Path, old: str
         ('SIMULATIONS = {"echo": Echo}', "", "expected a table SIMULATIONS"),
         ('{"echo": Echo}', '{"turtle": Echo}', "expected a new name, found `turtle`, which is taken"),
         ('{"echo": Echo}', '{"echo": Simulation}', "expected a dataclass, found another class"),
-        ('{"echo": Echo}', '{"echo": dataclass}', "expected a class derived from grader.simulation.Simulation"),
+        ('{"echo": Echo}', '{"echo": dataclass}', "expected a class derived from grader.api.Simulation"),
         ("count: int = 1", "count: bytes = b''", "no rubric syntax for a parameter annotated"),
         ("self.gain}", "1 / (self.gain - 2)}", "world.py:27: the simulation `echo` failed: ZeroDivisionError"),
         ("    _heard", "    period: int = 5\n    _heard", "has a period of 5 ns, expected at least 1 ms"),

@@ -40,6 +40,8 @@ def outcome(trace: Trace) -> tuple[bool, str, str]:
     """Return whether the program came to its end, and the error that ended it, with its file."""
     fault = trace.faults()[0]
     text = re.sub(r"\(/[^)]*/", "(", fault.text)  # a bare process names the folder of a file
+    # From Python 3.13 on, only an interpreter that was started for a file knows that it hides another, and says so.
+    text = re.sub(r"partially initialized | from '\w+\.py'| \((most likely due|consider renaming) .*\)", "", text)
     return "made" in [line.text for line in trace.lines()], text, fault.file
 
 

@@ -7,7 +7,6 @@ import hashlib
 import json
 import os
 import re
-import secrets
 import stat
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -23,6 +22,7 @@ from grader.core.errors import EvidenceError
 from grader.core.report import BroughtPackage, Environment
 from grader.core.scenario import ODOMETRY, RecordedStream, Scenario
 from grader.core.submission import Definition, StudentFile
+from grader.files import replace_file
 
 #: Describes the run and lists its recordings; written last.
 MANIFEST = "evidence.json"
@@ -74,7 +74,7 @@ def write(folder: Path, files: Mapping[str, bytes]) -> None:
         path = folder / name
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            _write_whole(path, data)
+            replace_file(path, data)
         except OSError as error:
             raise EvidenceError(f"{path}: the evidence cannot be written: {error.strerror or error}") from error
 
@@ -105,21 +105,6 @@ def read(path: Path, most: int) -> bytes:
     if len(data) > most:
         raise EvidenceError(f"{path}: expected at most {most >> 20} MiB, found more")
     return data
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    fresh = path.parent / f".grade-{secrets.token_hex(8)}.tmp"
-    descriptor = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.replace(path)
-    except BaseException:
-        with suppress(OSError):
-            fresh.unlink()
-        raise
 
 
 FORMAT = "grader/evidence/v1"

@@ -74,9 +74,21 @@ class Fields(Mapping[str, Any]):
             return fields
 
 
+#: A text with more lists and objects than this may be nested deeper than Python's limit of recursion, which the exact
+#: way refuses; from Python 3.12 on, decoding alone refuses only what is nested much deeper.
+_MANY_OPENINGS = 500
+
+
 def fields_of(text: msgspec.Raw) -> Mapping[str, Any]:
-    """Decode the fields of a JSON object; raises MsgspecError if the text is not an object."""
-    lazy = _SHORTEST < len(text) <= _LONGEST and memoryview(text)[0] == _OPENING
+    """Decode the fields of a JSON object.
+
+    Raises MsgspecError if the text is not an object, and RecursionError if it is nested too deeply.
+    """
+    plain = bytes(text)
+    if len(plain) > _MANY_OPENINGS and plain.count(b"[") + plain.count(b"{") > _MANY_OPENINGS:
+        _lively(fields := _decode(text))
+        return fields
+    lazy = _SHORTEST < len(text) <= _LONGEST and plain[0] == _OPENING
     return Fields(text) if lazy else _decode(text)
 
 

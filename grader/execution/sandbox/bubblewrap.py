@@ -75,7 +75,7 @@ class Bubblewrap:
         if not seccomp.supports(platform.machine()):
             raise EnvironmentFault(f"sandbox: expected x86_64 or aarch64, found {platform.machine()}")
         bwrap = _program("bwrap", install_command("bubblewrap"))
-        told = subprocess.run([bwrap, "--help"], capture_output=True, check=False, env={}, timeout=10)
+        told = subprocess.run([bwrap, "--help"], capture_output=True, check=False, env={})
         return cls(
             bwrap=bwrap,
             prlimit=_program("prlimit", install_command("util-linux")),

@@ -31,6 +31,7 @@ from grader.execution.sandbox.protocol import Isolation, StudentProcess
 from grader.execution.sandbox.start import SPARE
 from grader.execution.sandbox.starter import StartedProcess, Starter
 from grader.execution.sandbox.tiers import HOST, isolation_from_name
+from grader.student_host.originals import wait_until
 
 #: Seconds in which a message must have come back, and between two attempts to send it.
 EXCHANGE_S, AGAIN_S = 15.0, 0.03
@@ -160,13 +161,19 @@ def exchange(process: subprocess.Popen[bytes] | StartedProcess, domain: int) -> 
     replies: list[str] = []
     node.create_subscription(String, "probe_back", lambda message: replies.append(message.data), 10)
     forth = node.create_publisher(String, "probe_forth", 10)
-    deadline, again = time.monotonic() + EXCHANGE_S, 0.0
-    while nonce not in replies and process.poll() is None and (now := time.monotonic()) < deadline:
+    again = 0.0
+
+    def came() -> bool:
+        """Send it again if that is due, and look for an answer; also true if none can come any more."""
+        nonlocal again
         # An endpoint that is not matched yet does not receive messages.
-        if now >= again and forth.get_subscription_count():
+        if (now := time.monotonic()) >= again and forth.get_subscription_count():
             forth.publish(String(data=nonce))
             again = now + AGAIN_S
         rclpy.spin_once(node, timeout_sec=0.01)
+        return nonce in replies or process.poll() is not None
+
+    wait_until(came, EXCHANGE_S, pause_s=0)
     return nonce in replies, node
 
 

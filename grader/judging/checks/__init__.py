@@ -1,7 +1,5 @@
 """The general checks that rubrics can use; CHECKS lists all of them."""
 
-import sys
-
 from grader.judging.checks.actions import ActionFeedback, ActionResult, LifecycleStates
 from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
 from grader.judging.checks.closed_loop import ReachesGoal, StaysInRange
@@ -82,15 +80,4 @@ CHECKS: dict[str, type] = {
     "source_uses": SourceUses,
     "source_avoids": SourceAvoids,
 }
-_NAMES = {kind: name for name, kind in CHECKS.items()}
-__all__ = ["CHECKS", "name_of_check"]
-
-
-def name_of_check(check: object) -> str:
-    """Return the name of a check in rubrics: of a general one, or of one in a file that brings a table of its own."""
-    kind = type(check)
-    if kind in _NAMES:
-        return _NAMES[kind]
-    table = getattr(sys.modules.get(kind.__module__), "CHECKS", None)
-    own = table.items() if isinstance(table, dict) else ()
-    return next((str(name) for name, one in own if one is kind), kind.__name__)
+__all__ = ["CHECKS"]

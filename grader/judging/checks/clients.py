@@ -27,7 +27,7 @@ from grader.judging.findings import (
     only_printed,
     waiting_for,
 )
-from grader.judging.output import Output, printed_lines, shape_of, student_records
+from grader.judging.logs.outputs import Output, printed_lines, shape_of, student_records
 from grader.judging.plots import Drawing
 from grader.judging.service_calls import (
     LATENESS_NS,

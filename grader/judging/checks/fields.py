@@ -15,7 +15,7 @@ from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern
 from grader.core.trace import Message, Trace
 from grader.judging.facts import DrawFacts, SeriesFacts
 from grader.judging.findings import explain_fault, explain_no_message, met, not_met
-from grader.judging.output import number_in
+from grader.judging.logs.outputs import number_in
 from grader.judging.plots import Drawing, Plot, value_panels
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
 from grader.judging.values import (
@@ -34,7 +34,7 @@ from grader.judging.values import (
     rules_text,
     text_at,
 )
-from grader.judging.wording import moment, number, numbers, quote, unit_of
+from grader.judging.wording import in_unit, moment, number, numbers, quote
 
 
 @dataclass(frozen=True, slots=True)
@@ -349,21 +349,25 @@ class RandomInRange:
     """Every number on a topic is in a range, and the numbers are random: no constant, cycle, ramp or smooth curve.
 
     Attributes:
-        topic: Topic name as on the wire; its messages hold one number, as `data` or `temperature`.
+        topic: Topic name as on the wire.
         low: Smallest value allowed, the edge inside.
         high: Largest value allowed, the edge inside.
         after_discovery: Whether messages do not count that are sent as soon as the publisher is created, before anybody
             can have discovered it.
+        field: Path of the number; by default `data`, or else the only number of a message.
+        unit: Unit of the number, for reasons and charts, e.g. `m`.
     """
 
     topic: str
     low: float
     high: float
     after_discovery: bool = False
+    field: Annotated[str, FieldOf("topic")] = ""
+    unit: str = ""
 
     @property
     def expected(self) -> str:
-        span_ = f"{number(self.low)} to {number(self.high)}{unit_of(self.topic)}"
+        span_ = f"{number(self.low)} to {number(self.high)}{in_unit(self.unit)}"
         return f"every value on {self.topic} within {span_}, and drawn at random"
 
     def judge(self, trace: Trace) -> Finding:
@@ -371,7 +375,7 @@ class RandomInRange:
         if not messages:
             silent = explain_no_message(trace, self.topic)
             return not_met(silent.reason, silent.evidence, blocked_by="topic_rate", problem=silent.problem)
-        values = published_numbers(trace, self.topic)
+        values = published_numbers(trace, self.topic, self.field)
         if len(values) < len(messages):
             reason = f"{self.topic}: {quote(messages[0].type)} carries no number"
             return not_met(reason, {"type": messages[0].type}, problem=ProblemKind.NO_NUMBER)
@@ -387,7 +391,7 @@ class RandomInRange:
         return known | {"distinct": len(set(got)), "first_values": got[:10]}
 
     def _outside(self, values: Sequence[Reading]) -> Finding | None:
-        unit = unit_of(self.topic)
+        unit = in_unit(self.unit)
         bad = [r for r in values if not self.low - _EDGE <= r.value <= self.high + _EDGE]
         if not bad:
             return None
@@ -407,14 +411,14 @@ class RandomInRange:
             return None
         if pattern == "constant" and len(got) < _FEWEST_FOR_CONSTANT:
             reason = (
-                f"{self.topic}: {counted(len(got), 'value')} ({numbers(got)}{unit_of(self.topic)}) cannot show chance"
+                f"{self.topic}: {counted(len(got), 'value')} ({numbers(got)}{in_unit(self.unit)}) cannot show chance"
             )
             return not_met(
                 reason, self._evidence(values), hint=self._hint, blocked_by="topic_rate", problem=ProblemKind.TOO_FEW
             )
         problem = ProblemKind.NOT_RANDOM
         if pattern == "constant":
-            shown = f"constant, {number(got[0])}{unit_of(self.topic)} in all {len(got)} messages"
+            shown = f"constant, {number(got[0])}{in_unit(self.unit)} in all {len(got)} messages"
             problem = ProblemKind.CONSTANT
         else:
             shown = f"{pattern} ({numbers(got[:5])}, ...)"
@@ -424,7 +428,7 @@ class RandomInRange:
 
     def _drawn(self, values: Sequence[Reading]) -> Finding:
         got = [r.value for r in values]
-        unit = unit_of(self.topic)
+        unit = in_unit(self.unit)
         reason = f"{self.topic}: {counted(len(got), 'value')} from {number(min(got))} to {number(max(got))}{unit}, "
         reason += f"{len(set(got))} of them different; "
         reason += f"expected random ones in {number(self.low)} to {number(self.high)}{unit}"
@@ -432,5 +436,5 @@ class RandomInRange:
 
     def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
         """Return the numbers with their range."""
-        label = f"{number(self.low)} to {number(self.high)}{unit_of(self.topic)}"
-        return Drawing((Plot(self.topic, bands=(Band(self.low, self.high, f"{label}: accepted"),)),))
+        label = f"{number(self.low)} to {number(self.high)}{in_unit(self.unit)}"
+        return Drawing((Plot(self.topic, bands=(Band(self.low, self.high, f"{label}: accepted"),), unit=self.unit),))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -22,13 +21,11 @@ from grader.judging.findings import (
     not_met,
     only_printed,
 )
-from grader.judging.output import Output, in_window, numbers_in, printed_lines, student_records
+from grader.judging.logs.matching import says
+from grader.judging.logs.outputs import Output, in_window, printed_lines, student_records
 from grader.judging.service_calls import calls_of
-from grader.judging.values import JITTER_NS, as_number, heard_from_ns, shown, student_endpoints, value_at
+from grader.judging.values import JITTER_NS, heard_from_ns, shown, student_endpoints, value_at
 from grader.judging.wording import moment, quote, span
-
-#: More numbers than this in one text, besides those expected, show nothing.
-_FEW = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +128,7 @@ def _judged(trace: Trace, process: str, heard: Sequence[_Heard], within_ns: int,
         return in_window(outputs, one.t_ns - jitter_ns, one.t_ns + late_ns)
 
     def unlogged(outputs: Sequence[Output]) -> list[_Heard]:
-        return [one for one in due if not any(_says(o.text, one.value) for o in near(outputs, one))]
+        return [one for one in due if not any(says(o.text, one.value) for o in near(outputs, one))]
 
     records = student_records(trace, process)
     missing = unlogged(records)
@@ -157,17 +154,3 @@ def _judged(trace: Trace, process: str, heard: Sequence[_Heard], within_ns: int,
 def _ended(trace: Trace, process: str) -> bool:
     """Return whether a process ended before the recording did, so that nothing more is to be expected of it."""
     return any(mark.t_ns < trace.stop_ns for mark in trace.marks("exited", process))
-
-
-def _says(text: str, value: object) -> bool:
-    """Return whether a text shows a value: word for word, or as numbers next to each other and few others."""
-    if isinstance(value, str):
-        return re.search(rf"(?<!\w){re.escape(value)}(?!\w)", text) is not None
-    wanted = [as_number(one) for one in (value if isinstance(value, (list, tuple)) else [value])]
-    found = numbers_in(text)
-    if None in wanted or len(found) > len(wanted) + _FEW:
-        return False
-    return any(
-        all(n.shows(w) for n, w in zip(found[k:], wanted, strict=False) if w is not None)
-        for k in range(len(found) - len(wanted) + 1)
-    )

@@ -26,7 +26,7 @@ from grader.judging.findings import (
     only_printed,
     waiting_for,
 )
-from grader.judging.output import Output, is_no_node, numbers_in, printed_lines, shape_of, student_records
+from grader.judging.logs.outputs import Output, is_no_node, numbers_in, printed_lines, shape_of, student_records
 from grader.judging.plots import Drawing, Plot
 from grader.judging.values import JITTER_NS, number_at, published
 from grader.judging.wording import listed, moment, number, quote, span

@@ -17,7 +17,7 @@ from grader.judging.charts import gaps_panel, series, time_chart
 from grader.judging.checks.logs import complained
 from grader.judging.facts import LogPaceFacts, PositionFacts
 from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, only_printed
-from grader.judging.output import printed_lines, student_records, written
+from grader.judging.logs.outputs import printed_lines, student_records, written
 from grader.judging.plots import Drawing, Plot
 from grader.judging.position_causes import cause_of
 from grader.judging.position_logs import (

@@ -8,7 +8,7 @@ from dataclasses import field as dataclass_field
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from grader.core.chart import Look, Panel, Tone
 from grader.core.dataclass import dataclass
@@ -28,22 +28,9 @@ from grader.judging.findings import (
     not_met,
     only_printed,
 )
-from grader.judging.output import (
-    LoggedNumbers,
-    Output,
-    Sought,
-    after,
-    followed,
-    in_window,
-    numbers_in,
-    printed_lines,
-    shows_about,
-    standing,
-    student_records,
-    surroundings,
-    times,
-    wrong_conversion,
-)
+from grader.judging.logs.conversions import LoggedNumbers, times, wrong_conversion
+from grader.judging.logs.matching import Sought, followed, shows_about, standing, surroundings
+from grader.judging.logs.outputs import Output, after, in_window, numbers_in, printed_lines, student_records
 from grader.judging.plots import Drawing, Plot
 from grader.judging.texts import Printed, clean
 from grader.judging.values import (
@@ -94,6 +81,7 @@ class LogsValues:
             products that name each other's units for every message do not count. No unit needs to be named.
     """
 
+    noun: ClassVar[str] = "message"
     process: str
     topic: str
     field: Annotated[str, FieldOf("topic")] = "data"
@@ -114,36 +102,42 @@ class LogsValues:
         received = self._received(trace)
         if not received:
             return _nothing(trace, self.process, f"{self.topic}: no number {self.field} was published on it")
-        return self._judged(trace, received)
+        return _judged(self, trace, received)
 
-    def _judged(self, trace: Trace, received: Sequence[_Received]) -> Finding:
-        fault = first_fault(trace, self.process)
+    def when_logged(
+        self,
+        trace: Trace,  # noqa: ARG002 - as of the other check
+        received: Sequence[_Received],
+        unlogged: Sequence[_Received],
+        records: Sequence[Output],
+    ) -> Finding:
+        """Return the finding if enough is logged."""
+        evidence = self.evidence_of(received, unlogged)
+        return met(f"{self._said(received, unlogged)} logged{self._example(received, records)}", evidence)
+
+    def when_printed(self, received: Sequence[_Received], evidence: dict[str, object]) -> Finding:
+        """Return the finding if enough is written, but not through the logger."""
+        return only_printed(f"{self._said(received, ())} printed, not all of them logged", evidence, LOGGER_HINT)
+
+    def among(
+        self,
+        trace: Trace,  # noqa: ARG002 - as of the other check
+        received: Sequence[_Received],  # noqa: ARG002 - as of the other check
+        one: _Received,
+        records: Sequence[Output],
+    ) -> str:
+        """Return a clause about the numbers among which something is lost."""
+        return surroundings(records, self._sought([one], [one.stop_ns])[0])
+
+    def when_missing(
+        self, trace: Trace, received: Sequence[_Received], absent: Sequence[_Received], evidence: dict[str, object]
+    ) -> Finding:
+        """Return the finding if something was never written."""
         records = student_records(trace, self.process)
-        unlogged = self._unlogged(received, records)
-        evidence = self._evidence(received, unlogged)
-        if swapped := self._swapped_units(received, records):
-            return not_met(
-                swapped, evidence, hint="name the unit that each number has", problem=ProblemKind.WRONG_VALUE
-            )
-        if self._enough(received, unlogged):
-            return met(f"{self._said(received, unlogged)} logged{self._example(received, records)}", evidence)
-        lines = printed_lines(trace, self.process)
-        if self._enough(received, self._unlogged(received, sorted([*records, *lines], key=lambda o: o.t_ns))):
-            return only_printed(f"{self._said(received, ())} printed, not all of them logged", evidence, LOGGER_HINT)
-        absent = self._unlogged(received, records, standing)
-        hidden = self._enough(received, absent)
-        if fault is not None:
-            lost = f"{len(unlogged if hidden else absent)} of {len(received)} messages of {self.topic} were not logged"
-            return faulted(fault, lost, evidence)
-        if hidden:
-            first = unlogged[0]
-            among = surroundings(records, self._sought([first], [first.stop_ns])[0])
-            share = f"{len(unlogged)} of {counted(len(received), 'message')}"
-            return _hidden(self, share, (first.value, first.t_ns), among, evidence)
-        outputs = records if any(numbers_in(r.text) for r in records) else lines
-        return self._explain(received, absent, outputs, self._evidence(received, absent))
+        outputs = records if any(numbers_in(r.text) for r in records) else printed_lines(trace, self.process)
+        return self._explain(received, absent, outputs, evidence)
 
-    def _swapped_units(self, received: Sequence[_Received], outputs: Sequence[Output]) -> str:
+    def swapped_units(self, received: Sequence[_Received], outputs: Sequence[Output]) -> str:
         """Return that two products of every message are followed by each other's units; empty if they are not."""
         others = [f for f in dict.fromkeys(self.units.values()) if f not in self.unit_factors]
         for mine, other in ((f, o) for f in self.unit_factors for o in others):
@@ -217,12 +211,18 @@ class LogsValues:
         pairs = [(d, stop, number_at(d.value, self.field)) for d, stop in zip(sent, stops, strict=True)]
         return [_Received(d.t_ns - jitter_ns, stop, value) for d, stop, value in pairs if value is not None]
 
-    def _enough(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> bool:
+    def is_enough(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> bool:
+        """Return whether enough is logged."""
         return len(received) - len(unlogged) >= self.share * len(received) - 1e-9
 
-    def _unlogged(
-        self, received: Sequence[_Received], outputs: Sequence[Output], logged: _Logged = followed
+    def unlogged_in(
+        self,
+        trace: Trace,  # noqa: ARG002 - as of the other check
+        received: Sequence[_Received],
+        outputs: Sequence[Output],
+        logged: _Logged = followed,
     ) -> list[_Received]:
+        """Return what is not logged in some outputs."""
         punctual = self._unshown(received, [r.stop_ns for r in received], outputs, logged)
         written = sum(len(numbers_in(o.text)) for o in outputs if o.t_ns >= received[0].t_ns)
         if not punctual or written < self.share * len(received) * len(self.unit_factors):
@@ -246,7 +246,8 @@ class LogsValues:
             for f in self.unit_factors
         ]
 
-    def _evidence(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> dict[str, object]:
+    def evidence_of(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> dict[str, object]:
+        """Return the numbers behind the finding."""
         return {
             "messages": len(received),
             "logged": len(received) - len(unlogged),
@@ -330,6 +331,8 @@ def _shows(value: float, largest: float, printed: Printed) -> bool:
 _SHORTEST_NS = 1_200 * NS_PER_MS
 #: Fewest numbers whose changes show that a process is always one message behind.
 _CHANGES = 3
+#: Fewest values between the smallest and the largest that are never logged, while only these two are.
+_BETWEEN = 2
 #: Largest share of the messages at whose instants a process that logs from its callback may publish, or not log.
 _IN_STEP = 0.1
 _PRINT_HINT = "write the received values through the node's logger: self.get_logger().info(...)"
@@ -345,11 +348,14 @@ class LogsReceived:
     Attributes:
         process: File name of the student process.
         topic: Topic of the numbers.
+        field: Path of the number; by default `data`, or else the only number of a message.
     """
 
+    noun: ClassVar[str] = "value"
     roles: ClassVar[Roles] = Roles(hears=("topic",))
     process: str
     topic: str
+    field: Annotated[str, FieldOf("topic")] = ""
 
     @property
     def expected(self) -> str:
@@ -357,50 +363,55 @@ class LogsReceived:
 
     def judge(self, trace: Trace) -> Finding:
         fault = first_fault(trace, self.process)
-        values = held(trace, self.topic, heard_from_ns=heard_from_ns(trace, self.topic))
+        values = held(trace, self.topic, self.field, heard_from_ns=heard_from_ns(trace, self.topic))
         subscriptions = student_endpoints(trace, "subscription", self.topic)
         if not subscriptions and fault is None:
             return explain_no_subscription(trace, self.topic)
-        if not values or (subscriptions and not any(carries_number(e.type) for e in subscriptions)):
+        if not values or (subscriptions and not (self.field or any(carries_number(e.type) for e in subscriptions))):
             return self._no_values(trace, subscriptions)
-        return self._judged(trace, values, subscriptions)
+        return _judged(self, trace, values)
 
-    def _judged(self, trace: Trace, values: Sequence[Held], subscriptions: Sequence[Endpoint]) -> Finding:
-        fault = first_fault(trace, self.process)
-        records = student_records(trace, self.process)
-        sought = self._sought(values, trace)
-        unlogged = _missing(values, followed(records, sought), trace)
-        evidence: dict[str, object] = {"values": [v.value for v in values], "missing": [v.value for v in unlogged]}
-        facts = LogFacts(len(values), len(unlogged))
-        if not unlogged:
-            if behind := self._behind(trace, values, records):
-                return not_met(
-                    behind, evidence, hint="store the number before you log it, not after", problem=ProblemKind.BEHIND
-                )
-            reason = f"{self.process}: all {len(values)} values of {self.topic} are logged"
-            return met(f"{reason} ({numbers(v.value for v in values)})", evidence)
-        if not _missing(values, followed([*records, *printed_lines(trace, self.process)], sought), trace):
-            reason = f"{self.process}: all {len(values)} values of {self.topic} are printed, not all of them are logged"
-            return replace(only_printed(reason, evidence, _PRINT_HINT), facts=facts)
-        absent = _missing(values, standing(records, sought), trace)
-        evidence["missing"] = [v.value for v in absent or unlogged]
-        facts = LogFacts(len(values), len(absent or unlogged))
-        if fault is not None:
-            lost = f"{len(absent or unlogged)} of {len(values)} values of {self.topic} were not logged"
-            return replace(faulted(fault, lost, evidence), facts=facts)
-        if absent:
-            return replace(self._unlogged(subscriptions, values, absent, evidence), facts=facts)
-        among = surroundings(records, sought[values.index(unlogged[0])])
-        share = f"{len(unlogged)} of {len(values)} values"
-        hidden = _hidden(self, share, (unlogged[0].value, unlogged[0].start_ns), among, evidence)
-        return replace(hidden, facts=facts)
+    def when_logged(
+        self, trace: Trace, values: Sequence[Held], unlogged: Sequence[Held], records: Sequence[Output]
+    ) -> Finding:
+        """Return the finding if enough is logged."""
+        evidence = self.evidence_of(values, unlogged)
+        if behind := self._behind(trace, values, records):
+            hint = "store the number before you log it, not after"
+            return not_met(behind, evidence, hint=hint, problem=ProblemKind.BEHIND)
+        reason = f"{self.process}: all {len(values)} values of {self.topic} are logged"
+        return met(f"{reason} ({numbers(v.value for v in values)})", evidence)
+
+    def when_printed(self, values: Sequence[Held], evidence: dict[str, object]) -> Finding:
+        """Return the finding if enough is written, but not through the logger."""
+        reason = f"{self.process}: all {len(values)} values of {self.topic} are printed, not all of them are logged"
+        return only_printed(reason, evidence, _PRINT_HINT)
+
+    def among(self, trace: Trace, values: Sequence[Held], one: Held, records: Sequence[Output]) -> str:
+        """Return a clause about the numbers among which something is lost."""
+        return surroundings(records, self._sought(values, trace)[values.index(one)])
+
+    def evidence_of(self, values: Sequence[Held], unlogged: Sequence[Held]) -> dict[str, object]:
+        """Return the numbers behind the finding."""
+        return {"values": [v.value for v in values], "missing": [v.value for v in unlogged]}
+
+    def is_enough(self, values: Sequence[Held], unlogged: Sequence[Held]) -> bool:
+        """Return whether enough is logged."""
+        return not (values and unlogged)
+
+    def unlogged_in(
+        self, trace: Trace, values: Sequence[Held], outputs: Sequence[Output], logged: _Logged = followed
+    ) -> list[Held]:
+        """Return the values that are not logged, except for one that came too late."""
+        found = logged(outputs, self._sought(values, trace))
+        return [v for k, v in enumerate(values) if k not in found and trace.stop_ns - v.start_ns >= _SHORTEST_NS]
 
     def _behind(self, trace: Trace, values: Sequence[Held], records: Sequence[Output]) -> str:
         """Return that a process logs at each message, but the number of the message before; empty if it does not.
 
         Only virtual time tells a log in the callback of the subscription from one in a timer's.
         """
-        sent = {r.t_ns for r in delivered_numbers(trace, self.topic) if r.t_ns >= values[0].start_ns}
+        sent = {r.t_ns for r in delivered_numbers(trace, self.topic, self.field) if r.t_ns >= values[0].start_ns}
         ticks = {m.t_ns for m in trace.of(Message)}
         if trace.clock is not ClockKind.VIRTUAL or len(values) < _CHANGES or len(sent & ticks) > _IN_STEP * len(sent):
             return ""
@@ -425,7 +436,7 @@ class LogsReceived:
 
     def _no_values(self, trace: Trace, subscriptions: Sequence[Endpoint]) -> Finding:
         types = [e.type for e in subscriptions]
-        if types and not any(carries_number(t) for t in types):
+        if types and not self.field and not any(carries_number(t) for t in types):
             reason = f"{self.topic}: the subscription takes {quote(types[0])}, which carries no number"
             hint = "use a numeric message type, e.g. std_msgs/msg/Float32"
             return not_met(reason, {"type": types[0]}, hint=hint, problem=ProblemKind.NO_NUMBER)
@@ -439,19 +450,18 @@ class LogsReceived:
             for v, stop_ns in zip(values, stops, strict=True)
         ]
 
-    def _unlogged(
-        self,
-        subscriptions: Sequence[Endpoint],
-        values: Sequence[Held],
-        unlogged: Sequence[Held],
-        evidence: dict[str, object],
+    def when_missing(
+        self, trace: Trace, values: Sequence[Held], unlogged: Sequence[Held], evidence: dict[str, object]
     ) -> Finding:
+        """Return the finding if something was never written."""
+        subscriptions = student_endpoints(trace, "subscription", self.topic)
         first = unlogged[0]
         reason = f"{self.process}: {len(unlogged)} of {len(values)} values of {self.topic} are never logged, "
         reason += f"the first is {number(first.value)} at {moment(first.start_ns)}"
-        logged = {v.value for v in values} - {v.value for v in unlogged}
-        if logged and logged <= {0.0, 100.0}:
-            reason += "; only 0 and 100 are, so what is logged is not what was received"
+        sent, logged = {v.value for v in values}, {v.value for v in values} - {v.value for v in unlogged}
+        if logged and logged <= (ends := {min(sent), max(sent)}) and len(sent - ends) >= _BETWEEN:
+            only = f"{' and '.join(map(number, sorted(logged)))} {'is' if len(logged) == 1 else 'are'}"
+            reason += f"; only {only}, so what is logged is not what was received"
         if all(e.durability == "transient_local" for e in subscriptions):
             reason += (
                 "; the subscription asks for transient_local durability, which a volatile publisher does not offer"
@@ -461,19 +471,40 @@ class LogsReceived:
         return not_met(reason, evidence, hint=hint, problem=ProblemKind.NOT_LOGGED, brief=brief)
 
 
-def _missing(values: Sequence[Held], logged: frozenset[int], trace: Trace) -> list[Held]:
-    """Return the values that are not logged, except for one that came too late."""
-    return [v for k, v in enumerate(values) if k not in logged and trace.stop_ns - v.start_ns >= _SHORTEST_NS]
+def _judged(check: LogsValues | LogsReceived, trace: Trace, came: Sequence[Any]) -> Finding:
+    """Return the finding about what a process logged of what came to it.
 
-
-def _hidden(
-    check: LogsValues | LogsReceived, share: str, first: tuple[float, int], among: str, evidence: dict[str, object]
-) -> Finding:
-    """Return no credit for numbers that appear among others; `first` is the first of them and its time."""
-    value, t_ns = first
-    reason = f"{check.process}: {share} of {check.topic} are lost among other numbers, the first is {number(value)} "
+    The questions in their order: is all of it logged, is it at least printed, is it lost because of a fault, does it
+    stand only among so many other numbers that chance explains it, or is it missing?
+    """
+    fault = first_fault(trace, check.process)
+    records, lines = student_records(trace, check.process), printed_lines(trace, check.process)
+    unlogged: list[Any] = list(check.unlogged_in(trace, came, records))
+    if isinstance(check, LogsValues) and (swapped := check.swapped_units(came, records)):
+        hint = "name the unit that each number has"
+        return not_met(swapped, check.evidence_of(came, unlogged), hint=hint, problem=ProblemKind.WRONG_VALUE)
+    if check.is_enough(came, unlogged):
+        return check.when_logged(trace, came, unlogged, records)
+    facts = LogFacts(len(came), len(unlogged))
+    written: list[Output] = sorted([*records, *lines], key=lambda o: o.t_ns)
+    unwritten: list[Any] = list(check.unlogged_in(trace, came, written))
+    if check.is_enough(came, unwritten):
+        return replace(check.when_printed(came, check.evidence_of(came, unlogged)), facts=facts)
+    absent: list[Any] = list(check.unlogged_in(trace, came, records, standing))
+    hidden = check.is_enough(came, absent)
+    lost = unlogged if hidden else absent
+    evidence, facts = check.evidence_of(came, lost), LogFacts(len(came), len(lost))
+    if fault is not None:
+        text = f"{len(lost)} of {len(came)} {check.noun}s of {check.topic} were not logged"
+        return replace(faulted(fault, text, evidence), facts=facts)
+    if not hidden:
+        return replace(check.when_missing(trace, came, absent, evidence), facts=facts)
+    first = unlogged[0]
+    among = check.among(trace, came, first, records)
+    reason = f"{check.process}: {len(lost)} of {counted(len(came), check.noun)} of {check.topic} are lost among other "
+    reason += f"numbers, the first is {number(first.value)} at {moment(first.t_ns)}: {among}"
     hint = f"log the number received on {check.topic}, and no others"
-    return not_met(f"{reason}at {moment(t_ns)}: {among}", evidence, hint=hint, problem=ProblemKind.AMONG_OTHERS)
+    return replace(not_met(reason, evidence, hint=hint, problem=ProblemKind.AMONG_OTHERS), facts=facts)
 
 
 def _nothing(trace: Trace, process: str, problem: str) -> Finding:

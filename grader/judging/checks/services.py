@@ -25,7 +25,7 @@ from grader.core.quantities import (
 from grader.core.trace import Response, Trace
 from grader.judging.charts import expected_series, series
 from grader.judging.findings import explain_fault, explain_no_server, first_fault, met, not_met, waiting_for
-from grader.judging.output import number_in
+from grader.judging.logs.outputs import number_in
 from grader.judging.plots import Drawing
 from grader.judging.series import curve
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of

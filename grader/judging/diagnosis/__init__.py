@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ast
 import logging
-from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
 from grader.core.author_files import AuthorMistake, line_of, words_of
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Check, Criterion, Exercise, Finding, Outcome
+from grader.core.exercise import Criterion, Exercise, Finding, Outcome
 from grader.core.report import Verdict
 from grader.core.submission import Submission
 from grader.core.trace import Fault, Trace, main_not_called, same_node_name
@@ -57,34 +57,77 @@ _LOG = logging.getLogger(__name__)
 CAUSE_KEY = "diagnosis"
 
 
-def diagnose(  # noqa: PLR0913  what was found, and everything that may explain it
+def cases_of(  # noqa: PLR0913  what was found, and everything that may explain it
     verdicts: tuple[Verdict, ...],
     exercise: Exercise,
     traces: Mapping[str, Trace],
     submission: Submission,
     sources: Mapping[str, str],
     facts: Mapping[str, object],
+) -> tuple[Case | None, ...]:
+    """Return what rules are asked about each verdict, in rubric order; None where nothing was lost.
+
+    Args:
+        verdicts: The verdicts.
+        exercise: Their exercise.
+        traces: Scenario id -> trace.
+        submission: Tells which files were found.
+        sources: Wanted file name -> its text.
+        facts: Criterion id -> what its check hands to rules.
+    """
+    asked = {c.scenario for v, c in zip(verdicts, exercise.criteria, strict=True) if v.outcome in _LOST}
+    # only these, because parsing a file takes longer than judging it
+    names = dict.fromkeys(p for s in exercise.scenarios if s.id in asked for p in s.processes if p in sources)
+    read_ = {name: read(submission.files[name].found or name, sources[name]) for name in names}
+    lost: dict[str, Criterion] = {}
+    cases: list[Case | None] = []
+    for verdict, criterion in zip(verdicts, exercise.criteria, strict=True):
+        trace = traces.get(criterion.scenario)
+        if verdict.outcome not in _LOST or trace is None or trace.harness_problem:
+            cases.append(None)
+            continue
+        scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
+        own = {name: read_[name] for name in scenario.processes if name in read_}
+        others = tuple(c for c in exercise.criteria if c is not criterion)
+        fault, known = fault_of(verdict, trace), facts.get(criterion.id)
+        cases.append(Case(criterion, verdict, trace, own, fault, others, known, dict(lost)))
+        if verdict.outcome is Outcome.NOT_MET:
+            lost[criterion.id] = criterion
+    return tuple(cases)
+
+
+def diagnose(
+    verdicts: tuple[Verdict, ...],
+    cases: Sequence[Case | None],
+    rules: Sequence[Rule],
     mistakes: list[AuthorMistake],
 ) -> tuple[Verdict, ...]:
     """Return the verdicts, in rubric order, with a place and one hint wherever a cause is very likely.
 
     Args:
         verdicts: The verdicts.
-        exercise: The exercise; its own rules are asked too.
-        traces: Scenario id -> trace.
-        submission: Tells which files were found.
-        sources: Wanted file name -> its text.
-        facts: Criterion id -> what its check hands to rules.
+        cases: What rules are asked about each; see `cases_of`.
+        rules: The rules in their order; see `rules_of`.
         mistakes: Mistakes in the exercise's own rules are appended here.
     """
-    asked = {c.scenario for v, c in zip(verdicts, exercise.criteria, strict=True) if v.outcome in _LOST}
-    if not asked:
-        return verdicts
-    # only these, because parsing a file takes longer than judging it
-    names = dict.fromkeys(p for s in exercise.scenarios if s.id in asked for p in s.processes if p in sources)
-    read_ = {name: read(submission.files[name].found or name, sources[name]) for name in names}
-    reporter = _Reporter(exercise, rules_of(exercise), facts, mistakes)
-    return tuple(reporter.on(v, c, traces, read_) for v, c in zip(verdicts, exercise.criteria, strict=True))
+    owner: dict[str, str] = {}
+    return tuple(
+        verdict if case is None else _explained(verdict, clue_for(case, rules, mistakes), owner)
+        for verdict, case in zip(verdicts, cases, strict=True)
+    )
+
+
+def _explained(verdict: Verdict, found: tuple[str, Clue] | None, owner: dict[str, str]) -> Verdict:
+    """Return a verdict with its cause, if known; `owner` holds the criterion with which each one was reported."""
+    if found is None:
+        return verdict
+    id_, clue = found
+    if clue.same_as:
+        return _same_as(clue.same_as, verdict)
+    earlier = owner.setdefault(clue.key or f"{id_}:{clue.location}", verdict.id)
+    evidence = {**verdict.evidence, CAUSE_KEY: id_}
+    placed = replace(verdict, hint=clue.hint, location=clue.location or verdict.location, evidence=evidence)
+    return placed if earlier == verdict.id else _same_as(earlier, placed)
 
 
 def rules_of(exercise: Exercise) -> tuple[Rule, ...]:
@@ -96,30 +139,36 @@ def rules_of(exercise: Exercise) -> tuple[Rule, ...]:
 def clue_for(
     case: Case, rules: Sequence[Rule] | None = None, mistakes: list[AuthorMistake] | None = None
 ) -> tuple[str, Clue] | None:
-    """Return id and clue of the first rule that applies to a case; None if no cause is very likely.
+    """Return id and clue of the first rule that applies to a case; None if no cause is very likely."""
+    return next(((rule.id, clue) for rule, clue in clues_for(case, RULES if rules is None else rules, mistakes)), None)
+
+
+def clues_for(
+    case: Case, rules: Sequence[Rule], mistakes: list[AuthorMistake] | None = None
+) -> Iterator[tuple[Rule, Clue]]:
+    """Yield the rules that apply to a case, with their clues, in the order of the rules.
 
     A rule that raises is skipped, because a mistake in it must not prevent a report: a rule of a rubric's own is
     appended to `mistakes`, another one is logged.
     """
-    for rule in RULES if rules is None else rules:
+    for rule in rules:
         try:
             clue = rule.clue(case)
-            if rule.file is not None and clue is not None and (wrong := unfit(clue, case)):
+            if rule.file and clue is not None and (wrong := unfit(clue, case)):
                 raise TypeError(wrong)
         except Exception as error:
-            if rule.file is None:
+            if not rule.file:
                 _LOG.exception("the rule %s failed on the criterion %s", rule.id, case.criterion.id)
             elif mistakes is not None:
-                mistakes.append(_mistake(rule, rule.file[0], error))
+                mistakes.append(_mistake(rule, error))
             continue
         if clue is not None:
-            return rule.id, clue
-    return None
+            yield rule, clue
 
 
-def _mistake(rule: Rule, path: str, error: Exception) -> AuthorMistake:
+def _mistake(rule: Rule, error: Exception) -> AuthorMistake:
     text = f"the rule {rule.id}: {type(error).__name__}: {quote(words_of(error))}"
-    return AuthorMistake(path.rsplit("/", 1)[-1], line_of(error, path, 0), text)
+    return AuthorMistake(rule.file.rsplit("/", 1)[-1], line_of(error, rule.file, 0), text)
 
 
 def hint_for(fault: Fault, trace: Trace, text: str) -> str:
@@ -145,46 +194,6 @@ class _Fault:
 
     def judge(self, trace: Trace) -> Finding:
         raise NotImplementedError("a fault is there already")
-
-
-@dataclass(slots=True)
-class _Reporter:
-    """Remembers the criterion with which each cause was reported, so that none is reported twice."""
-
-    exercise: Exercise
-    rules: Sequence[Rule]
-    facts: Mapping[str, object]
-    mistakes: list[AuthorMistake]
-    owner: dict[str, str] = field(default_factory=dict)
-    lost: dict[str, Check] = field(default_factory=dict)
-
-    def on(
-        self, verdict: Verdict, criterion: Criterion, traces: Mapping[str, Trace], sources: Mapping[str, Source]
-    ) -> Verdict:
-        """Return the verdict with its cause, if known."""
-        trace = traces.get(criterion.scenario)
-        if verdict.outcome not in _LOST or trace is None or trace.harness_problem:
-            return verdict
-        found = clue_for(self._case(verdict, criterion, trace, sources), self.rules, self.mistakes)
-        if verdict.outcome is Outcome.NOT_MET:
-            self.lost[criterion.id] = criterion.check
-        if found is None:
-            return verdict
-        id_, clue = found
-        if clue.same_as:
-            return _same_as(clue.same_as, verdict)
-        key = clue.key or f"{id_}:{clue.location}"
-        earlier = self.owner.setdefault(key, criterion.id)
-        evidence = {**verdict.evidence, CAUSE_KEY: id_}
-        placed = replace(verdict, hint=clue.hint, location=clue.location or verdict.location, evidence=evidence)
-        return placed if earlier == criterion.id else _same_as(earlier, placed)
-
-    def _case(self, verdict: Verdict, criterion: Criterion, trace: Trace, sources: Mapping[str, Source]) -> Case:
-        scenario = next(s for s in self.exercise.scenarios if s.id == criterion.scenario)
-        own = {name: sources[name] for name in scenario.processes if name in sources}
-        siblings = tuple(c.check for c in self.exercise.criteria if c is not criterion)
-        facts, lost = self.facts.get(criterion.id), dict(self.lost)
-        return Case(criterion, verdict, trace, own, fault_of(verdict, trace), siblings, facts, lost)
 
 
 def _same_as(criterion: str, verdict: Verdict) -> Verdict:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import ast
 import re
-from collections import Counter
 
 from grader.core.exercise import Location, Outcome, ProblemKind
 from grader.core.quantities import seconds
 from grader.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.received import LogsReceived, LogsValues
-from grader.judging.diagnosis.rules import Case, Clue, hint_rule
+from grader.judging.diagnosis.rules import Case, Clue, hint_rule, log_call
 from grader.judging.diagnosis.wiring import (
     Made,
     constant,
@@ -28,7 +27,7 @@ from grader.judging.diagnosis.wiring import (
     timer_code,
 )
 from grader.judging.facts import LogFacts, LogPaceFacts, PositionFacts
-from grader.judging.output import printed_lines, student_records
+from grader.judging.logs.outputs import printed_lines, student_records
 from grader.judging.source import Source, argument, chain, last_name, text_of
 from grader.judging.wording import number
 
@@ -216,21 +215,9 @@ def _commented_out(case: Case) -> Clue | None:
     return Clue("the log is commented out: take the # away", Location(case.source.file, row))
 
 
-def position_log(case: Case) -> ast.Call | None:
-    """Return the call that wrote most of the records."""
-    source = case.source
-    lines = Counter(r.line for r in student_records(case.trace, case.process) if r.file == source.file and r.line)
-    for row, _ in lines.most_common():
-        call = next((c for c in source.on_line(row, ast.Call) if is_log(source, c)), None)
-        if call is not None:
-            return call
-    logs = [n for n in source.all(ast.Call) if is_log(source, n)]
-    return logs[0] if len(logs) == 1 else None
-
-
 @hint_rule(LogPeriod, LogsPosition, LogsReceived, priority=11090)
 def _logged_once(case: Case) -> Clue | None:
-    call = position_log(case)
+    call = log_call(case)
     if call is None:
         return None
     once = argument(call, 99, "once")
@@ -256,7 +243,7 @@ def _set_inside(test: ast.If) -> bool:
 @hint_rule(LogPeriod, priority=11100)
 def _log_period(case: Case) -> Clue | None:
     """The timer, the throttle or the callback sets the wrong pace."""
-    pace, call = case.found(LogPaceFacts), position_log(case)
+    pace, call = case.found(LogPaceFacts), log_call(case)
     if call is None or pace is None:
         return None
     source, wanted_s, average = case.source, seconds(case.check.period), pace.average_s
@@ -366,7 +353,7 @@ def _error_while_waiting(case: Case) -> Clue | None:
 @hint_rule(LogsEvery, priority=11130)
 def _log_every(case: Case) -> Clue | None:
     """`count % 100 == 0` where one log for every ten messages is asked for, or no condition at all."""
-    source, every, call = case.source, case.check.every, position_log(case)
+    source, every, call = case.source, case.check.every, log_call(case)
     logs = [n for n in source.all(ast.Call) if is_log(source, n)]
     timed = [n for m in made(source, "timer") for n in runs(source, m)]
     call = next((c for c in logs if c in timed), call)

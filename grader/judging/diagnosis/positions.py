@@ -6,8 +6,7 @@ import ast
 
 from grader.core.exercise import Outcome
 from grader.judging.checks.odometry import LogsPosition
-from grader.judging.diagnosis.logs import position_log
-from grader.judging.diagnosis.rules import Case, Clue, Maker, hint_rule
+from grader.judging.diagnosis.rules import Case, Clue, Maker, hint_rule, log_call
 from grader.judging.diagnosis.wiring import (
     is_flag,
     made,
@@ -84,7 +83,7 @@ def _swapped_axes(case: Case) -> Clue | None:
     crossed = [k for k in source.all(ast.keyword) if {k.arg, _axis(chain(k.value))} == {"x", "y"}]
     if crossed:
         return Clue(f"{source.code(crossed[0])} mixes up x and y", source.place(crossed[0]))
-    call = position_log(case)
+    call = log_call(case)
     if call is None or _order_in(call)[:2] != ["y", "x"]:
         return None
     return Clue(f"y stands before x in {source.code(call, 60)}", source.place(call))
@@ -119,7 +118,7 @@ def _order_in(call: ast.Call) -> list[str]:
 @_position_rule("wrong", "sign", "no_sign", "abs", priority=12030)
 def _no_sign(case: Case) -> Clue | None:
     """`abs()` removes the sign."""
-    source, call = case.source, position_log(case)
+    source, call = case.source, log_call(case)
     if call is None:
         return None
     function = source.function_of(call)
@@ -139,7 +138,7 @@ def _wrong_axis(case: Case) -> Clue | None:
         reads = [n for n in source.all(ast.Attribute) if n.attr == "z" and isinstance(n.ctx, ast.Load)]
         hint = f"{source.code(reads[0], 50)} is the height: {missing} of the position is asked for" if reads else ""
         return Clue(hint, source.place(reads[0])) if len(reads) == 1 else None
-    call = position_log(case)
+    call = log_call(case)
     if call is None:
         return None
     return Clue(f"{source.code(call, 60)} does not show {missing}: log {_POSITION}.{missing} too", source.place(call))
@@ -172,7 +171,7 @@ def _rounded_away(case: Case) -> Clue | None:
 @_position_rule("constant", "nothing", "no_pair", priority=12070)
 def _thrown_away(case: Case) -> Clue | None:
     """The function that logs puts a new message in the place of the stored one."""
-    source, call = case.source, position_log(case)
+    source, call = case.source, log_call(case)
     function = source.function_of(call) if call is not None else None
     callbacks = [f for m in made(source, "subscription") for f in roots(source, m.callback)]
     for statement in source.all(ast.Assign):
@@ -203,7 +202,7 @@ def _never_stored(case: Case) -> Clue | None:
 @_position_rule("wrong", priority=12090)
 def _scaled_position(case: Case) -> Clue | None:
     """The position is multiplied, as for another unit."""
-    source, call = case.source, position_log(case)
+    source, call = case.source, log_call(case)
     if call is None:
         return None
     for node in subtree(call):
@@ -257,7 +256,7 @@ def _oldest_taken(source: Source) -> Clue | None:
 @_position_rule("wrong", "no_pair", "constant", "few", "stale", "sign", priority=12110)
 def _log_line(case: Case) -> Clue | None:
     """Only the line that logs is known."""
-    call = position_log(case)
+    call = log_call(case)
     return Clue(case.verdict.hint, case.source.place(call)) if call is not None and case.verdict.hint else None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, replace
 from functools import partial
@@ -13,7 +14,8 @@ from grader.core.dataclass import dataclass
 from grader.core.exercise import Check, Criterion, Location, Outcome, ProblemKind, named, roles_of
 from grader.core.report import Verdict
 from grader.core.trace import Fault, FaultKind, Trace
-from grader.judging.diagnosis.wiring import made_for
+from grader.judging.diagnosis.wiring import is_log, made_for
+from grader.judging.logs.outputs import student_records
 from grader.judging.source import Source, first_line
 from grader.judging.values import published, student_endpoints
 
@@ -49,9 +51,9 @@ class Case:
     Attributes:
         sources: Wanted file name -> source, for the submitted files of the scenario.
         fault: The fault that the verdict rests on; None for none.
-        siblings: The checks of the exercise's other criteria.
+        others: The exercise's other criteria.
         facts: What the check hands to rules, see `Finding.facts`.
-        lost: The earlier criteria that were not met, by id, with their checks.
+        lost: The earlier criteria that were not met, by id.
     """
 
     criterion: Criterion
@@ -59,9 +61,9 @@ class Case:
     trace: Trace
     sources: Mapping[str, Source]
     fault: Fault | None = None
-    siblings: tuple[Check, ...] = ()
+    others: tuple[Criterion, ...] = ()
     facts: Any = None
-    lost: Mapping[str, Check] = field(default_factory=dict)
+    lost: Mapping[str, Criterion] = field(default_factory=dict)
 
     @property
     def check(self) -> Any:
@@ -80,6 +82,15 @@ class Case:
     def source(self) -> Source:
         """The source of the one file that the criterion is about; an empty one if there is none."""
         return self.sources.get(self.process, NO_SOURCE)
+
+    @property
+    def siblings(self) -> tuple[Check, ...]:
+        """The checks of the exercise's other criteria."""
+        return tuple(criterion.check for criterion in self.others)
+
+    def asked(self, name: str) -> list[Any]:
+        """Return the checks of other criteria that have this name in rubrics."""
+        return [criterion.check for criterion in self.others if criterion.check_name == name]
 
     def is_about(self, kind: ProblemKind) -> bool:
         """Return whether the check found a kind of problem."""
@@ -153,7 +164,8 @@ class Rule:
         text: Pattern that the text of an exception must have; empty for any.
         priority: Its place among all rules: the one with the lowest number is asked first, and the first clue wins.
         about: The mistake in a sentence, for `grade explain --rules`; may be empty.
-        file: The author's file with the rule, and the text of it; None for a rule of the grader.
+        file: Path of the author's file with the rule; empty for a rule of the grader.
+        function: What the decorator was above; None for a rule that was made without one.
     """
 
     id: str
@@ -165,8 +177,8 @@ class Rule:
     text: str = ""
     priority: int = FIRST
     about: str = ""
-    file: tuple[str, bytes] | None = None
-    function: Callable[..., object] | None = None  # what the decorator was above
+    file: str = ""
+    function: Callable[..., object] | None = None
 
     def explains(self, criterion: Criterion) -> bool:
         """Return whether it is about the check of a criterion."""
@@ -267,6 +279,18 @@ def unfit(clue: object, case: Case) -> str:
     if clue.same_as and clue.same_as not in case.lost:
         return f"expected the id of an earlier criterion that was not met, found `{clue.same_as}`"
     return "" if clue.hint or clue.same_as else "expected a clue with a hint, found an empty one"
+
+
+def log_call(case: Case) -> ast.Call | None:
+    """Return the call that wrote most of the log records; the only one in the file if none wrote any; else None."""
+    source = case.source
+    lines = Counter(r.line for r in student_records(case.trace, case.process) if r.file == source.file and r.line)
+    for row, _ in lines.most_common():
+        call = next((c for c in source.on_line(row, ast.Call) if is_log(source, c)), None)
+        if call is not None:
+            return call
+    logs = [n for n in source.all(ast.Call) if is_log(source, n)]
+    return logs[0] if len(logs) == 1 else None
 
 
 def lines_of(node: ast.AST, *others: ast.AST) -> str:

@@ -41,7 +41,7 @@ from grader.judging.diagnosis.wiring import (
     waits_for_ever,
 )
 from grader.judging.facts import PositionFacts, RateFacts
-from grader.judging.output import student_records
+from grader.judging.logs.outputs import student_records
 from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, subtree, text_of
 from grader.judging.values import carries_number, student_endpoints
 from grader.judging.wording import quote

@@ -25,7 +25,7 @@ from grader.judging.diagnosis.wiring import (
 )
 from grader.judging.facts import DrawFacts, SeriesFacts
 from grader.judging.source import Source, chain, first_line, last_name, words
-from grader.judging.values import as_number, leaves, published, published_numbers, value_at
+from grader.judging.values import as_number, leaves, number_path, published, published_numbers, value_at
 from grader.judging.wording import moment, number
 
 _DRAWS = words(
@@ -621,8 +621,11 @@ def _not_drawn(case: Case) -> Clue | None:
     if facts is None or not facts.pattern or draws(source):
         return None
     values = published_numbers(case.trace, check.topic)
-    places = [g for leaf in ("data", "temperature") for g in given_leaf(source, leaf)]
-    if len(places) != 1 or not values:
+    if not values:
+        return None
+    path = check.field or number_path(published(case.trace, check.topic)[0].value)
+    places = given_leaf(source, path.rpartition(".")[2])
+    if len(places) != 1:
         return None
     code = source.code(places[0])
     hint = f"{code} draws nothing: random.uniform({float(check.low)}, {float(check.high)}) gives a new value each time"

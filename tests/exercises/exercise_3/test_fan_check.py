@@ -14,8 +14,8 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
 from grader.rubrics.exercise_checks import known_checks
 
-ON = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above")
-OFF = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "at_or_below")
+ON = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above", unit="°C")
+OFF = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "at_or_below", unit="°C")
 
 
 def both(rec: Recording) -> tuple[Finding, Finding]:

@@ -1,0 +1,161 @@
+"""The optional members of a check of one's own: each is used, and without it the documented value applies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+
+from grader.api import NODE_GRAPH, Check, Drawing, Finding, Plot, Roles, Trace, TraceBuilder, met, not_met
+from grader.core.exercise import has, named, of_beginning, reads_sources, roles_of
+from grader.core.submission import StudentFile, Submission
+from grader.judging.checks import CHECKS
+from grader.judging.judge_run import judge_exercise
+from grader.judging.plots import chart_of, shows_graph
+from grader.rubrics.loader import read_rubric
+
+FLOAT = "std_msgs/msg/Float32"
+FLOW = TraceBuilder("pump.py", stop_s=2.0).messages("/flow", FLOAT, {"data": 1.5}, rate_hz=10).trace()
+
+
+@dataclass(frozen=True)
+class Plain:
+    """Anything."""
+
+    topic: str = "/flow"
+
+    def judge(self, trace: Trace) -> Finding:
+        return met("well")
+
+
+@dataclass(frozen=True)
+class Derived(Check):
+    """A check that names the protocol as its base."""
+
+    expected: str = "a parameter of this name"
+
+    def judge(self, trace: Trace) -> Finding:
+        return met("well")
+
+
+@dataclass(frozen=True)
+class Drawn(Plain):
+    """A check with a drawing."""
+
+    def drawing(self, trace: Trace) -> Any:
+        return Drawing((Plot(self.topic),), title="The flow")
+
+
+@dataclass(frozen=True)
+class Graph(Plain):
+    """A check about the graph."""
+
+    drawing: ClassVar[str] = NODE_GRAPH
+
+
+def test_without_a_member_the_documented_value_applies() -> None:
+    """For a class that stands alone as for one that derives from the protocol."""
+    for check in (Plain(), Derived()):
+        assert not reads_sources(check)
+        assert of_beginning(check) is check
+        assert not has(check, "drawing")
+        assert roles_of(type(check)) == Roles()
+    assert has(Derived(), "expected")
+    assert not has(Plain(), "expected")
+
+
+def test_a_drawing_is_used_in_place_of_the_general_chart() -> None:
+    """Or the graph of nodes and topics."""
+    general, own = chart_of(Plain(), FLOW), chart_of(Drawn(), FLOW)
+    assert general is not None
+    assert own is not None
+    assert (general.title, own.title) == ("Messages published on /flow", "The flow")
+    assert chart_of(Graph(), FLOW) is None
+    assert [shows_graph(check) for check in (Plain(), Drawn(), Graph())] == [False, False, True]
+
+
+def test_a_drawing_of_another_kind_is_a_mistake() -> None:
+    """Grading reports it as one of the author's."""
+
+    @dataclass(frozen=True)
+    class Wrong(Plain):
+        def drawing(self, trace: Trace) -> Any:
+            return [1]
+
+    with pytest.raises(TypeError, match="drawing returned a list, expected a Drawing, a Chart or None"):
+        chart_of(Wrong(), FLOW)
+
+
+ROLES = '''\
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+from grader.api import Finding, Roles, Trace, met, not_met
+
+
+@dataclass(frozen=True)
+class Flows:
+    """Something comes out."""
+
+    ROLES
+    outlet: str
+
+    def judge(self, trace: Trace) -> Finding:
+        return met("it flows") if trace.messages(self.outlet) else not_met("nothing comes out")
+
+
+CHECKS = {"flows": Flows}
+'''
+RUBRIC = """\
+schema: grader/rubric/v1
+exercise: {id: pump, number: "7", title: A pump}
+files: [pump.py]
+checks: [pump_checks.py]
+scenarios: [{id: alone, processes: [pump.py], observe: {duration: 2 s}}]
+criteria: [{id: flows, title: Flows, points: 1, scenario: alone, check: {flows: {outlet: /flow}}}]
+"""
+SOURCE = """\
+class Pump(Node):
+    def __init__(self):
+        self.out = self.create_publisher(Float32, "/flux", 10)
+        self.create_timer(0.1, self.tick)
+
+    def tick(self):
+        self.out.publish(Float32())
+"""
+
+
+@pytest.mark.parametrize("declared", [True, False])
+def test_roles_open_the_general_hint_rules(tmp_path: Path, *, declared: bool) -> None:
+    """They explain why a topic is silent, whatever its parameter is called."""
+    roles = 'roles: ClassVar[Roles] = Roles(topics=("outlet",), speaks=("outlet",))' if declared else "pass"
+    (tmp_path / "pump_checks.py").write_text(ROLES.replace("ROLES", roles), encoding="utf-8")
+    (tmp_path / "pump.yaml").write_text(RUBRIC, encoding="utf-8")
+    trace = TraceBuilder("pump.py", stop_s=2.0).messages("/flux", FLOAT, {"data": 1.5}, rate_hz=10).trace()
+    submission = Submission("s", "s", Path("s"), "sha256:1", {"pump.py": StudentFile("pump.py", "pump.py")})
+    report = judge_exercise(read_rubric(tmp_path / "pump.yaml"), {"alone": trace}, submission, {"pump.py": SOURCE})
+    hint = report.verdicts[0].hint
+    assert ("publishes on /flux: the topic asked for is /flow" in hint) == declared
+
+
+def test_a_declared_topic_has_to_be_written_as_one(tmp_path: Path) -> None:
+    """Its form is checked, as that of a parameter with one of the usual names."""
+    roles = 'roles: ClassVar[Roles] = Roles(speaks=("outlet",))'
+    (tmp_path / "pump_checks.py").write_text(ROLES.replace("ROLES", roles), encoding="utf-8")
+    (tmp_path / "pump.yaml").write_text(RUBRIC.replace("outlet: /flow", "outlet: flow"), encoding="utf-8")
+    with pytest.raises(Exception, match="expected an absolute topic name"):
+        read_rubric(tmp_path / "pump.yaml")
+
+
+def test_every_role_names_a_parameter() -> None:
+    """Of the check that declares it: a name that is mistyped would be ignored."""
+    for kind in CHECKS.values():
+        declared: Roles | None = vars(kind).get("roles")
+        if declared is not None:
+            held = {field.name for field in fields(kind)}
+            assert set(declared.hears) | set(declared.speaks) <= held
+            assert {*declared.hears, *declared.speaks}
+    assert named(Plain(), "topic", "nothing") == ("/flow",)
+    assert not_met("no").facts is None
