@@ -5,6 +5,7 @@ from __future__ import annotations
 from grader.app.grade import Progress
 from grader.app.request import GradeRequest
 from grader.app.start import grade
+from grader.core.exercise import Outcome
 from grader.core.report import Report
 
 #: Even if every second attempt is undecided, so many are it less than once in a million runs: 2 ** -20.
@@ -19,6 +20,12 @@ def grade_until_decided(request: GradeRequest, hear: Progress = say_nothing) -> 
     """Grade a submission, again where the machine was too busy for the wall clock."""
     for _ in range(ATTEMPTS):
         report = grade(request, hear, pictures=False)
-        if report.final:
+        if not was_too_busy(report):
             break
     return report
+
+
+def was_too_busy(report: Report) -> bool:
+    """Return whether a criterion is undecided because of the machine."""
+    verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
+    return any(v.outcome is Outcome.UNDECIDED and "the machine was too busy" in v.reason for v in verdicts)

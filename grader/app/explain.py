@@ -124,7 +124,7 @@ def _parameter(field: Field[object], kind: type, manual: Manual, check: object |
 def _written(value: Any, annotation: object) -> str:
     """Format a value the way a rubric writes it."""
     unit = _unit(annotation)
-    if value is None:
+    if value is None or value == "":
         return "none"
     if unit is not None:
         return format_quantity(value, unit)

@@ -331,10 +331,9 @@ class Ledger:
         """Return whether any message was taken ahead of time and is still kept."""
         return len(self._kept) > 0 and any(self._kept.values())
 
-    def may_be_pushed_out(self) -> bool:
-        """Return whether this process has sent messages, not announced yet, after others that are still kept."""
-        kept = (subscription.topic_name for subscription, messages in self._kept.items() if messages)
-        return bool(self.sent) and any(self.sent[f"topic {topic}"] for topic in kept)
+    def may_be_pushed_out(self, subscription: Any) -> bool:
+        """Return whether this process has sent messages, not announced yet, after others that are kept."""
+        return bool(self.kept(subscription)) and self.sent[f"topic {subscription.topic_name}"] > 0
 
     def expects_anything(self) -> bool:
         """Return whether any message is expected."""

@@ -108,7 +108,7 @@ class VirtualTime:
         self.clock.real_ns = ros.system_ns
         ros.install_order()
         ros.install_clocks(self._clocks, self.scheduler, self.clock)
-        ros.install_wait_sets(self.scheduler, self.clock, self._ledger, self._settle)
+        ros.install_wait_sets(self.scheduler, self.clock, self._ledger)
         ros.install_traffic(
             self._ledger,
             self.clock,

@@ -20,6 +20,7 @@ import pytest
 import grader
 from grader.core.errors import EnvironmentFault
 from grader.core.limits import Limits
+from grader.execution import domains
 from grader.execution.codec import to_json
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.bubblewrap import Bubblewrap
@@ -30,8 +31,10 @@ from grader.execution.sandbox.tiers import FlatBubblewrap, Landlock, isolation_f
 
 HOST = Path(grader.__file__).resolve().parent / "student_host"
 USER = 1000
-#: One for each process of tests that run side by side: not every tier has a network of its own.
-DOMAIN = str(71 + int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]) % 30)
+#: Not every tier has a network of its own: neither tests that run side by side nor graders may use the same domain. It
+#: is reserved until this process ends.
+_RESERVED = domains._reserve()
+DOMAIN = str(_RESERVED[0])
 
 # The worker of these tests: starts the student's command that the test prepared, and ends as it ends.
 RELAY = """

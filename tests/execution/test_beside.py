@@ -89,7 +89,7 @@ def test_a_program_reads_and_writes_beside_itself(
     write(root, "settings.txt", "deep/table.csv")
     for path in (root, *root.rglob("*")):
         path.chmod(0o755 if path.is_dir() else 0o644)
-    trace = record(studio, root, PROGRAM, duration_ns=2 * NS_PER_S, **how)
+    trace = record(studio, root, PROGRAM, duration_ns=60 * NS_PER_S, **how)  # it ends by itself
     lines = [o.text for o in trace.observations if isinstance(o, OutputLine)]
     assert lines[:2] == ["read text", "30 text ['a.py', 'deep', 'settings.txt']"]
     assert (root / "settings.txt").read_text() == "text"

@@ -100,7 +100,8 @@ def test_each_record_names_its_own_place(studio: RecordingSession, tmp_path: Pat
         loggers._internal_callers.append(b.__file__)
         b.say(logger, "left out")
     """
-    trace = record(studio, tmp_path / "s", textwrap.dedent(program), says, says, clock=clock, duration_ns=SECOND_NS)
+    programs = (textwrap.dedent(program), says, says)  # they end by themselves
+    trace = record(studio, tmp_path / "s", *programs, clock=clock, duration_ns=60 * SECOND_NS)
     found = [(r.severity, r.text, r.file, r.line) for r in trace.records() if r.process == "a.py"]
     each = [
         [

@@ -232,7 +232,7 @@ def test_how_a_program_ends_after_ctrl_c_is_told(run: Callable[..., Trace], file
 def test_the_wall_clock_sees_the_same(run: Callable[..., Trace]) -> None:
     """Only later by what the machine needs."""
     server = ServiceServer(BATTERY, TRIGGER, ANSWERS, 600 * NS_PER_MS, answers=1)
-    trace = run(("client_callbacks.py",), server, seconds=3, clock="wall", shutdown_ns=2 * NS_PER_S)
+    trace = run(("client_callbacks.py",), server, seconds=6, clock="wall", shutdown_ns=2 * NS_PER_S)
     assert trace.clock is ClockKind.WALL
     lines = [line.partition(" ")[2] for line in short(trace)]
     assert lines[:4] == [

@@ -74,7 +74,7 @@ def kept(trace: Trace) -> dict[tuple[str, str], bytes]:
 @pytest.mark.parametrize("clock", ["virtual", "wall"])
 def test_a_program_writes_beside_itself_and_it_is_kept(run: Run, clock: str) -> None:
     """With a relative name, and by the folder of its file; files that it holds open are written to their end."""
-    trace = run(hostile(before=WRITES), clock=clock)
+    trace = run(hostile(before=WRITES), clock=clock, first_message_on="/cmd_vel")
     assert printed(trace)[:2] == [
         "before ['a.py', 'table.txt']",
         "after ['a.py', 'data', 'log.txt', 'table.txt', 'velocity.csv'] True",

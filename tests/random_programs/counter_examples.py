@@ -11,6 +11,7 @@ from program_description import (
     Fixed,
     Group,
     Heard,
+    Nap,
     Node,
     Process,
     Program,
@@ -70,6 +71,15 @@ COUNTER_EXAMPLES: dict[str, Program] = {
             1,
             (Timer("t00", 100, tuple(Publish("a", Fixed(number)) for number in range(3))),),
             (Subscription("s00", "a", 2, SAYS),),
+        )
+    ),
+    # The same where the later message is sent in the callback before, after a single look for work.
+    "queue_of_one_behind_a_slow_timer": alone(
+        Node(
+            "n0",
+            1,
+            (Timer("t00", 100, (Nap(120), Publish("a", Runs()))),),
+            (Subscription("s00", "a", 1, SAYS),),
         )
     ),
     # The model did not know that a response wakes every client of the service.

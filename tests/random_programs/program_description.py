@@ -142,7 +142,7 @@ class SleepRate:
 
 
 class Ending(Enum):
-    """How a program ends itself."""
+    """How a program ends itself; after a shutdown, the callback returns."""
 
     RAISE = "raise"
     EXIT = "exit"

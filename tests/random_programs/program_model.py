@@ -10,6 +10,7 @@ from __future__ import annotations
 import heapq
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
@@ -166,6 +167,8 @@ class ProcessModel:
 
     def end(self, ended: Ended) -> None:
         """Note the end; no thread goes on."""
+        if self.ended:
+            return
         self.ended, self.ok = True, False
         self.world.expected.ends[self.number] = self.world.now, ended
         world = self.world
@@ -294,10 +297,12 @@ class ProcessModel:
         yield from self.pause(self.end_of(LAST_NAP_MS * NS_PER_MS))
 
     def say(self, text: str) -> None:
-        self.world.expected.logs.setdefault(self.number, []).append((self.world.now, text))
+        if not self.ended:
+            self.world.expected.logs.setdefault(self.number, []).append((self.world.now, text))
 
     def write(self, text: str) -> None:
-        self.world.expected.lines.setdefault(self.number, []).append((self.world.now, text))
+        if not self.ended:
+            self.world.expected.lines.setdefault(self.number, []).append((self.world.now, text))
 
 
 class TimerModel:
@@ -344,7 +349,8 @@ class FutureModel:
     def __init__(self, executor: Executor | None = None) -> None:
         self.executor = executor
         self.done, self.value = False, 0
-        self.callbacks: list[Callable[[], Steps]] = []
+        #: The first one is of the client itself, which forgets the request.
+        self.callbacks: list[Callable[[], Steps]] = [nothing]
 
     def set(self, executor: Executor, value: int) -> None:
         self.done, self.value = True, value
@@ -531,7 +537,8 @@ class NodeModel:
     def call(self, name: str, body: tuple[Statement, ...], heard: int = 0, scope: Scope | None = None) -> Steps:
         """Run a callback."""
         self.runs[name] = self.runs.get(name, 0) + 1
-        yield from self.run(body, scope or Scope(name, name, heard))
+        with suppress(ReturnedError):
+            yield from self.run(body, scope or Scope(name, name, heard))
 
     def run(self, body: tuple[Statement, ...], scope: Scope) -> Steps:
         for one in body:
@@ -629,8 +636,12 @@ class NodeModel:
     def leave(self, how: Ending) -> None:
         if how is Ending.SHUTDOWN:
             self.process.ok = False
-            return
+            raise ReturnedError
         raise Leave(ENDINGS[how], how)
+
+
+class ReturnedError(Exception):
+    """A callback returns before its end."""
 
 
 class TimeUpError(Exception):

@@ -54,7 +54,9 @@ PERIODS = (50, 100, 100, 125, 200, 250, 300, 470)
 NAPS = (7, 30, 50, 100, 120, 260)
 DURATION_MS = 2000
 SLOTS = 2
-NUMBERS, FEW, MANY, SOME = st.integers(-3, 9), st.integers(2, 9), st.integers(0, 4), st.integers(0, 2)
+NUMBERS, FEW = st.integers(-3, 9), st.integers(2, 9)
+#: How many statements a callback has, and one that is nested; and how many timers a node has.
+MANY, SOME, TIMERS = (st.sampled_from(counts) for counts in ((0, 1, 2, 2, 3, 3, 4), (0, 1, 1, 2), (0, 1, 1, 2, 2, 3)))
 
 
 #: Ends that work in a callback whose spin waits for something else as well, in the threads of a pool, and in the main
@@ -107,8 +109,8 @@ class Room:
         kinds += [Cancel, Reset, Pace] if self.timers else []
         kinds += [*([] if self.shared else [SetParameter]), *([SleepRate] * 2 if rate else [])]
         if deep:
-            kinds += [*([Ask] if asked else []), *([Await] if asked and self.awaits else [])]
-            kinds += [*([CallAndWait] if asked and self.waits else []), Every, *([End] if self.ends else [])]
+            kinds += [*([Ask] * 2 if asked else []), *([Await] * 2 if asked and self.awaits else [])]
+            kinds += [*([CallAndWait] * 4 if asked and self.waits else []), Every, *([End] if self.ends else [])]
 
         def nested() -> tuple[Statement, ...]:
             return self.statements(draw, channels, heard=heard, deep=False)
@@ -166,9 +168,9 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
     """Draw a node, and what the main thread does beside a thread that spins; no service has two servers."""
     several = spinning is Spinning.MULTI
     groups = tuple(draw(st.lists(st.sampled_from(Group), min_size=int(several), max_size=2)))
-    timers = [(f"t{number}{n}", draw(st.integers(0, len(groups)))) for n in range(draw(st.integers(0, 3)))]
+    timers = [(f"t{number}{n}", draw(st.integers(0, len(groups)))) for n in range(draw(TIMERS))]
     topics = draw(st.lists(st.sampled_from(TOPICS), max_size=2))
-    services = [s for s in draw(st.lists(st.sampled_from(SERVICES), max_size=1)) if s not in taken.served]
+    services = [s for s in SERVICES if s not in taken.served and draw(st.booleans())]
     taken.served |= set(services)
     wanted = draw(
         st.lists(st.sampled_from(SERVICES), min_size=int(spinning is Spinning.UNTIL), max_size=2, unique=True)
@@ -208,8 +210,11 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
         beside = Room(own[0], (1,), (), own[1], MAIN_ENDS, shared=True, awaits=False, waits=True)
     room = rooms if several else rooms * (len(groups) + 1)
 
-    def callback(group: int, channels: str, *, heard: bool = True) -> tuple[Statement, ...]:
-        return room[group].statements(draw, channels, heard=heard)
+    def callback(group: int, channels: str, *, heard: bool = True, answers: bool = False) -> tuple[Statement, ...]:
+        its = room[group]
+        if answers:  # after a shutdown, no response can be sent
+            its = replace(its, ends=tuple(how for how in its.ends if how is not Ending.SHUTDOWN))
+        return its.statements(draw, channels, heard=heard)
 
     of = [draw(st.integers(0, len(groups))) for _ in (*topics, *services)]
     node = Node(
@@ -220,7 +225,7 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
                 name,
                 draw(st.sampled_from(PERIODS)),
                 callback(group, TOPICS + SERVICES, heard=False),
-                starts=draw(st.sampled_from((True, True, True, False))),
+                starts=draw(st.sampled_from((True, True, True, True, True, False))),
                 group=group,
             )
             for name, group in timers
@@ -235,7 +240,7 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
             Server(
                 f"v{number}{n}",
                 service,
-                callback(group, after(service)),
+                callback(group, after(service), answers=True),
                 room[group].value(draw, heard=True),
                 group,
             )

@@ -56,7 +56,7 @@ ENDINGS = {
     Ending.RAISE: 'raise RuntimeError("no more")',
     Ending.EXIT: "sys.exit(3)",
     Ending.EXIT_WELL: "sys.exit()",
-    Ending.SHUTDOWN: "rclpy.shutdown()",
+    Ending.SHUTDOWN: "rclpy.shutdown(); return",
     Ending.LEAVE_AT_ONCE: "os._exit(4)",
 }
 

@@ -148,6 +148,6 @@ def test_a_failure_in_virtual_time_is_recorded_on_the_wall_clock(studio: Recordi
     """Little of the grader's code runs there."""
     tmp_path.chmod(0o755)
     source = BREAKING.format(module="ledger", name="BACKGROUND_PARAMETERS", value="None")
-    trace = record(studio, tmp_path / "s", source, duration_ns=S, clock="wall")
+    trace = record(studio, tmp_path / "s", source, duration_ns=S, clock="wall", first_message_on="/cmd_vel")
     assert trace.harness_problem == ""
     assert trace.messages("/cmd_vel")
