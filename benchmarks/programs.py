@@ -182,7 +182,7 @@ def run(arguments: argparse.Namespace) -> int:
         told = [one for part in results.values() for one in part["differ_on_wall"]]
         print(*told, sep="\n\n")
         print(f"on the wall clock: {sum(part['wall'] for part in results.values())} programs, {len(told)} differ")
-    if new:
+    if new and arguments.isolation == "none":  # a sandbox keeps what its processes have used to itself
         print(f"{(used_s() - before_s) / new:.2f} s of processor time for each program")
     return int(bool(differ))
 

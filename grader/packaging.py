@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import importlib
 import importlib.metadata
 import io
 import json
 import re
 import sys
+import tomllib
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -99,9 +99,6 @@ def zipped(files: Mapping[str, bytes], programs: tuple[str, ...] = (), private: 
 
 def _refuse_stale(installed: importlib.metadata.Distribution) -> None:
     """Refuse a checkout whose requirements have grown since it was installed."""
-    if sys.version_info < (3, 11):
-        return
-    tomllib = importlib.import_module("tomllib")  # not in Python 3.10
     project = Path(grader.__file__).resolve().parent.parent / "pyproject.toml"
     if not project.is_file():
         return

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -212,7 +212,7 @@ def _run(course: ClassRequest, conditions: Conditions, began_s: float, graded: G
     return RunOfClass(
         conditions=conditions,
         title=title_of(course.sources),
-        written=datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
+        written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         jobs=course.jobs or len(os.sched_getaffinity(0)),
         took_s=time.monotonic() - began_s,
         graded=0 if graded is None else graded.graded,

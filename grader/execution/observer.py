@@ -112,7 +112,7 @@ class Observer:
         for node in self._nodes:
             try:
                 return create(node)
-            except rclpy_implementation.RCLError:  # noqa: PERF203 - the first one nearly always does
+            except rclpy_implementation.RCLError:
                 if len(self._nodes) >= PARTICIPANTS:
                     raise
         other = _make_node(self._domain)

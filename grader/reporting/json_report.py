@@ -7,9 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import asdict
 from fractions import Fraction
-from typing import Any, TypedDict
-
-from typing_extensions import NotRequired
+from typing import Any, NotRequired, TypedDict
 
 from grader.core.checkup import described
 from grader.core.exercise import Problem

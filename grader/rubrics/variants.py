@@ -9,10 +9,9 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
-from typing import Annotated
+from typing import Annotated, Self
 
 from pydantic import ConfigDict, PlainValidator, WithJsonSchema, model_validator
-from typing_extensions import Self
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Value, Variant

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 
 from grader.core.dataclass import dataclass
@@ -74,7 +74,7 @@ def handed_in(environment: Mapping[str, str]) -> HandedIn:
 def _committed_at(environment: Mapping[str, str]) -> str:
     text = environment.get(COMMIT_DATETIME) or _from_event(environment.get(_EVENT, ""))
     try:
-        when = datetime.fromisoformat(text.replace("Z", "+00:00"))
+        when = datetime.fromisoformat(text)
     except ValueError:
         when = datetime.min  # noqa: DTZ901  it has no offset, like a time that cannot be used
     if when.tzinfo is None:
@@ -82,7 +82,7 @@ def _committed_at(environment: Mapping[str, str]) -> str:
             f"classroom50: {COMMIT_DATETIME}: expected the commit's time with its offset, found none",
             f'export {COMMIT_DATETIME}="$(git show -s --format=%cI)"',
         )
-    return when.astimezone(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+    return when.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _from_event(path: str) -> str:

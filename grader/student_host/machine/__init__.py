@@ -231,10 +231,6 @@ def _install_folders() -> None:
         return _Sorted(scandir(path))
 
     os.listdir, os.scandir = sorted_listdir, sorted_scandir
-    pathlib = sys.modules.get("pathlib")
-    accessor = getattr(pathlib, "_NormalAccessor", None)  # Python 3.10 keeps its own references
-    if accessor is not None:
-        accessor.listdir, accessor.scandir = staticmethod(sorted_listdir), staticmethod(sorted_scandir)
 
 
 class Display:
