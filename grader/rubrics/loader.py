@@ -353,6 +353,7 @@ def _exercise(
     if mistakes:
         _refuse(path, mistakes)
     limits = build(rubric.limits)
+    rules = brought.hints + hints_of({criterion.check_name for criterion in criteria} - brought.own)
     return Exercise(
         id=rubric.exercise.id,
         number=rubric.exercise.number,
@@ -365,7 +366,7 @@ def _exercise(
         by_request=rubric.exercise.by_request,
         bonus=rubric.exercise.bonus or Fraction(0),
         interfaces=tuple(str(path.parent / folder) for folder in rubric.interfaces),
-        hints=brought.hints + hints_of({criterion.check_name for criterion in criteria} - brought.own),
+        hints=rules if rules.files else (),
     )
 
 
