@@ -31,9 +31,9 @@ from grader.cli.main import app
 from grader.core.chart import Chart, Panel
 from grader.core.exercise import Criterion, Exercise
 from grader.core.report import CheckExplanation, CriterionExplanation, Parameter, Report
-from grader.judging.checks import CHECKS
 from grader.judging.run_check import check_name
 from grader.reporting.html.render import render_html
+from grader.rubrics.exercise_checks import known_checks
 from grader.rubrics.loader import read_rubric
 from grader.rubrics.schema import rubric_schema
 
@@ -432,7 +432,7 @@ def _example(folder: Path) -> str:
 
 def _example_row(criterion: Criterion) -> str:
     name = check_name(criterion)
-    check = f"[`{name}`](reference/checks.md#{name})" if name in CHECKS else f"`{name}`, its own"
+    check = f"[`{name}`](reference/checks.md#{name})" if name in known_checks() else f"`{name}`, its own"
     return f"| {_cell(criterion.title)} `{criterion.id}` | {float(criterion.points):g} | {check} |"
 
 

@@ -89,6 +89,7 @@ if TYPE_CHECKING:
     from grader.judging.diagnosis.rules import log_call as log_call
     from grader.judging.diagnosis.rules import silent_topic as silent_topic
     from grader.judging.diagnosis.rules import unheard_topic as unheard_topic
+    from grader.judging.diagnosis.values import draws as draws
     from grader.judging.diagnosis.wiring import Constant as Constant
     from grader.judging.diagnosis.wiring import Made as Made
     from grader.judging.diagnosis.wiring import conditions as conditions
@@ -104,7 +105,7 @@ if TYPE_CHECKING:
     from grader.judging.diagnosis.wiring import message_classes as message_classes
     from grader.judging.diagnosis.wiring import names_in as names_in
     from grader.judging.diagnosis.wiring import node_made as node_made
-    from grader.judging.diagnosis.wiring import number_at as number_in_code
+    from grader.judging.diagnosis.wiring import number_in_code as number_in_code
     from grader.judging.diagnosis.wiring import publish_calls as publish_calls
     from grader.judging.diagnosis.wiring import python_loggers as python_loggers
     from grader.judging.diagnosis.wiring import reached as reached
@@ -114,7 +115,7 @@ if TYPE_CHECKING:
     from grader.judging.diagnosis.wiring import short as short
     from grader.judging.diagnosis.wiring import spins as spins
     from grader.judging.diagnosis.wiring import target_of as target_of
-    from grader.judging.diagnosis.wiring import text as text_in_code
+    from grader.judging.diagnosis.wiring import text_in_code as text_in_code
     from grader.judging.diagnosis.wiring import timer_code as timer_code
     from grader.judging.diagnosis.wiring import used as used
     from grader.judging.diagnosis.wiring import value_of as value_of
@@ -129,6 +130,7 @@ if TYPE_CHECKING:
     from grader.judging.facts import PositionFacts as PositionFacts
     from grader.judging.facts import RateFacts as RateFacts
     from grader.judging.facts import SeriesFacts as SeriesFacts
+    from grader.judging.findings import FAULT_KEY as FAULT_KEY
     from grader.judging.findings import explain_fault as explain_fault
     from grader.judging.findings import explain_no_client as explain_no_client
     from grader.judging.findings import explain_no_message as explain_no_message
@@ -215,7 +217,7 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.core.exercise": "Check Roles NODE_GRAPH Finding Problem ProblemKind Location",
         "grader.judging.findings": (
             "met partly not_met only_printed waiting_for explain_fault faulted first_fault fault_sentence "
-            "explain_no_message explain_no_subscription explain_no_server explain_no_client fault_hint"
+            "explain_no_message explain_no_subscription explain_no_server explain_no_client fault_hint FAULT_KEY"
         ),
     },
     "Parameters": {
@@ -258,6 +260,7 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.judging.source": (
             "Source first_line last_line covers last_name chain argument parameters text_of subtree words Function"
         ),
+        "grader.judging.diagnosis.values": "draws",
         "grader.judging.diagnosis.wiring": (
             "Constant Made constant given_leaf made made_for target_of roots reached runs names_in is_log "
             "publish_calls used conditions is_flag spins node_made variable_of timer_code short received "
@@ -272,8 +275,6 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.testing": "TraceBuilder judge explain builtin_check",
     },
 }
-#: Public name -> its name in its own module, where no other function has it.
-_RENAMED = {"number_in_code": "number_at", "text_in_code": "text"}
 _HOMES = {name: home for homes in CONTENTS.values() for home, names in homes.items() for name in names.split()}
 
 __all__ = ["grade", "observe", "rejudge", *_HOMES]  # noqa: PLE0604  the table is the list
@@ -283,7 +284,7 @@ def __getattr__(name: str) -> Any:
     """Import a public name when it is first looked up."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__} has no attribute {name}")
-    value = getattr(importlib.import_module(_HOMES[name]), _RENAMED.get(name, name))
+    value = getattr(importlib.import_module(_HOMES[name]), name)
     globals()[name] = value
     return value
 

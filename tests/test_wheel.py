@@ -84,6 +84,8 @@ def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel: Path) -> N
         "exercise_1/selftest.yaml",
         "exercise_2/rubric.yaml",
         "exercise_3/rubric.yaml",
+        "exercise_3/checks.py",
+        "exercise_3/hints.py",
         "rubric.schema.json",
         "exercise_2/odometry/metadata.yaml",
     ):
@@ -168,13 +170,13 @@ def test_an_installed_rubric_has_all_its_names(wheel: Path, tmp_path: Path) -> N
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-compile", "--target"]
     subprocess.run([*pip, str(place), str(wheel)], check=True)
     rubrics = place / "grader" / "shipped" / "rubrics"
-    names = [rubrics / f"exercise_2{form}" for form in ("", "/rubric.yaml", ".yaml")]
+    names = [rubrics / f"exercise_3{form}" for form in ("", "/rubric.yaml", ".yaml")]
     code = "from grader.cli.main import main; main()"
     command = [sys.executable, "-c", code, "rubric", "check", *map(str, names)]
     environment = {**os.environ, "PYTHONPATH": str(place)}
     done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=tmp_path, env=environment)
     assert (done.returncode, done.stderr) == (0, "")
-    said = f"{names[1]}: odom_subscriber: 1 scenario, 4 criteria, 30 points"
+    said = f"{names[1]}: two_node_communication: 3 scenarios, 7 criteria, 40 points"
     assert done.stdout.splitlines() == [said] * 3
     assert [path.name for path in rubrics.iterdir() if path.is_file()] == ["rubric.schema.json"]
 

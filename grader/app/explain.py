@@ -31,10 +31,10 @@ from grader.core.scenario import (
     TimeBetween,
     cases,
 )
-from grader.judging.checks import CHECKS
 from grader.judging.run_check import check_name
 from grader.rubrics.check_parameters import Manual, manual_of
 from grader.rubrics.draws import First
+from grader.rubrics.exercise_checks import known_checks
 from grader.rubrics.loader import own_checks
 from grader.rubrics.units import format_quantity
 
@@ -51,7 +51,7 @@ def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanat
     found = [_criterion(e, c) for e, c in pairs if name in (c.id, f"{e.id}/{c.id}")]
     if found:
         return list(found)
-    checks = {**CHECKS, **{check_name(c): type(c.check) for _, c in pairs}}
+    checks = {**known_checks(), **{check_name(c): type(c.check) for _, c in pairs}}
     if name in checks:
         return [_check(name, checks[name], [f"{e.id}/{c.id}" for e, c in pairs if check_name(c) == name])]
     raise unknown(name, [*(c.id for _, c in pairs), *checks])
@@ -74,7 +74,7 @@ def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation 
     for e, c in pairs:
         used.setdefault(check_name(c), []).append(f"{e.id}/{c.id}")
     own = {name: kind for path in rubrics for name, kind in own_checks(path).items()}
-    return [_check(name, kind, used.get(name, [])) for name, kind in {**CHECKS, **own}.items()]
+    return [_check(name, kind, used.get(name, [])) for name, kind in {**known_checks(), **own}.items()]
 
 
 def exercises_of(rubrics: tuple[Path, ...]) -> list[Exercise]:

@@ -29,10 +29,10 @@ from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.scenario import ODOMETRY, Scenario, Simulated
 from grader.core.trace import FaultKind, Trace
-from grader.judging.checks import CHECKS
 from grader.judging.findings import fault_sentence
 from grader.judging.values import carries_number, student_endpoints
 from grader.judging.wording import quote
+from grader.rubrics.exercise_checks import known_checks
 from grader.rubrics.loader import RubricMistakes, read_rubric
 from grader.rubrics.simulations import offered
 
@@ -139,7 +139,7 @@ def new_rubric(request: ObserveRequest, progress: Progress, *, id_: str = "", be
     _refuse_broken(driven, draft.files)
     draft = replace(draft, remarks=(*draft.remarks, *_remarks(driven)))
     seen = Seen(alone.trace, driven, draft.files, _window_s(driven, draft.duration_s))
-    kept, left_out = _sorted_out(draft, (row for row in questions(seen) if row.check in CHECKS), driven)
+    kept, left_out = _sorted_out(draft, (row for row in questions(seen) if row.check in known_checks()), driven)
     if not kept:
         names = ", ".join(draft.files)
         raise SubmissionError(f"{names}: expected a reference that publishes, listens, serves or logs, found none")

@@ -70,11 +70,11 @@ def _schema(*, rubric: Path | None) -> int:
 
     That for a rubric FILE knows the checks of its own as well.
     """
-    from grader.judging.checks import CHECKS
+    from grader.rubrics.exercise_checks import known_checks
     from grader.rubrics.loader import own_checks
     from grader.rubrics.schema import schema_text
 
-    print_for_programs(schema_text({**CHECKS, **({} if rubric is None else own_checks(rubric))}))
+    print_for_programs(schema_text({**known_checks(), **({} if rubric is None else own_checks(rubric))}))
     return ALL_MET
 
 

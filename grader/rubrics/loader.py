@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
-from grader.core.exercise import Check, Criterion, Exercise, HintRule, Variant
+from grader.core.exercise import Check, Criterion, Exercise, Variant
 from grader.core.limits import Limits
 from grader.core.quantities import duration
 from grader.core.rubric_files import rubric_file
@@ -35,7 +35,9 @@ from grader.core.scenario import (
     shortest,
 )
 from grader.judging.checks import CHECKS
+from grader.rubrics.author_modules import OwnHints
 from grader.rubrics.draws import Draw, First
+from grader.rubrics.exercise_checks import hints_of, known_checks
 from grader.rubrics.interfaces import Interfaces, interface_mistakes
 from grader.rubrics.mistakes import mistakes_of, nearest
 from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, feedback_of, rubric_model
@@ -239,15 +241,16 @@ class _Brought:
     """
 
     checks: Mapping[str, type]
+    own: frozenset[str]  # the names of its own checks
     simulations: Mapping[str, OwnSimulation]
     provided: Mapping[str, str]
-    hints: Iterable[HintRule]
+    hints: OwnHints
 
 
 def read_rubric(
     path: Path,
     *,
-    checks: Mapping[str, type] = CHECKS,
+    checks: Mapping[str, type] | None = None,
     submissions: Sequence[Path] = (),
     draw: Draw | None = None,
     interfaces: Interfaces | None = None,
@@ -256,7 +259,7 @@ def read_rubric(
 
     Args:
         path: The file, or another name for it (`rubric_file`); messages show it as given.
-        checks: Checks that the rubric may use, besides its own.
+        checks: Checks that the rubric may use, besides its own; by default those that come with the grader.
         submissions: Folders that students write to: checks are never loaded from there.
         draw: Chooses the values of variants; without it, a rubric with variants is rejected.
         interfaces: The installed types, which the rubric's types and field paths must be among; not checked if None.
@@ -271,9 +274,10 @@ def read_rubric(
     hints = own_files(path, _own_names(path, tree, "hints"), submissions, key="hints")
     simulated = own_files(path, _own_names(path, tree, "simulations"), submissions, key="simulations")
     others = own_files(path, _own_names(path, tree, "provided"), submissions, key="provided")
-    usable = {**checks, **load(files, checks)}
+    own = load(files, CHECKS if checks is None else checks)
+    usable = {**(known_checks() if checks is None else checks), **own}
     provided = {one.name: _provided(one) for one in others}
-    brought = _Brought(usable, load_simulations(simulated), provided, load_hints(hints, usable))
+    brought = _Brought(usable, frozenset(own), load_simulations(simulated), provided, load_hints(hints, usable))
     definitions = definition_files(path, folders := _own_names(path, tree, "interfaces"), submissions)
     bags = bag_files(path, named_bags(tree.data), submissions)
     digest = digest_of(content, tuple(dict.fromkeys((*files, *hints, *others, *simulated, *definitions, *bags))))
@@ -349,6 +353,7 @@ def _exercise(
     if mistakes:
         _refuse(path, mistakes)
     limits = build(rubric.limits)
+    rules = brought.hints + hints_of({criterion.check_name for criterion in criteria} - brought.own)
     return Exercise(
         id=rubric.exercise.id,
         number=rubric.exercise.number,
@@ -361,7 +366,7 @@ def _exercise(
         by_request=rubric.exercise.by_request,
         bonus=rubric.exercise.bonus or Fraction(0),
         interfaces=tuple(str(path.parent / folder) for folder in rubric.interfaces),
-        hints=brought.hints,
+        hints=rules if rules.files else (),
     )
 
 

@@ -7,22 +7,20 @@ each plan.
 from __future__ import annotations
 
 import ast
-import copyreg
 import dataclasses
 import hashlib
 import inspect
 import re
-import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from grader.core.author_files import line_of, run, words_of
+from grader.core.author_files import line_of, words_of
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
-from grader.core.exercise import HintRule, Outcome, ProblemKind
+from grader.core.exercise import Outcome, ProblemKind
 from grader.interfaces.definitions import files_in
+from grader.rubrics.author_modules import OwnHints, module_of, rules_in
 from grader.rubrics.check_parameters import choice_model, simulation_shape
 from grader.rubrics.mistakes import nearest
 from grader.rubrics.types import BESIDE
@@ -142,7 +140,7 @@ def load(files: Sequence[OwnFile], known: Mapping[str, type]) -> dict[str, type]
     """Run check files, and return their checks by name, none of which is in `known`; raises RubricError."""
     found: dict[str, type] = {}
     for file in files:
-        table = _table(file, TABLE, lambda f: vars(_module(str(f.path.resolve()), f.content)).get(TABLE))
+        table = _table(file, TABLE, lambda f: vars(module_of(*_told(f))).get(TABLE))
         problems = list(_problems(file, table, {**known, **found}, _no_check))
         if problems:
             raise RubricError("\n".join(problems))
@@ -162,22 +160,7 @@ def load_simulations(files: Sequence[OwnFile]) -> dict[str, OwnSimulation]:
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class OwnHints:
-    """The hint rules of a rubric, by the files that hold them.
-
-    A file runs when its rules are first asked for: they need all of diagnosis, which takes 50 ms to import.
-    """
-
-    files: tuple[OwnFile, ...]
-
-    def __iter__(self) -> Iterator[HintRule]:
-        """Yield the rules in the order of the files and of their text."""
-        for file in self.files:
-            yield from _rules(file)
-
-
-def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> Iterable[HintRule]:
+def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> OwnHints:
     """Run files with hint rules, and return their rules.
 
     Args:
@@ -189,13 +172,13 @@ def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> Iterable[
             does not exist, or cannot be asked.
     """
     if not files:
-        return ()
+        return OwnHints()
     from grader.judging.diagnosis import RULES  # noqa: PLC0415  most rubrics have no rules
 
     taken = {rule.id for rule in RULES}
     problems: list[str] = []
     for file in files:
-        rules, where = _ran(file, _rules), shown(str(file.path), 500)
+        rules, where = _ran(file, lambda f: rules_in(*_told(f))), shown(str(file.path), 500)
         if not rules:
             text = f"{where}:1: expected hint rules, which are functions with @hint_rule(...) above them, found none"
             raise RubricError(text)
@@ -206,16 +189,12 @@ def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> Iterable[
             taken.add(rule.id)
     if problems:
         raise RubricError("\n".join(problems))
-    return OwnHints(tuple(files))
+    return OwnHints(tuple(map(_told, files)))
 
 
-def _rules(file: OwnFile) -> tuple[Any, ...]:
-    """Run a file and return its rules."""
-    from grader.judging.diagnosis.rules import Rule  # noqa: PLC0415  as above
-
-    path = str(file.path.resolve())
-    rules = (value for value in vars(_module(path, file.content)).values() if isinstance(value, Rule))
-    return tuple(dataclasses.replace(rule, file=path) for rule in dict.fromkeys(rules))
+def _told(file: OwnFile) -> tuple[str, bytes]:
+    """Return where a file is, and its text."""
+    return str(file.path.resolve()), file.content
 
 
 def _no_rule(rule: Any, known: Mapping[str, type]) -> str:
@@ -289,26 +268,6 @@ def _table(file: OwnFile, name: str, ran: Callable[[OwnFile], object]) -> dict[s
         found = "none" if table is None else "an empty one" if table == {} else f"a {type(table).__name__}"
         raise RubricError(f'{where}:1: expected a table {name} = {{"name": Class}}, found {found}')
     return table
-
-
-def _module(path: str, content: bytes) -> ModuleType:
-    """Return the module of a file, whose checks other processes can recreate."""
-    module = run("_own_checks", path, content)
-    for kind in vars(module).values():
-        if isinstance(kind, type) and kind.__module__ == module.__name__ and dataclasses.is_dataclass(kind):
-            copyreg.pickle(kind, _reduced)
-    return module
-
-
-def _reduced(value: Any) -> tuple[Any, ...]:
-    """Return how another process recreates a value of such a class; it has to run the file first."""
-    module = sys.modules[type(value).__module__]
-    given = {field.name: getattr(value, field.name) for field in dataclasses.fields(value) if field.init}
-    return _remade, (module.__file__, vars(module)["__content__"], type(value).__qualname__, given)
-
-
-def _remade(path: str, content: bytes, name: str, given: Mapping[str, object]) -> Any:
-    return getattr(_module(path, content), name)(**given)
 
 
 def _problems(

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic.json_schema import JsonSchemaValue
 
-from grader.judging.checks import CHECKS
+from grader.rubrics.exercise_checks import known_checks
 from grader.rubrics.model import rubric_model
 from grader.rubrics.variants import REFERENCE
 
@@ -35,15 +35,16 @@ _FIXED = frozenset({"ExerciseShape", "FeedbackShape", "LimitsShape", "VariantSha
 _FREE = {"Criterion": ("title", "hint"), "ScenarioShape": ("shutdown",)}
 
 
-def rubric_schema(checks: Mapping[str, type] = CHECKS) -> JsonSchemaValue:
+def rubric_schema(checks: Mapping[str, type] | None = None) -> JsonSchemaValue:
     """Return the JSON Schema (2020-12) of rubric files."""
-    schema = rubric_model(tuple(checks.items())).model_json_schema(by_alias=True)
+    usable = known_checks() if checks is None else checks
+    schema = rubric_model(tuple(usable.items())).model_json_schema(by_alias=True)
     tidy = _tidy(schema)
     tidy["$defs"] = {name: _varying(name, node) for name, node in tidy["$defs"].items()} | {_VARIANT: _REFERENCE}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": ID, **tidy}
 
 
-def schema_text(checks: Mapping[str, type] = CHECKS) -> str:
+def schema_text(checks: Mapping[str, type] | None = None) -> str:
     """Return the schema as text; that of the built-in checks is shipped."""
     return json.dumps(rubric_schema(checks), indent=2, ensure_ascii=False) + "\n"
 

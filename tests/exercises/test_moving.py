@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import shutil
 import subprocess
@@ -69,3 +70,30 @@ def test_a_copied_exercise_grades_real_nodes(moved: Path) -> None:
         done = subprocess.run([*GRADE, *words], cwd=moved, check=False, capture_output=True, text=True)
         verdicts = [v for e in json.loads(done.stdout)["exercises"] for v in e["criteria"]]
         assert {v["id"]: v["outcome"] for v in verdicts if v["outcome"] != "met"} == lost, done.stderr
+
+
+FILES = sorted((ROOT / "rubrics").rglob("*.py"))
+
+
+def packages_in(tree: ast.Module) -> set[str]:
+    """Return what a file imports: `grader.api` as a whole, of others the package."""
+    absolute = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    names |= {"." * node.level + (node.module or "") for node in absolute}
+    return {name if name.startswith("grader") else name.split(".")[0] for name in names}
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_what_an_exercise_brings_imports_the_public_door_alone(file: Path) -> None:
+    """Besides it the standard library; the script that makes a recording runs alone and needs nothing of the grader."""
+    found = packages_in(ast.parse(file.read_text(encoding="utf-8"))) - set(sys.stdlib_module_names)
+    if file.name in ("checks.py", "hints.py"):
+        assert found == {"grader.api"}
+    else:
+        assert not [name for name in found if name.startswith("grader")]
+
+
+@pytest.mark.parametrize("line", ["import grader.core.trace", "from grader.judging import values", "from . import a"])
+def test_another_import_is_found(line: str) -> None:
+    """The rule can fail."""
+    assert packages_in(ast.parse(line)) - set(sys.stdlib_module_names) != {"grader.api"}

@@ -6,10 +6,12 @@ from tracing import ODOMETRY, TRIGGER, TWIST
 
 from grader.core.exercise import Check
 from grader.core.quantities import NS_PER_S
-from grader.judging.checks import CHECKS
 from grader.judging.checks.graph import GraphEdge
 from grader.judging.checks.timing import ReactionCase
 from grader.judging.values import FieldRule
+from grader.rubrics.exercise_checks import known_checks
+
+CHECKS = known_checks()
 
 INSTANCES: dict[str, Check] = {
     "publishes": CHECKS["publishes"]("/cmd_vel", TWIST),

@@ -34,6 +34,8 @@ from grader.rubrics.builtin import builtin_exercises
 from grader.submissions.sources import source_text
 
 HERE = Path(__file__).parent
+#: The rules of the grader, and of the exercises that come with it.
+EVERY: list[Any] = [*RULES, *(rule for exercise in builtin_exercises() for rule in exercise.hints)]
 Row = Mapping[str, Any]
 CRASHES = rows("crashes.yaml")
 BEHAVIOURS = rows("behaviours.yaml")
@@ -151,22 +153,21 @@ def test_every_rule_is_shown_to_work() -> None:
     shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS, *SLIPS)} | {v["evidence"].get(CAUSE_KEY) for v in verdicts}
     # it only names another criterion, so that reports do not name it
     shown |= {"follows" for v in verdicts if v.get("same_cause_as") and CAUSE_KEY not in v["evidence"]}
-    assert {rule.id for rule in RULES} - shown == set()
+    assert {rule.id for rule in EVERY} - shown == set()
 
 
 def test_the_rules_are_asked_in_the_order_that_is_written_down() -> None:
     """Wherever a rule is defined: its priority alone decides."""
     order = (HERE / "diagnosis" / "order.txt").read_text("utf-8").split()
-    rules: list[Any] = [*RULES, *(rule for exercise in builtin_exercises() for rule in exercise.hints)]
-    assert [rule.id for rule in in_order(rules)] == [*order, "follows"]
-    priorities = [rule.priority for rule in rules]
+    assert [rule.id for rule in in_order(EVERY)] == [*order, "follows"]
+    priorities = [rule.priority for rule in EVERY]
     assert len(set(priorities)) == len(priorities)
     assert min(priorities) >= 1000 > FIRST
 
 
 def test_the_ids_of_rules_are_unique() -> None:
     """Reports name them."""
-    ids = [rule.id for rule in RULES]
+    ids = [rule.id for rule in EVERY]
     assert len(ids) == len(set(ids))
 
 
@@ -316,7 +317,7 @@ def test_a_near_miss_is_not_blamed(
 
 
 #: Rules that say what a program does wrong, whatever was recorded: a right program must never get them.
-TEXTUAL = {rule.id for rule in RULES} - {
+TEXTUAL = {rule.id for rule in EVERY} - {
     "log_line",  # where a log is written
     "log_period",
     "late_timer",

@@ -6,12 +6,12 @@ import pytest
 from tracing import FAN_VALUES, Recording, position_logs, scripted
 
 from grader.core.trace import FaultKind
-from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogsPosition
+from grader.rubrics.exercise_checks import known_checks
 
 POSITION = LogsPosition("odom_subscriber.py", "/odom")
-ON = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "above")
+ON = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above")
 
 
 @pytest.mark.parametrize(

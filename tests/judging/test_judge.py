@@ -19,6 +19,7 @@ from grader.core.trace import ClockKind, FaultKind, Trace
 from grader.judging.checks import CHECKS
 from grader.judging.installation import lacking_package
 from grader.judging.judge_run import judge_exercise
+from grader.rubrics.exercise_checks import known_checks
 from grader.testing import TraceBuilder
 
 FILE = "velocity_publisher.py"
@@ -453,7 +454,7 @@ def test_the_same_fault_in_two_scenarios_is_one_cause() -> None:
     scenarios = (Scenario("s", files[:1], Span(SECOND)), Scenario("both", files, Span(SECOND)))
     ex = exercise(
         criterion("rate", CHECKS["topic_rate"]("/t", 5.0, 1.0, SECOND), scenario="s"),
-        criterion("together", CHECKS["answers_together"]("/t", "/f", 25, 100, 0), scenario="both"),
+        criterion("together", known_checks()["answers_together"]("/t", "/f", 25, 100, 0), scenario="both"),
         files=files,
         scenarios=scenarios,
     )
@@ -470,8 +471,8 @@ def test_two_files_that_cannot_start_are_two_causes() -> None:
     scenarios = (Scenario("s", files[:1], Span(SECOND)), Scenario("f", files[1:], Span(SECOND)))
     ex = exercise(
         criterion("rate", CHECKS["topic_rate"]("/t", 5.0, 1.0, SECOND), scenario="s"),
-        criterion("on", CHECKS["threshold_response"]("/t", "/f", 25, 100, 0, "above"), scenario="f"),
-        criterion("off", CHECKS["threshold_response"]("/t", "/f", 25, 100, 0, "at_or_below"), scenario="f"),
+        criterion("on", known_checks()["threshold_response"]("/t", "/f", 25, 100, 0, "above"), scenario="f"),
+        criterion("off", known_checks()["threshold_response"]("/t", "/f", 25, 100, 0, "at_or_below"), scenario="f"),
         files=files,
         scenarios=scenarios,
     )

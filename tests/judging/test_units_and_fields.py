@@ -9,11 +9,12 @@ from tracing import TWIST, Recording
 
 from grader.core.exercise import Finding
 from grader.execution.stimuli import number_message, numeric_field
-from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import RandomInRange
 from grader.judging.checks.received import LogsReceived
-from grader.judging.checks.together import AnswersTogether
 from grader.judging.values import number_of, number_path, published
+from grader.rubrics.exercise_checks import known_checks
+
+ThresholdResponse, AnswersTogether = (known_checks()[name] for name in ("threshold_response", "answers_together"))
 
 RANGE = "sensor_msgs/msg/Range"
 DISTANCES = (0.4, 0.9, 0.3, 0.7, 0.5)

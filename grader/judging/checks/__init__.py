@@ -1,9 +1,8 @@
-"""The checks that rubrics can use; CHECKS lists all of them."""
+"""The general checks that rubrics can use; CHECKS lists all of them."""
 
 from grader.judging.checks.actions import ActionFeedback, ActionResult, LifecycleStates
 from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
 from grader.judging.checks.closed_loop import ReachesGoal, StaysInRange
-from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange, FieldMonotone, RandomInRange
 from grader.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
 from grader.judging.checks.heard import LogsResponse, LogsTexts
@@ -27,7 +26,6 @@ from grader.judging.checks.services import (
     ServiceSequence,
 )
 from grader.judging.checks.timing import Latency, Period, Reaction, Silence
-from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes, Transform
 
 #: Name in a rubric -> check class; the fields of the class are the parameters.
@@ -42,8 +40,6 @@ CHECKS: dict[str, type] = {
     "waits_gracefully": WaitsGracefully,
     "random_in_range": RandomInRange,
     "logs_received": LogsReceived,
-    "threshold_response": ThresholdResponse,
-    "answers_together": AnswersTogether,
     "bidirectional_graph": BidirectionalGraph,
     "field_function": FieldFunction,
     "logs_every": LogsEvery,

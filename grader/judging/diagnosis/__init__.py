@@ -18,7 +18,6 @@ from grader.judging.diagnosis import (
     attributes,
     callbacks,
     crashes,
-    fan,
     loading,
     logs,
     misuse,
@@ -49,7 +48,6 @@ _MODULES = (
     values,
     logs,
     positions,
-    fan,
 )
 #: All rules of the grader in the order of their priorities; the first that applies wins.
 RULES: tuple[Rule, ...] = in_order(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))

@@ -19,7 +19,7 @@ from grader.judging.diagnosis.wiring import (
     made,
     made_for,
     names_in,
-    number_at,
+    number_in_code,
     python_loggers,
     reached,
     roots,
@@ -277,8 +277,8 @@ def _counts(source: Source, test: ast.expr) -> bool:
     """Return whether a condition is `n % 20 == 0`, or compares a counter with a number."""
     if any(isinstance(n, ast.BinOp) and isinstance(n.op, ast.Mod) for n in ast.walk(test)):
         return True
-    counters = {chain(a.target) for a in source.all(ast.AugAssign) if number_at(source, a.value) == 1}
-    limits = [number_at(source, c) for c in test.comparators] if isinstance(test, ast.Compare) else []
+    counters = {chain(a.target) for a in source.all(ast.AugAssign) if number_in_code(source, a.value) == 1}
+    limits = [number_in_code(source, c) for c in test.comparators] if isinstance(test, ast.Compare) else []
     return isinstance(test, ast.Compare) and chain(test.left) in counters and None not in limits
 
 
@@ -365,7 +365,7 @@ def _log_every(case: Case) -> Clue | None:
     worth = constant(source, by[0].right) if len(by) == 1 else None
     if worth is None or test is None:
         return None
-    rest = number_at(source, test.test.comparators[0]) if isinstance(test.test, ast.Compare) else None
+    rest = number_in_code(source, test.test.comparators[0]) if isinstance(test.test, ast.Compare) else None
     if rest is not None and rest >= worth.value:
         hint = f"'{source.code(test.test, 40)}' is never true, the rest is below {number(worth.value)}: compare with 0"
         return Clue(hint, source.place(test))

@@ -13,7 +13,7 @@ from grader.judging.diagnosis.wiring import (
     made,
     message_classes,
     node_made,
-    number_at,
+    number_in_code,
     received,
     target_of,
     variable_of,
@@ -313,7 +313,7 @@ def _of_node(crash: Crash, name: str, missing: str | None, keyword: str | None) 
     call = next(iter(_calls(crash, name)), None)
     if missing is not None and call is not None and name == "create_timer" and len(call.args) == 1:
         first = crash.source.code(call.args[0], 40)
-        number = number_at(crash.source, call.args[0])
+        number = number_in_code(crash.source, call.args[0])
         lacks = "the method to call is missing" if number is not None else "the period in seconds is missing"
         right = f"create_timer({first}, self.callback)" if number is not None else f"create_timer(0.1, {first})"
         return Clue(f"{lacks}: {right}")

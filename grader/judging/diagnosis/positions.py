@@ -7,7 +7,16 @@ import ast
 from grader.core.exercise import Outcome
 from grader.judging.checks.odometry import LogsPosition
 from grader.judging.diagnosis.rules import Case, Clue, Maker, hint_rule, log_call
-from grader.judging.diagnosis.wiring import is_flag, made, message_classes, names_in, number_at, reached, roots, runs
+from grader.judging.diagnosis.wiring import (
+    is_flag,
+    made,
+    message_classes,
+    names_in,
+    number_in_code,
+    reached,
+    roots,
+    runs,
+)
 from grader.judging.facts import PositionFacts
 from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
 
@@ -152,7 +161,7 @@ def _rounded_away(case: Case) -> Clue | None:
     """`round(x, -1)` leaves tens of metres."""
     source = case.source
     for call in source.calls("round"):
-        places = number_at(source, argument(call, 1, "ndigits"))
+        places = number_in_code(source, argument(call, 1, "ndigits"))
         if places is not None and places < 0:
             hint = f"{source.code(call)} leaves tens of metres: keep a decimal or two"
             return Clue(hint, source.place(call))
@@ -198,7 +207,7 @@ def _scaled_position(case: Case) -> Clue | None:
         return None
     for node in subtree(call):
         if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Mult, ast.Div)):
-            factor = number_at(source, node.right)
+            factor = number_in_code(source, node.right)
             if factor in (10, 100, 1000):
                 return Clue(f"{source.code(node)} is not in metres: log the number as it is", source.place(node))
     return None
@@ -237,7 +246,7 @@ def _one_at_a_time(source: Source) -> Clue | None:
 def _oldest_taken(source: Source) -> Clue | None:
     """Messages are added at one end and taken from the other, slower than they arrive."""
     for call in source.calls("pop", "popleft"):
-        first = last_name(call.func) == "popleft" or (len(call.args) == 1 and number_at(source, call.args[0]) == 0)
+        first = last_name(call.func) == "popleft" or (len(call.args) == 1 and number_in_code(source, call.args[0]) == 0)
         if first and isinstance(call.func, ast.Attribute) and any(source.calls("append")):
             hint = f"{source.code(call, 50)} takes the oldest of what is stored, and more comes than is taken"
             return Clue(f"{hint}: keep the newest only", source.place(call))

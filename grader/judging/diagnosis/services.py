@@ -22,7 +22,7 @@ from grader.judging.diagnosis.wiring import (
     runs,
     short,
     target_of,
-    text,
+    text_in_code,
 )
 from grader.judging.facts import OtherEnd
 from grader.judging.service_calls import CallKind, ResponseReader, episodes_of
@@ -55,7 +55,7 @@ def _other_service(case: Case) -> Clue | None:
         return None
     found = other.name
     for source, kind in _sides(case):
-        named = [(c, text(source, argument(c, 1, "srv_name"))) for c in _ends(source, kind)]
+        named = [(c, text_in_code(source, argument(c, 1, "srv_name"))) for c in _ends(source, kind)]
         fitting = [(c, name) for c, name in named if goes_to(name, found)] or (named if len(named) == 1 else [])
         if len(fitting) != 1:
             continue
@@ -74,7 +74,9 @@ def _other_service_type(case: Case) -> Clue | None:
     for source, kind in _sides(case):
         types = {e.type for e in case.trace.service_ends(kind, case.check.service)}
         calls = [
-            c for c in _ends(source, kind) if goes_to(text(source, argument(c, 1, "srv_name")), case.check.service)
+            c
+            for c in _ends(source, kind)
+            if goes_to(text_in_code(source, argument(c, 1, "srv_name")), case.check.service)
         ]
         if not wanted or not types or wanted in types or len(calls) != 1:
             continue

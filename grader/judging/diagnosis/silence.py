@@ -6,13 +6,12 @@ import ast
 import re
 
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Location, Outcome
+from grader.core.exercise import Location, Outcome, named, roles_of
 from grader.core.quantities import seconds
 from grader.judging.checks.graph import BidirectionalGraph
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogsPosition
 from grader.judging.checks.received import LogsReceived
-from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import Publishes, Subscribes
 from grader.judging.diagnosis.rules import NO_SOURCE, Case, Clue, file_for, hint_rule, silent_topic, unheard_topic
 from grader.judging.diagnosis.wiring import (
@@ -188,12 +187,10 @@ def _latched_subscription(case: Case) -> Clue | None:
     return Clue(hint, source.place(policy if policy is not None else item.call), key=f"apart:{topic}")
 
 
-@hint_rule(AnswersTogether, BidirectionalGraph, priority=8060)
+@hint_rule(priority=8060)
 def _kept_apart(case: Case) -> Clue | None:
     """Two files are correct by themselves, but cannot communicate."""
-    check: AnswersTogether | BidirectionalGraph = case.check
-    ends_of = (check.input, check.output) if isinstance(check, AnswersTogether) else (check.forward, check.back)
-    for topic in ends_of:
+    for topic in named(case.check, *roles_of(type(case.check)).topics):
         ends = student_endpoints(case.trace, topic=topic)
         here = [e for e in ends if e.kind == "publisher"]
         there = [e for e in ends if e.kind == "subscription"]

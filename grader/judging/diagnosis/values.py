@@ -10,7 +10,6 @@ from grader.core.dataclass import dataclass
 from grader.core.exercise import ProblemKind
 from grader.core.trace import Message
 from grader.judging.checks.fields import FieldFunction, RandomInRange
-from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues
 from grader.judging.diagnosis.rules import Case, Clue, hint_rule
 from grader.judging.diagnosis.wiring import (
@@ -19,7 +18,7 @@ from grader.judging.diagnosis.wiring import (
     given_leaf,
     made,
     made_for,
-    number_at,
+    number_in_code,
     runs,
     target_of,
     variable_of,
@@ -517,7 +516,7 @@ def _draw_limits(case: Case) -> Clue | None:
     if last_name(call.func) in ("gauss", "normalvariate", "normal") and not list(source.calls("min", "max", "clip")):
         hint = f"{source.code(call)} has no limits, some values lie far out: {right}"
         return Clue(hint, source.place(call), key="draw")
-    limits = [number_at(source, a) for a in call.args]
+    limits = [number_in_code(source, a) for a in call.args]
     if last_name(call.func) in ("uniform", "randint") and len(limits) == 2 and None not in limits:
         if limits == [check.low, check.high]:
             return None
@@ -546,7 +545,7 @@ def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: in
     if node is call:
         return drawn
     if not isinstance(node, ast.BinOp) or depth > _DEEPEST:
-        return number_at(source, node)
+        return number_in_code(source, node)
     left = _with(source, node.left, call, drawn, depth + 1)
     right = _with(source, node.right, call, drawn, depth + 1)
     if left is None or right is None:
@@ -583,7 +582,7 @@ def _shifted_draw(case: Case) -> Clue | None:
     if last_name(calls[0].func) not in ("uniform", "randint"):
         return None
     around = source.parents.get(calls[0])
-    limits = [number_at(source, a) for a in calls[0].args]
+    limits = [number_in_code(source, a) for a in calls[0].args]
     if not isinstance(around, ast.BinOp) or limits != [check.low, check.high]:
         return None
     ends = [end for limit in (check.low, check.high) if (end := _with(source, around, calls[0], limit)) is not None]
@@ -631,21 +630,3 @@ def _not_drawn(case: Case) -> Clue | None:
     code = source.code(places[0])
     hint = f"{code} draws nothing: random.uniform({float(check.low)}, {float(check.high)}) gives a new value each time"
     return Clue(hint, source.place(places[0]))
-
-
-@hint_rule(AnswersTogether, problem=ProblemKind.NEVER_CHANGES, priority=10220)
-def _never_crosses(case: Case) -> Clue | None:
-    """All drawn values are on one side of the controller's threshold."""
-    check: AnswersTogether = case.check
-    owners = [s for s in case.sources.values() if made_for(s, "publisher", check.input) is not None]
-    calls = draws(owners[0]) if len(owners) == 1 else []
-    if len(calls) != 1 or last_name(calls[0].func) not in ("uniform", "randint") or len(calls[0].args) != 2:
-        return None
-    limits = [number_at(owners[0], a) for a in calls[0].args]
-    known = [limit for limit in limits if limit is not None]
-    if len(known) < 2 or min(known) <= check.threshold < max(known):
-        return None
-    hint = f"{owners[0].code(calls[0])} stays on one side of {number(check.threshold)}"
-    asked = next((c for c in case.siblings if isinstance(c, RandomInRange) and c.topic == check.input), None)
-    hint += f": the values go from {number(asked.low)} to {number(asked.high)}" if asked is not None else ""
-    return Clue(hint, owners[0].place(calls[0]), key="draw")

@@ -83,7 +83,7 @@ def _named(source: Source, node: ast.Name | ast.Attribute, depth: int) -> Consta
     return constant(source, _only_assignment(source, node), depth + 1)
 
 
-def number_at(source: Source, node: ast.AST | None) -> float | None:
+def number_in_code(source: Source, node: ast.AST | None) -> float | None:
     """Return the value of an expression, or None."""
     found = constant(source, node)
     return None if found is None else found.value
@@ -226,13 +226,13 @@ def _made(source: Source, kind: str, call: ast.Call) -> Made:
     if kind == "timer":
         period, callback = argument(call, 0, "timer_period_sec"), argument(call, 1, "callback")
         return Made(kind, call, period=period, callback=callback)
-    type_, topic = argument(call, 0, "msg_type"), text(source, argument(call, 1, "topic"))
+    type_, topic = argument(call, 0, "msg_type"), text_in_code(source, argument(call, 1, "topic"))
     callback = argument(call, 2, "callback") if kind == "subscription" else None
     qos = argument(call, 3 if kind == "subscription" else 2, "qos_profile")
     return Made(kind, call, last_name(type_), topic, callback, qos=qos)
 
 
-def text(source: Source, node: ast.expr | None, depth: int = 0) -> str | None:
+def text_in_code(source: Source, node: ast.expr | None, depth: int = 0) -> str | None:
     """Return the text of a literal, or of a name that is assigned a literal."""
     literal = text_of(node)
     if literal is not None or node is None or depth > 3:
@@ -244,7 +244,7 @@ def text(source: Source, node: ast.expr | None, depth: int = 0) -> str | None:
         values = [s.value for s in around if isinstance(s, ast.Assign)]
     else:
         return None
-    return text(source, values[0], depth + 1) if len(values) == 1 else None
+    return text_in_code(source, values[0], depth + 1) if len(values) == 1 else None
 
 
 def goes_to(written: str | None, topic: str) -> bool:

@@ -1,39 +1,51 @@
-"""Causes of wrong, late or missing answers of a controller: the comparison, the numbers, or no answer."""
+"""Hint rules of exercise 3: why answers of a controller are wrong, late or missing."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, cast
 
-from grader.core.dataclass import dataclass
-from grader.core.exercise import Outcome, ProblemKind
-from grader.core.quantities import within
-from grader.judging.checks.fan import ThresholdResponse
-from grader.judging.checks.fields import RandomInRange
-from grader.judging.checks.rate import TopicRate
-from grader.judging.checks.together import AnswersTogether
-from grader.judging.diagnosis.rules import Case, Clue, hint_rule, silent_topic
-from grader.judging.diagnosis.wiring import (
+from grader.api import (
+    EXACT,
+    AnswerFacts,
+    AnswerRow,
+    Case,
+    Clue,
     Constant,
+    Outcome,
+    ProblemKind,
+    Source,
+    chain,
     conditions,
     constant,
+    draws,
+    first_line,
     given_leaf,
+    hint_rule,
     is_flag,
+    last_name,
     made,
     made_for,
     names_in,
-    number_at,
+    number,
+    number_in_code,
     publish_calls,
+    published,
+    published_numbers,
     received,
     runs,
-    text,
+    silent_topic,
+    subtree,
+    text_in_code,
+    text_of,
     timer_code,
+    within,
 )
-from grader.judging.facts import AnswerFacts, AnswerRow
-from grader.judging.source import Source, chain, first_line, last_name, subtree, text_of
-from grader.judging.values import EXACT, published, published_numbers
-from grader.judging.wording import number
 
+#: The checks that are explained here.
+ALONE, TOGETHER = ANSWERS = ("threshold_response", "answers_together")
 #: Answers delayed by at most this count as prompt.
 _PROMPT_S = 0.3
 _MEANS = ("mean", "fmean", "average", "median", "nanmean")
@@ -59,7 +71,7 @@ class _Controller:
 
     case: Case
     source: Source
-    check: ThresholdResponse | AnswersTogether
+    check: Any  # one of the two checks of this exercise
 
 
 def _subscribers(case: Case) -> Iterator[_Subscriber]:
@@ -93,7 +105,7 @@ class _Switch:
 
 def _controller(case: Case) -> _Controller | None:
     """Return the controller, if it answers."""
-    check: ThresholdResponse | AnswersTogether = case.check
+    check = case.check
     if silent_topic(case) or case.is_about(ProblemKind.NEVER_CHANGES):
         return None
     owners = [s for s in case.sources.values() if made_for(s, "publisher", check.output) is not None]
@@ -124,7 +136,7 @@ def _wrong_inputs(case: Case) -> list[float]:
     return [r.input for r in _rows(case) if r.answer is None or not within(r.answer, r.expected, EXACT)]
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_late, priority=13010)
+@hint_rule(*ANSWERS, given=_late, priority=13010)
 def _stored_late(late: _Subscriber) -> Clue | None:
     """An attribute is compared before it gets the new value."""
     source = late.source
@@ -139,13 +151,14 @@ def _stored_late(late: _Subscriber) -> Clue | None:
     return None
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_late, priority=13020)
+@hint_rule(*ANSWERS, given=_late, priority=13020)
 def _oldest_compared(late: _Subscriber) -> Clue | None:
     """The oldest of several stored values is compared."""
     source = late.source
     for test in late.comparisons():
         for node in subtree(test):
-            if isinstance(node, ast.Subscript) and number_at(source, node.slice) == 0 and _grows(source, node.value):
+            first = isinstance(node, ast.Subscript) and number_in_code(source, node.slice) == 0
+            if isinstance(node, ast.Subscript) and first and _grows(source, node.value):
                 hint = f"{source.code(node, 40)} is the oldest of the values that are kept: compare the newest"
                 return Clue(hint, source.place(test), key="late_answer")
     return None
@@ -156,25 +169,25 @@ def _grows(source: Source, values: ast.expr) -> bool:
     return chain(values) != "" and any(chain(c.func) == f"{chain(values)}.append" for c in source.calls("append"))
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_late, priority=13030)
+@hint_rule(*ANSWERS, given=_late, priority=13030)
 def _put_off(late: _Subscriber) -> Clue | None:
     """The answer is left to a timer, or the callback sleeps before it answers."""
     source = late.source
     for node in late.reached:
         name = last_name(node.func) if isinstance(node, ast.Call) else ""
         if isinstance(node, ast.Call) and name in ("Timer", "create_timer", "sleep", "call_later"):
-            worth = number_at(source, node.args[0] if node.args else None)
+            worth = number_in_code(source, node.args[0] if node.args else None)
             if worth is not None and worth > _PROMPT_S:
                 hint = f"{source.code(node, 50)} puts the answer off by {number(worth)} s: answer at once"
                 return Clue(hint, source.place(node), key="late_answer")
     return None
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, priority=13040)
+@hint_rule(*ANSWERS, priority=13040)
 def _compared_as_text(case: Case) -> Clue | None:
     """`str(msg.data) > '25'` compares alphabetically."""
     for source, test in _compared(case):
-        sides = [text(source, side) for side in (test.left, test.comparators[0])]
+        sides = [text_in_code(source, side) for side in (test.left, test.comparators[0])]
         constant = next((side for side in sides if side is not None), None)
         is_number = constant is not None and constant.strip().replace(".", "", 1).isdigit()
         if not is_number or not isinstance(test.ops[0], _ORDERS):
@@ -185,7 +198,7 @@ def _compared_as_text(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, priority=13050)
+@hint_rule(*ANSWERS, priority=13050)
 def _compared_mean(case: Case) -> Clue | None:
     """A mean of the last values lags behind, and stays near the threshold."""
     for source, test in _compared(case):
@@ -202,7 +215,7 @@ def _sum_by_count(node: ast.BinOp) -> bool:
     return isinstance(node.left, ast.Call) and last_name(node.left.func) == "sum"
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, problem=ProblemKind.NO_NUMBER, given=_controller, priority=13060)
+@hint_rule(*ANSWERS, problem=ProblemKind.NO_NUMBER, given=_controller, priority=13060)
 def _answer_without_number(controller: _Controller) -> Clue | None:
     """Answers have a type without a number."""
     source, check = controller.source, controller.check
@@ -213,7 +226,7 @@ def _answer_without_number(controller: _Controller) -> Clue | None:
     return Clue(hint, source.place(item.call), key=f"apart:{check.output}")
 
 
-@hint_rule(ThresholdResponse, given=_controller, priority=13070)
+@hint_rule(ALONE, given=_controller, priority=13070)
 def _at_the_threshold(controller: _Controller) -> Clue | None:
     """Only inputs exactly at the threshold are answered wrongly."""
     source, check = controller.source, controller.check
@@ -231,7 +244,7 @@ def _at_the_threshold(controller: _Controller) -> Clue | None:
     return None
 
 
-@hint_rule(ThresholdResponse, given=_controller, priority=13080)
+@hint_rule(ALONE, given=_controller, priority=13080)
 def _inverted(controller: _Controller) -> Clue | None:
     """The answers are exchanged."""
     source, check = controller.source, controller.check
@@ -250,7 +263,7 @@ def _inverted(controller: _Controller) -> Clue | None:
     return Clue(f"{hint}, {number(check.otherwise)} at or below it", source.place(switches[0].node), key="inverted")
 
 
-def _says_inverted(source: Source, switch: _Switch, check: ThresholdResponse | AnswersTogether) -> bool:
+def _says_inverted(source: Source, switch: _Switch, check: Any) -> bool:
     """Return whether the text, too, gives each side the answer of the other."""
     negated = isinstance(source.parents.get(switch.node), ast.UnaryOp)
     choice = next((n for n in source.around(switch.node, ast.AST) if isinstance(n, (ast.If, ast.IfExp))), None)
@@ -264,7 +277,7 @@ def _says_inverted(source: Source, switch: _Switch, check: ThresholdResponse | A
     return wrong in numbers and right not in numbers
 
 
-@hint_rule(ThresholdResponse, given=_controller, priority=13090)
+@hint_rule(ALONE, given=_controller, priority=13090)
 def _rounded(controller: _Controller) -> Clue | None:
     """The input is truncated or rounded before the comparison."""
     source, check = controller.source, controller.check
@@ -280,7 +293,7 @@ def _rounded(controller: _Controller) -> Clue | None:
     return None
 
 
-@hint_rule(ThresholdResponse, given=_controller, priority=13100)
+@hint_rule(ALONE, given=_controller, priority=13100)
 def _other_threshold(controller: _Controller) -> Clue | None:
     source, check = controller.source, controller.check
     known = _switches(source)
@@ -299,7 +312,7 @@ def _other_threshold(controller: _Controller) -> Clue | None:
     return Clue(f"{hint}{number(check.threshold)}", source.place(others[0].limit.origin), key="other_threshold")
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13110)
+@hint_rule(*ANSWERS, given=_controller, priority=13110)
 def _wrong_answer(controller: _Controller) -> Clue | None:
     """The controller sends a number that is not in the exercise."""
     source, check = controller.source, controller.check
@@ -337,7 +350,7 @@ def _is_worth(source: Source, node: ast.AST, value: float) -> bool:
     return worth is not None and within(worth.value, value, EXACT)
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13120)
+@hint_rule(*ANSWERS, given=_controller, priority=13120)
 def _compared_not_set(controller: _Controller) -> Clue | None:
     """`fan.data == 100.0` compares and sets nothing."""
     source = controller.source
@@ -350,7 +363,7 @@ def _compared_not_set(controller: _Controller) -> Clue | None:
     return None
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13130)
+@hint_rule(*ANSWERS, given=_controller, priority=13130)
 def _sent_before_set(controller: _Controller) -> Clue | None:
     """The message is published before its number is set."""
     source, check = controller.source, controller.check
@@ -367,7 +380,7 @@ def _sent_before_set(controller: _Controller) -> Clue | None:
     return Clue(hint, source.place(calls[0]))
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13140)
+@hint_rule(*ANSWERS, given=_controller, priority=13140)
 def _sends_what_came(controller: _Controller) -> Clue | None:
     """The message that came is published instead of the answer."""
     source, check = controller.source, controller.check
@@ -384,7 +397,7 @@ def _sends_what_came(controller: _Controller) -> Clue | None:
     return None
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13150)
+@hint_rule(*ANSWERS, given=_controller, priority=13150)
 def _one_branch(controller: _Controller) -> Clue | None:
     """An answer is sent only on one side of the threshold."""
     source, check = controller.source, controller.check
@@ -406,7 +419,7 @@ def _tests_threshold(source: Source, test: ast.expr, threshold: float) -> bool:
     return any(s.node in inside for s in _switches(source, threshold))
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13160)
+@hint_rule(*ANSWERS, given=_controller, priority=13160)
 def _answered_once(controller: _Controller) -> Clue | None:
     """A flag lets one answer through."""
     source, check = controller.source, controller.check
@@ -425,7 +438,7 @@ def _answered_once(controller: _Controller) -> Clue | None:
     return None
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13170)
+@hint_rule(*ANSWERS, given=_controller, priority=13170)
 def _sent_in_one_branch(controller: _Controller) -> Clue | None:
     """`publish` stands inside `else`, or a return comes before it."""
     source, check = controller.source, controller.check
@@ -448,7 +461,7 @@ def _sent_in_one_branch(controller: _Controller) -> Clue | None:
     return Clue(hint, source.place(early[0]), key="one_branch")
 
 
-@hint_rule(ThresholdResponse, given=_controller, priority=13180)
+@hint_rule(ALONE, given=_controller, priority=13180)
 def _no_other_side(controller: _Controller) -> Clue | None:
     """The message is kept, and its number is set on one side of the threshold only."""
     source, check = controller.source, controller.check
@@ -475,7 +488,7 @@ def _asks_none(test: ast.expr, name: str) -> bool:
     return isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not) and chain(test.operand) == name
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13190)
+@hint_rule(*ANSWERS, given=_controller, priority=13190)
 def _latched(controller: _Controller) -> Clue | None:
     """A variable is set on one side of the threshold, and never reset."""
     source, check = controller.source, controller.check
@@ -497,7 +510,7 @@ def _latched(controller: _Controller) -> Clue | None:
     return None
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, given=_controller, priority=13200)
+@hint_rule(*ANSWERS, given=_controller, priority=13200)
 def _slow_timer(controller: _Controller) -> Clue | None:
     """A timer answers too rarely."""
     source, check = controller.source, controller.check
@@ -512,22 +525,40 @@ def _slow_timer(controller: _Controller) -> Clue | None:
     return None
 
 
-@hint_rule(ThresholdResponse, AnswersTogether, outcome=Outcome.NOT_MET, priority=13210)
+@hint_rule(*ANSWERS, outcome=Outcome.NOT_MET, priority=13210)
 def _callback_sleeps(case: Case) -> Clue | None:
     """The callback sleeps, and what comes meanwhile is answered late."""
     for late in _subscribers(case):
         for node in late.reached:
-            slept = number_at(late.source, node.args[0]) if isinstance(node, ast.Call) and node.args else None
+            slept = number_in_code(late.source, node.args[0]) if isinstance(node, ast.Call) and node.args else None
             if isinstance(node, ast.Call) and last_name(node.func) == "sleep" and (slept or 0) > _PROMPT_S:
                 hint = f"{late.source.code(node, 50)} holds up the callback: what comes meanwhile is answered late"
                 return Clue(f"{hint}; take it out", late.source.place(node), key="late_answer")
     return None
 
 
-@hint_rule(AnswersTogether, priority=13990)
+@hint_rule(TOGETHER, problem=ProblemKind.NEVER_CHANGES, priority=10220)
+def _never_crosses(case: Case) -> Clue | None:
+    """All drawn values are on one side of the controller's threshold."""
+    check = case.check
+    owners = [s for s in case.sources.values() if made_for(s, "publisher", check.input) is not None]
+    calls = draws(owners[0]) if len(owners) == 1 else []
+    if len(calls) != 1 or last_name(calls[0].func) not in ("uniform", "randint") or len(calls[0].args) != 2:
+        return None
+    limits = [number_in_code(owners[0], a) for a in calls[0].args]
+    known = [limit for limit in limits if limit is not None]
+    if len(known) < 2 or min(known) <= check.threshold < max(known):
+        return None
+    hint = f"{owners[0].code(calls[0])} stays on one side of {number(check.threshold)}"
+    asked = next((c for c in case.asked("random_in_range") if c.topic == check.input), None)
+    hint += f": the values go from {number(asked.low)} to {number(asked.high)}" if asked is not None else ""
+    return Clue(hint, owners[0].place(calls[0]), key="draw")
+
+
+@hint_rule(TOGETHER, priority=13990)
 def _follows(case: Case) -> Clue | None:
     """A criterion about one of the two nodes was lost already, and explains this one."""
-    check: AnswersTogether = case.check
+    check = case.check
     problem = case.verdict.problem
     if problem is None:
         return None
@@ -536,10 +567,10 @@ def _follows(case: Case) -> Clue | None:
     stopped = problem.kind is ProblemKind.STOPPED and check.input in problem.topics
     answered = problem.kind is ProblemKind.WRONG_ANSWER or (quiet and check.output in problem.topics)
     for id_, criterion in case.lost.items():
-        other = criterion.check
-        controller = isinstance(other, ThresholdResponse) and other.output == check.output
-        sensor = isinstance(other, RandomInRange) and other.topic == check.input
-        pace = isinstance(other, TopicRate) and other.topic == check.input
+        kind, other = criterion.check_name, cast("Any", criterion.check)
+        controller = kind == ALONE and other.output == check.output
+        sensor = kind == "random_in_range" and other.topic == check.input
+        pace = kind == "topic_rate" and other.topic == check.input
         if (controller and answered) or (sensor and fixed) or (pace and stopped):
             return Clue(same_as=id_)
     return None

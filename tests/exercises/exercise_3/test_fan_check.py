@@ -12,10 +12,10 @@ from tracing import FAN_VALUES, FLOAT32, Recording, held_at, scripted
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
-from grader.judging.checks.fan import ThresholdResponse
+from grader.rubrics.exercise_checks import known_checks
 
-ON = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "above", unit="°C")
-OFF = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "at_or_below", unit="°C")
+ON = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above", unit="°C")
+OFF = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "at_or_below", unit="°C")
 
 
 def both(rec: Recording) -> tuple[Finding, Finding]:

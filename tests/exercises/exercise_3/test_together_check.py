@@ -15,9 +15,9 @@ from nodes import right_speed, sensor, together
 from tracing import FLOAT32, FLOAT64, Recording
 
 from grader.core.trace import ClockKind
-from grader.judging.checks.together import AnswersTogether
+from grader.rubrics.exercise_checks import known_checks
 
-CHECK = AnswersTogether("/temperature", "/fan_speed", 25, 100, 0)
+CHECK = known_checks()["answers_together"]("/temperature", "/fan_speed", 25, 100, 0)
 
 
 def on_change(
