@@ -226,9 +226,7 @@ def by_name(workspace: Path, into: Path, programs: tuple[str, ...]) -> Found:
 def by_package_folder(workspace: Path, into: Path, programs: tuple[str, ...]) -> Found:
     """`grade observe PACKAGE_FOLDER` for each package."""
     made = {"build", "install"}
-    found = {
-        name: (path.parent for path in sorted(workspace.rglob(f"{name}/package.xml"))) for name in packages(programs)
-    }
+    found = [sorted(workspace.rglob(f"{name}/package.xml")) for name in packages(programs)]
     own = [[path.parent for path in paths if not made.intersection(path.parts)] for paths in found]
     return observed(tuple(folders[0] for folders in own if folders), into)
 
