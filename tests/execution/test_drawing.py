@@ -370,6 +370,8 @@ def test_what_leaves_nothing_open_is_planned_as_ever() -> None:
     exercise = read_rubric(Path(__file__).with_name("fixed_course.yaml"))
     kept = ("numbers", "recordings", "messages", "servers", "calls", "goals", "duration_ns", "starts_ns", "host_seed")
     plans = [to_json(plan("fixed", s, seed)) for s in exercise.scenarios for seed in (1, 2, 2**40)]
+    for numbers in (numbers for data in plans for numbers in data["numbers"]):
+        assert numbers.pop("field") == ""  # which is younger than the digest
     text = json.dumps([{name: data[name] for name in kept} for data in plans])
     assert hashlib.sha256(text.encode()).hexdigest() == PLANS
     assert tuple(map(scenario_digest, exercise.scenarios)) == SCENARIOS

@@ -18,7 +18,7 @@ from grader.reporting.json_report import dumps
 from grader.rubrics.loader import read_rubric
 
 ROOT = EXERCISES.parents[1]
-NAMES = sorted(path.name for path in EXERCISES.glob("*/"))
+NAMES = sorted(path.name for path in EXERCISES.glob("[!_]*/"))
 #: Graded in each run: one that plays a recording of its own, and one of two nodes.
 USUAL = ("exercise_2", "exercise_3")
 GRADE = (sys.executable, "-c", "from grader.cli.main import main; main()")
