@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Generator, Sequence
@@ -279,6 +280,7 @@ def test_only_the_changed_exercise_of_a_submission_runs(tmp_path: Path) -> None:
     for number in (1, 2):
         text = (RUBRICS / f"exercise_{number}" / "rubric.yaml").read_text(encoding="utf-8")
         (tmp_path / f"{number}.yaml").write_text(text, encoding="utf-8")
+    shutil.copytree(RUBRICS / "exercise_2" / "odometry", tmp_path / "odometry")
     (tmp_path / "in" / "ada").mkdir(parents=True)
     for path in (RUBRICS.parent / "reference_solutions").rglob("*.py"):
         (tmp_path / "in" / "ada" / path.name).write_bytes(path.read_bytes())
