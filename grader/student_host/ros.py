@@ -73,6 +73,11 @@ GRAPH_LOOKS = (
     *("get_service_names_and_types_by_node", "get_client_names_and_types_by_node"),
     *("get_publishers_info_by_topic", "get_subscriptions_info_by_topic"),
 )
+#: Those behind the functions of rclpy.action that list the actions of the graph.
+ACTION_LOOKS = (
+    *("get_action_names_and_types", "get_action_client_names_and_types_by_node"),
+    "get_action_server_names_and_types_by_node",
+)
 
 
 class RosClocks:
@@ -910,8 +915,9 @@ def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None
     _install_counts(clock, at_the_graph)
     looking(_rclpy.ActionClient, "is_action_server_available", at_the_graph)
     _note_found(ledger, _rclpy.ActionClient, "is_action_server_available")
-    for name in GRAPH_LOOKS:
-        looking(rclpy.node.Node, name, lambda: at_the_graph(whole=True))
+    for owner, names in ((rclpy.node.Node, GRAPH_LOOKS), (_rclpy.Node, ACTION_LOOKS)):
+        for name in names:
+            looking(owner, name, lambda: at_the_graph(whole=True))
 
 
 def _install_counts(clock: VirtualClock, before: Callable[[], None]) -> None:

@@ -62,7 +62,7 @@ ASSIGNED = {
 CPP = {
     "": (
         *("ActionClient", "ActionServer", "Clock", "ClockType", "EventHandle", "EventsExecutor", "InvalidHandle"),
-        *("LifecycleStateMachine", "RCLError"),
+        *("LifecycleStateMachine", "Node", "RCLError"),
         *(
             "SignalHandlerOptions",
             "WaitSet",
@@ -82,7 +82,10 @@ CPP = {
         *("clear_entities", "get_ready_entities", "is_ready", "wait"),
     ),
     "Timer": ("time_until_next_call",),
-    "Node": ("get_count_clients",),
+    "Node": (
+        *("get_action_client_names_and_types_by_node", "get_action_names_and_types"),
+        *("get_action_server_names_and_types_by_node", "get_count_clients"),
+    ),
     "Publisher": ("get_subscription_count", "get_topic_name"),
     "Subscription": ("get_publisher_count", "get_topic_name", "pointer", "take_message"),
     "EventHandle": ("__init__", "take_event"),
