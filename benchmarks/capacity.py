@@ -28,8 +28,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 
 import msgspec
@@ -121,7 +122,7 @@ def run(place: Path, graded: Path, rerun: str, *, similarity: bool, dask: bool) 
         given=read_given((shipped("student_template"),)) if similarity else None,
     )
     command = [sys.executable, __file__, "--serve", str(graded)]
-    with dask_scheduler(graded) if dask else local_scheduler(command) as make:
+    with dask_scheduler(graded) if dask else nullcontext(partial(LocalScheduler, command=command)) as make:
         started, before_s = time.perf_counter(), time.process_time()
         grade_class(course, Watcher(lambda _: None), lambda _: None, make)
         took_s, processor_s = time.perf_counter() - started, time.process_time() - before_s
@@ -129,12 +130,6 @@ def run(place: Path, graded: Path, rerun: str, *, similarity: bool, dask: bool) 
     sizes = [path.stat().st_size for path in results.rglob("*") if path.is_file()]
     mib, page_kib = sum(sizes) / 2**20, (results / "index.html").stat().st_size / 1024
     print(f"{took_s:>8.1f} {processor_s:>8.1f} {peak_mib:>9.0f} {mib:>12.0f} {len(sizes):>8} {page_kib:>9.0f}")
-
-
-@contextmanager
-def local_scheduler(command: list[str]) -> Iterator[MakeScheduler]:
-    """Yield what makes the scheduler of one machine, whose processes copy results."""
-    yield lambda jobs: LocalScheduler(jobs, command)
 
 
 @contextmanager
@@ -190,14 +185,10 @@ def copied(task: Task, graded: Path) -> ResultStatus:
     )
 
 
+@cache
 def wanted() -> tuple[str, ...]:
     """Return the names of the files that the exercises of the chapter ask for."""
-    if not _WANTED:
-        _WANTED.extend(wanted_files(read_exercises(GradeRequest(""))))
-    return tuple(_WANTED)
-
-
-_WANTED: list[str] = []
+    return tuple(wanted_files(read_exercises(GradeRequest(""))))
 
 
 if __name__ == "__main__":

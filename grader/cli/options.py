@@ -74,7 +74,6 @@ isolation_option = click.option(
 )
 
 
-#: Message definitions of a course.
 def _parse_recordings(ctx: click.Context, param: click.Parameter, value: Sequence[str]) -> tuple[tuple[str, Path], ...]:
     """Parse the values of `--recording TOPIC=BAG`; a click callback."""
     del ctx, param
@@ -111,6 +110,7 @@ def recording_options(command: Callable[..., int]) -> Callable[..., int]:
     return recording(odom_bag(called))
 
 
+#: Message definitions of a course.
 interfaces_option = click.option(
     "--interfaces",
     type=PATH,

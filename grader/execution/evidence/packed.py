@@ -79,16 +79,19 @@ class Fields(Mapping[str, Any]):
 _MANY_OPENINGS = 500
 
 
+def _openings(text: bytes) -> int:
+    return text.count(b"[") + text.count(b"{")
+
+
 def fields_of(text: msgspec.Raw) -> Mapping[str, Any]:
     """Decode the fields of a JSON object.
 
     Raises MsgspecError if the text is not an object, and RecursionError if it is nested too deeply.
     """
-    plain = bytes(text)
-    if len(plain) > _MANY_OPENINGS and plain.count(b"[") + plain.count(b"{") > _MANY_OPENINGS:
+    if len(text) > _MANY_OPENINGS and _openings(bytes(text)) > _MANY_OPENINGS:
         _lively(fields := _decode(text))
         return fields
-    lazy = _SHORTEST < len(text) <= _LONGEST and plain[0] == _OPENING
+    lazy = _SHORTEST < len(text) <= _LONGEST and memoryview(text)[0] == _OPENING
     return Fields(text) if lazy else _decode(text)
 
 
