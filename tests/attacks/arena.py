@@ -68,6 +68,7 @@ class Arena:
 
     def __init__(self, tier: str) -> None:
         self.tier = tier
+        self.patience_s = 60.0  # how long processes may take to be ended, on a busy machine
         self.secret = f"canary-{secrets.token_hex(16)}"
         self.mark = f"mark-{secrets.token_hex(8)}"
         self._stack = contextlib.ExitStack()
@@ -204,7 +205,7 @@ class Arena:
 
     def processes_left(self) -> list[str]:
         """Return the command lines of processes that nobody waits for any more; they get a moment to be ended."""
-        deadline = time.monotonic() + 60.0
+        deadline = time.monotonic() + self.patience_s
         while processes := self._orphans():
             if time.monotonic() > deadline:
                 for pid in processes:

@@ -144,6 +144,7 @@ def test_a_process_whose_parent_is_gone_is_noticed_and_ended(arena: Arena) -> No
     """It has become a child of whoever watches, and does not survive the look."""
     sleep = [sys.executable, "-I", "-S", "-c", "import time; time.sleep(99)", arena.mark]
     subprocess.run([sys.executable, "-I", "-c", f"import subprocess; subprocess.Popen({sleep!r})"], check=True)
+    arena.patience_s = 1.0  # this one is ended by nobody else
     (found,) = texts(arena)
     assert found.startswith("processes were left")
     assert texts(arena) == []
