@@ -169,7 +169,9 @@ class Discovery:
     def match(self, now_ns: int) -> None:
         """Wait until the graph shows exactly the endpoints that exist, and all of them are matched."""
         claims = self._claims()
-        if not self.patience.wait(lambda: self._holds(now_ns, claims), pause_s=GRAPH_PAUSE_S):
+        # What a process that is about to leave has removed already, it tells when it goes on.
+        staying = [c for s in self._staying() for c in s.claims]
+        if not self.patience.wait(lambda: self._holds(now_ns, staying), pause_s=GRAPH_PAUSE_S):
             self._recorder.note("an endpoint that a node created was not seen in the graph")
         if not self._departures.wait(lambda: not self._surplus(now_ns, claims), pause_s=GRAPH_PAUSE_S):
             self._strangers = self._strangers + self._surplus(now_ns, claims)
@@ -240,6 +242,9 @@ class Discovery:
         """Note that a process ended without leaving the graph, so its endpoints stay there for a while."""
         self._strangers += Counter(map(_key, student.claims))
 
+    def _staying(self) -> list[NodeProcess]:
+        return [s for s in self._students if not (s.ended or s.leaving)]
+
     def _claims(self) -> list[dict[str, Any]]:
         return [c for s in self._students if not s.ended for c in s.claims]
 
@@ -282,14 +287,14 @@ class Discovery:
         """Return whether the graph shows everything that the processes claim."""
         wanted = _wanted(claims)
         self._known |= wanted.keys()
-        names = self._nodes()
+        names = {c["name"] for c in claims if c["kind"] == "node"}
         if not names <= {*self._observer.students_nodes(names)}:
             return False  # before anything that takes longer to query: this is asked most often
         graph = self._graph_at(now_ns)
         found = self._found(graph)
         offered = {(e.kind, e.service, e.type) for e in graph.services}
         # The end of an action outlives its node, and is then in the list of none.
-        nodes = [s.claims for s in self._students if not s.ended and any(c["kind"] == "node" for c in s.claims)]
+        nodes = [s.claims for s in self._staying() if any(c["kind"] == "node" for c in s.claims)]
         exchanging = {
             (c["kind"], c["name"], c["type"]) for own in nodes for c in own if c["kind"] in ("service", "client")
         }

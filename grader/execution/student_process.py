@@ -82,6 +82,7 @@ class NodeProcess:
         sees_graph: Whether its program queries the graph, as it reports.
         offers: The services, clients and parameters that it has reported.
         nudged: Whether it has to run again at this instant, because its endpoints were matched.
+        leaving: Whether it waits until what it has sent has arrived, before it tells which endpoints it removes.
         ended: Whether it has ended.
         limits: Its limits.
         workload: Measures the cost of its steps; None until its program starts.
@@ -119,6 +120,7 @@ class NodeProcess:
     sees_graph: bool = False
     offers: set[tuple[str, str, str]] = field(default_factory=set)
     nudged: bool = False
+    leaving: bool = False
     ended: bool = False
     workload: Workload | None = None
     most_bytes: int = 0

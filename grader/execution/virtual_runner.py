@@ -214,6 +214,7 @@ class VirtualRunner(Runner):
                 self._report_fault(student, report, self._now_ns)
                 continue
             workload.end(report, self._now_ns - began_ns)
+            student.leaving = report.get("leaving") is True
             self._account(student, report)
             if kind == "exited":
                 student.unsettled = str(report.get("unsettled", ""))
@@ -222,7 +223,7 @@ class VirtualRunner(Runner):
                 if report.get("left"):
                     self._discovery.await_departure(self._now_ns)
                 return
-            if report.get("leaving"):
+            if student.leaving:
                 self._hand_over()
             wake_ns = report.get("wake_ns")
             student.wake_ns = wake_ns - self._plan.epoch_ns if isinstance(wake_ns, int) else None

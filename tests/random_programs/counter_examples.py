@@ -34,6 +34,14 @@ def alone(node: Node, spinning: Spinning = Spinning.SPIN) -> Program:
     return Program((Process((node,), spinning),), 2000)
 
 
+def raising(number: int, spinning: Spinning) -> Process:
+    """Return a process that answers each message of both processes, and raises at the fifth answer."""
+    timer = Timer(f"t{number}0", 50, (Publish("b", Fixed(0)),))
+    answers = Subscription(f"s{number}1", "b", 2, (Publish("d", Fixed(7)), Publish("d", Heard())))
+    raises = Subscription(f"s{number}0", "d", 10, (Say(Heard()), Every(5, (End(Ending.RAISE),))))
+    return Process((Node(f"n{number}", 1, (timer,), (raises, answers)),), spinning)
+
+
 COUNTER_EXAMPLES: dict[str, Program] = {
     # The grader was not told how late it was, and recorded the end at the last time that it knew.
     "leaves_at_once_after_saying_nothing": alone(
@@ -91,4 +99,6 @@ COUNTER_EXAMPLES: dict[str, Program] = {
         ),
         2000,
     ),
+    # Both end at one instant: what the second had removed was waited for, while it was about to leave.
+    "two_processes_that_end_at_one_instant": Program((raising(0, Spinning.SPIN), raising(1, Spinning.EXECUTOR)), 2000),
 }

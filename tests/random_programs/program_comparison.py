@@ -121,18 +121,10 @@ def _shown(entries: Sequence[tuple[int, str]]) -> str:
     return "; ".join(f"{t / NS_PER_MS:g} ms {text}" for t, text in entries) or "nothing"
 
 
-#: The note about an endpoint that the graph does not show.
-GONE = "an endpoint that a node created was not seen in the graph"
-
-
 def differences_of(program: Program, trace: Trace) -> list[str]:
     """Return how a recording in virtual time differs from the model of its program."""
-    model = expected_of(program)
-    expected, did = told_by_model(model), told_by_trace(trace)
-    ends = [at_ns for at_ns, _ in model.ends.values()]
-    # Of two processes that end at one instant, the endpoints of the second may be gone when the first is missed.
-    told = [each for each in problems(trace) if each != GONE or len(set(ends)) == len(ends)]
-    return [*told, *differences(by_source(expected, program), by_source(did, program))]
+    expected, did = told_by_model(expected_of(program)), told_by_trace(trace)
+    return [*problems(trace), *differences(by_source(expected, program), by_source(did, program))]
 
 
 def compared(session: RecordingSession, program: Program, folder: Path) -> list[str]:
