@@ -353,6 +353,8 @@ class Discovery:
             count = self._counterparts(claim, claims)
             if count:
                 expected.setdefault(claim["kind"], {}).setdefault(claim["name"], []).append(count)
+            elif claim["kind"] == "client" and (heard := self._hearing(claim, claims)):
+                expected.setdefault("heard", {})[claim["name"]] = [heard]
             number = claim.get("number", 0)
             if refused := self._refused.get((student.name, number)):
                 expected.setdefault("refused", {})[str(number)] = [len(refused)]
@@ -395,6 +397,10 @@ class Discovery:
             return 0
         graders = self._services.serves(name, claim["type"]) and answers({}, claim)
         return int(graders or any(serves(c, name, claim["type"]) and answers(c, claim) for c in claims))
+
+    def _hearing(self, client: dict[str, Any], claims: list[dict[str, Any]]) -> int:
+        """Count the servers that get the requests of a client, although it may not get their responses."""
+        return sum(serves(c, client["name"], client["type"]) and passes(client, c) for c in claims)
 
     def look(self, now_ns: int) -> None:
         """Record the graph if it has changed."""

@@ -361,7 +361,8 @@ class Ledger:
 
         Args:
             expected: Kind of endpoint -> name -> numbers of counterparts, one for each endpoint that has any. Under
-                `refused`, for the number of an endpoint, how many counterparts its QoS has not fitted so far.
+                `refused`, for the number of an endpoint, how many counterparts its QoS has not fitted so far. Under
+                `heard`, for a service, how many servers get the requests of a client that they cannot answer.
             wait_s: Time-out in seconds.
         """
         matched = originals.wait_until(lambda: not self._unmatched(expected), wait_s)
@@ -422,6 +423,11 @@ class Ledger:
         missing = []
         if "graph" in expected and self._graph() not in (None, expected["graph"]):
             missing.append("graph")
+        missing += [
+            f"client {service}"
+            for service, (count,) in expected.get("heard", {}).items()
+            if (servers := self._servers_of(service)) is not None and servers < count
+        ]
         for kind, names in expected.items():
             found: dict[str, list[float]] = {}
             for endpoint in self.alive(kind) if kind in self._endpoints else ():
@@ -465,6 +471,14 @@ class Ledger:
             return None
         with node.handle:
             return int(node.handle.get_count_clients(service))
+
+    def _servers_of(self, service: str) -> int | None:
+        """Return how many receivers of a service's requests this process sees; None without a node to ask."""
+        node = self._node()
+        if node is None:
+            return None
+        with node.handle:
+            return len(_rclpy.rclpy_get_subscriptions_info_by_topic(node.handle, f"rq{service}Request", True))  # noqa: FBT003 - C++
 
     def _node(self) -> Any:
         """Return the newest node that can query the graph, or None."""

@@ -68,6 +68,7 @@ CPP = {
             "WaitSet",
             "get_current_signal_handlers_options",
             "rclpy_get_service_names_and_types",
+            "rclpy_get_subscriptions_info_by_topic",
         ),
         *(
             "rclpy_get_topic_names_and_types",
