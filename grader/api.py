@@ -127,9 +127,9 @@ if TYPE_CHECKING:
     from grader.judging.facts import LogFacts as LogFacts
     from grader.judging.facts import LogPaceFacts as LogPaceFacts
     from grader.judging.facts import OtherEnd as OtherEnd
-    from grader.judging.facts import PositionFacts as PositionFacts
     from grader.judging.facts import RateFacts as RateFacts
     from grader.judging.facts import SeriesFacts as SeriesFacts
+    from grader.judging.facts import WrongLogFacts as WrongLogFacts
     from grader.judging.findings import FAULT_KEY as FAULT_KEY
     from grader.judging.findings import explain_fault as explain_fault
     from grader.judging.findings import explain_no_client as explain_no_client
@@ -253,7 +253,7 @@ CONTENTS: dict[str, dict[str, str]] = {
             "Maker NO_SOURCE"
         ),
         "grader.judging.facts": (
-            "RateFacts SeriesFacts DrawFacts AnswerRow AnswerFacts LogFacts PositionFacts LogPaceFacts OtherEnd"
+            "RateFacts SeriesFacts DrawFacts AnswerRow AnswerFacts LogFacts WrongLogFacts LogPaceFacts OtherEnd"
         ),
     },
     "Source code": {

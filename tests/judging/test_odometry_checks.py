@@ -10,7 +10,8 @@ from tracing import driving, position_logs
 from grader.core.errors import HarnessError
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, FaultKind, Trace
-from grader.judging.checks.odometry import LogPeriod, WaitsGracefully
+from grader.judging.checks.odometry import LogPeriod
+from grader.judging.checks.waiting import WaitsGracefully
 
 PERIOD = LogPeriod("odom_subscriber.py", "/odom", NS_PER_S)
 WAITS = WaitsGracefully("odom_subscriber.py", "/odom", 5 * NS_PER_S)
@@ -108,7 +109,7 @@ def test_no_fault_is_graceful(kind: FaultKind) -> None:
 def test_silence_after_the_data_came_leaves_the_question_open() -> None:
     """Alive, but without a sign that it works: the position criterion names the mistake."""
     finding = WAITS.judge(driving().log(0.0, "started").trace())
-    assert finding.blocked_by == "logs_position"
+    assert finding.blocked_by == "/odom"
     assert "no sign that the data arrived" in finding.reason
 
 
@@ -127,7 +128,7 @@ def test_waiting_that_goes_on_as_before_is_no_sign_of_data() -> None:
         rec.log(float(t), "waiting for odometry", process="odom_subscriber.py")
     finding = WAITS.judge(rec.trace())
     assert finding.credit == 0
-    assert finding.blocked_by == "logs_position"
+    assert finding.blocked_by == "/odom"
 
 
 def test_a_text_that_was_not_there_before_is_a_sign_of_data() -> None:

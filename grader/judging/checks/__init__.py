@@ -7,7 +7,7 @@ from grader.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange
 from grader.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
 from grader.judging.checks.heard import LogsResponse, LogsTexts
 from grader.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
-from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
+from grader.judging.checks.odometry import LogPeriod, LogsPosition
 from grader.judging.checks.programs import (
     CleanShutdown,
     NoFault,
@@ -27,6 +27,7 @@ from grader.judging.checks.services import (
 )
 from grader.judging.checks.timing import Latency, Period, Reaction, Silence
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes, Transform
+from grader.judging.checks.waiting import WaitsGracefully
 
 #: Name in a rubric -> check class; the fields of the class are the parameters.
 CHECKS: dict[str, type] = {

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import ClassVar
 
-from grader.core.chart import Band, Case, Chart, Look, Panel, Point, Series, Tone
+from grader.core.chart import Band, Chart, Look, Panel, Point, Series, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.exercise import Finding, Problem, ProblemKind, Roles
 from grader.core.quantities import NS_PER_S, DurationNs, counted, seconds, within
 from grader.core.trace import Fault, Trace
 from grader.judging.charts import gaps_panel, series, time_chart
-from grader.judging.checks.logs import complained
-from grader.judging.facts import LogPaceFacts, PositionFacts
+from grader.judging.facts import LogPaceFacts, WrongLogFacts
 from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, only_printed
 from grader.judging.logs.outputs import printed_lines, student_records, written
-from grader.judging.plots import Drawing, Plot
 from grader.judging.position_causes import cause_of
 from grader.judging.position_logs import (
     Analysis,
@@ -40,7 +38,6 @@ _LONGEST_GAP = 2.2
 #: Minimum share of messages with a log for the logs to count as one per message.
 _ONE_A_MESSAGE = 0.8
 _MOST_IN_EVIDENCE = 60
-_DIGIT = re.compile(r"\d")
 
 
 def _track(trace: Trace, process: str, topic: str) -> Track | Finding:
@@ -71,6 +68,7 @@ class LogsPosition:
         topic: Topic of the odometry.
     """
 
+    roles: ClassVar[Roles] = Roles(logs=("topic",))
     process: str
     topic: str
 
@@ -106,7 +104,7 @@ class LogsPosition:
         if fault is not None and fault.t_ns < track.times_ns[0]:
             return _ended_early(fault)
         cause = cause_of(found, track)
-        evidence, facts = _evidence(found) | {"cause": cause.name}, PositionFacts(cause.name, len(found.right))
+        evidence, facts = _evidence(found) | {"cause": cause.name}, WrongLogFacts(cause.name, len(found.right), (X, Y))
         if fault is not None and cause.name in ("no_pair", "few"):
             return faulted(fault, cause.sentence if found.right else "no position was logged before it", evidence)
         if not found.groups and not any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process)):
@@ -184,7 +182,8 @@ class LogPeriod:
         times = [t for t in self.log_times(trace, track) if track.start_ns <= t < track.stop_ns]
         if not times:
             reason = f"{self.process}: nothing with a number was logged while {self.topic} was played"
-            return not_met(reason, blocked_by="logs_position", problem=ProblemKind.NOT_LOGGED)
+            none = LogPaceFacts(0, 0.0, seconds(self.period))
+            return not_met(reason, blocked_by="logs_position", problem=ProblemKind.NOT_LOGGED, facts=none)
         average_ns = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 0.0
         evidence = {
             "logs": len(times),
@@ -193,7 +192,7 @@ class LogPeriod:
             "stream_s": [seconds(track.start_ns), seconds(track.stop_ns)],
         }
         found = self._judged(trace, track, times, average_ns, evidence)
-        return replace(found, facts=LogPaceFacts(len(times), average_ns / 1e9))
+        return replace(found, facts=LogPaceFacts(len(times), average_ns / 1e9, seconds(self.period)))
 
     def _judged(
         self, trace: Trace, track: Track, times: Sequence[int], average_ns: float, evidence: dict[str, object]
@@ -267,71 +266,6 @@ class LogPeriod:
             Panel("logs", "", (dots,), lanes=("log",), grid=(seconds(times[0]), period_s)),
             gaps_panel("log", times, bands=(Band(period_s - share, period_s + share, label),)),
         )
-
-
-@dataclass(frozen=True, slots=True)
-class WaitsGracefully:
-    """A process survives a silence on a topic without an exception or ERROR record, and works once data arrives.
-
-    Attributes:
-        process: File name of the student process.
-        topic: Topic that is silent at first.
-        silence: Minimum duration of the silence in the recording.
-    """
-
-    process: str
-    topic: str
-    silence: DurationNs
-
-    @property
-    def expected(self) -> str:
-        silence = number(seconds(self.silence))
-        return f"{self.process} lives through {silence} s without {self.topic}, without an error, and works afterwards"
-
-    def judge(self, trace: Trace) -> Finding:
-        fault = first_fault(trace, self.process)
-        if fault is not None:
-            return self._faulted(trace, fault)
-        bad = [r for r in student_records(trace, self.process) if r.severity in ("ERROR", "FATAL")]
-        if bad:
-            more = {"first_s": seconds(bad[0].t_ns), "first": quote(bad[0].text)}
-            return complained(
-                self.process, bad, "", more, "waiting for data is not an error: log nothing, or use info or warn"
-            )
-        deliveries = trace.deliveries(self.topic)
-        if not deliveries or deliveries[0].t_ns < self.silence:
-            raise HarnessError(
-                f"{self.topic}: the recording has no silence of {span(self.silence)} before the first message"
-            )
-        return self._works(trace, deliveries[0].t_ns)
-
-    def _faulted(self, trace: Trace, fault: Fault) -> Finding:
-        deliveries = trace.deliveries(self.topic)
-        early = not deliveries or fault.t_ns < deliveries[0].t_ns
-        when = f"while nothing was published on {self.topic}" if early else f"after messages arrived on {self.topic}"
-        hint = fault_hint(fault)
-        if fault.said("NoneType"):
-            hint = "start with None and return early until a message has arrived"
-        return not_met(f"{fault_sentence(fault)}, {when}", {"fault_s": seconds(fault.t_ns)}, hint=hint, fault=fault)
-
-    def drawing(self, trace: Trace) -> Drawing:
-        """Return what came after the silence, with what the process wrote all the time."""
-        came = trace.deliveries(self.topic)
-        first_s = seconds(min(came[0].t_ns if came else trace.stop_ns, trace.stop_ns))
-        cases = (Case(0.0, first_s, f"nothing on {self.topic}"),)
-        return Drawing((Plot(self.topic, most=1),), processes=(self.process,), cases=cases)
-
-    def _works(self, trace: Trace, first_ns: int) -> Finding:
-        outputs = written(trace, self.process)
-        before = {o.text for o in outputs if o.t_ns < first_ns and not _DIGIT.search(o.text)}
-        # a text without a number that was also written before the data is about waiting, not about the data
-        after = min((o.t_ns for o in outputs if o.t_ns >= first_ns and o.text not in before), default=None)
-        alive = f"{self.process}: alive through {span(first_ns)} without a message"
-        if after is None:
-            reason = f"{alive}, but no sign that the data arrived"
-            return not_met(reason, blocked_by="logs_position", problem=ProblemKind.NOT_LOGGED)
-        evidence = {"silence_s": seconds(first_ns), "first_output_s": seconds(after)}
-        return met(f"{alive}, first output with data at {moment(after)}", evidence)
 
 
 #: A logged pair farther away than this many path sizes is mentioned, not drawn: it would shrink the path to a dot.

@@ -17,7 +17,7 @@ from grader.judging.diagnosis.wiring import (
     roots,
     runs,
 )
-from grader.judging.facts import PositionFacts
+from grader.judging.facts import WrongLogFacts
 from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
 
 _POSITION = "msg.pose.pose.position"
@@ -42,7 +42,7 @@ def _position_rule(*causes: str, priority: int) -> Maker[Case]:
 
 def _cause(case: Case) -> str:
     """Return the cause that the check found; empty if it found none."""
-    facts = case.found(PositionFacts)
+    facts = case.found(WrongLogFacts)
     return "" if facts is None else facts.cause
 
 
@@ -217,7 +217,7 @@ def _scaled_position(case: Case) -> Clue | None:
 def _old_messages(case: Case) -> Clue | None:
     """A callback that sleeps lags behind the messages, and so does a loop that handles one at a time and sleeps."""
     source = case.source
-    facts = case.found(PositionFacts)
+    facts = case.found(WrongLogFacts)
     oldest = _oldest_taken(source) if _cause(case) == "stale" else None
     if oldest is not None:
         return oldest
