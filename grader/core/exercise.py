@@ -62,7 +62,7 @@ class Problem:
 
     kind: ProblemKind
     topics: tuple[str, ...] = ()  # the topics concerned, if a check looks at several
-    # What tells problems of this kind apart, e.g. `swapped` for wrong positions; empty if nothing does
+    # What tells problems of this kind apart, e.g. `swapped` for values in the wrong order; empty if nothing does
     detail: str = ""
     # The number that a count starts at; None for problems of other kinds; not shown in reports
     start: int | None = None

@@ -7,7 +7,6 @@ from grader.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange
 from grader.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
 from grader.judging.checks.heard import LogsResponse, LogsTexts
 from grader.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
-from grader.judging.checks.odometry import LogPeriod, LogsPosition
 from grader.judging.checks.programs import (
     CleanShutdown,
     NoFault,
@@ -36,8 +35,6 @@ CHECKS: dict[str, type] = {
     "field_values": FieldValues,
     "uses_logger": UsesLogger,
     "subscribes": Subscribes,
-    "logs_position": LogsPosition,
-    "log_period": LogPeriod,
     "waits_gracefully": WaitsGracefully,
     "random_in_range": RandomInRange,
     "logs_received": LogsReceived,

@@ -1,24 +1,33 @@
-"""Causes of wrong position logs: another attribute, or an assignment that mixes up values."""
+"""Hint rules of exercise 2: why the logged positions are wrong."""
 
 from __future__ import annotations
 
 import ast
 
-from grader.core.exercise import Outcome
-from grader.judging.checks.odometry import LogsPosition
-from grader.judging.diagnosis.rules import Case, Clue, Maker, hint_rule, log_call
-from grader.judging.diagnosis.wiring import (
+from grader.api import (
+    Case,
+    Clue,
+    Maker,
+    Outcome,
+    Source,
+    WrongLogFacts,
+    argument,
+    chain,
+    first_line,
+    hint_rule,
     is_flag,
+    last_name,
+    log_call,
     made,
     message_classes,
     names_in,
     number_in_code,
+    parameters,
     reached,
     roots,
     runs,
+    subtree,
 )
-from grader.judging.facts import WrongLogFacts
-from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
 
 _POSITION = "msg.pose.pose.position"
 #: Cause found by the check -> parts of the message that may have been read instead of the position.
@@ -37,7 +46,7 @@ def _position_rule(*causes: str, priority: int) -> Maker[Case]:
     def found(case: Case) -> Case | None:
         return case if _cause(case) in causes else None
 
-    return hint_rule(LogsPosition, outcome=Outcome.NOT_MET, given=found, priority=priority)
+    return hint_rule("logs_position", outcome=Outcome.NOT_MET, given=found, priority=priority)
 
 
 def _cause(case: Case) -> str:
