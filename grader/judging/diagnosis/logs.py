@@ -65,7 +65,7 @@ def _unseen(case: Case) -> bool:
         return not student_records(case.trace, case.process) and not printed_lines(case.trace, case.process)
     wrong, logged = case.found(WrongLogFacts), case.found(LogFacts)
     if wrong is not None:
-        return wrong.cause in ("nothing", "no_pair") and wrong.right == 0
+        return wrong.absent
     return logged is not None and logged.expected == logged.missing
 
 
