@@ -243,8 +243,9 @@ class Finding:
 class Roles:
     """What the parameters of a check are, by their names; a name that the check does not have is ignored.
 
-    A parameter with one of the usual names, which are the defaults here, needs no declaration. `hears` and `speaks`
-    have no usual name: a check that declares them lets the general hint rules explain a silent or unheard topic.
+    A parameter with one of the usual names, which are the defaults here, needs no declaration. The last four have no
+    usual name: a check that declares them lets the general hint rules explain a topic that is silent or that nobody
+    subscribes to, and a service that nobody offers or calls.
     """
 
     topics: tuple[str, ...] = ("input", "topic", "output", "forward", "back", "publishes", "subscribes")
@@ -255,6 +256,8 @@ class Roles:
     type: str = "type"  # the type of the topic
     hears: tuple[str, ...] = ()  # topics to which a node of the student's has to subscribe
     speaks: tuple[str, ...] = ()  # topics on which the check itself misses messages of the student's nodes
+    serves: tuple[str, ...] = ()  # services that a node of the student's has to offer
+    calls: tuple[str, ...] = ()  # services that a node of the student's has to call
 
 
 #: The value of `drawing` of a check whose picture is the graph of nodes and topics.

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from grader.core.chart import Band, Case, Level, Look, Panel, Point, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, Pattern, counted, seconds
 from grader.core.trace import OutputLine, Trace
 from grader.judging.charts import Lanes, gaps_panel, series
@@ -65,6 +65,7 @@ class CallsOfClient:
             example}`.
     """
 
+    roles: ClassVar[Roles] = Roles(calls=("service",))
     service: str
     calls: int
     at_most: int | None = None
@@ -161,6 +162,7 @@ class WaitsForService:
         within: Longest time from the server's appearance to the first request.
     """
 
+    roles: ClassVar[Roles] = Roles(calls=("service",))
     process: str
     service: str
     within: DurationNs = 5 * NS_PER_S
@@ -276,6 +278,7 @@ class ReactsToResponses:
             out.
     """
 
+    roles: ClassVar[Roles] = Roles(calls=("service",))
     process: str
     service: str
     threshold: float
@@ -412,6 +415,7 @@ class NoGoWithoutAnswer:
             out.
     """
 
+    roles: ClassVar[Roles] = Roles(calls=("service",))
     process: str
     service: str
     threshold: float

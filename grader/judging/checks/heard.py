@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, counted, seconds
 from grader.core.trace import Trace
 from grader.judging.checks.logs import LOGGER_HINT
@@ -82,6 +82,7 @@ class LogsResponse:
         within: Longest time from a response to its log record.
     """
 
+    roles: ClassVar[Roles] = Roles(calls=("service",))
     process: str
     service: str
     field: Annotated[str, FieldOf("service", "_Response")]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby, pairwise
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from grader.core.chart import Look, Panel, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import (
     NS_PER_S,
     DurationNs,
@@ -44,6 +44,7 @@ class ServiceAvailable:
         type: Service type, e.g. `std_srvs/srv/Trigger`.
     """
 
+    roles: ClassVar[Roles] = Roles(serves=("service",))
     service: str
     type: ServiceType
 
@@ -73,6 +74,7 @@ class ServiceAnswersAll:
         at_least: Number of requests needed for a judgement.
     """
 
+    roles: ClassVar[Roles] = Roles(serves=("service",))
     service: str
     within: DurationNs = NS_PER_S
     at_least: int = 1
@@ -131,6 +133,7 @@ class ServiceResponse(FewSuffice):
         at_least: Number of responses needed for a judgement.
     """
 
+    roles: ClassVar[Roles] = Roles(serves=("service",))
     service: str
     fields: Annotated[Mapping[str, RuleOrValue], FieldOf("service", "_Response")]
     at_least: int = 1
@@ -204,6 +207,7 @@ class ServiceFunction(FewSuffice):
         at_least: Number of responses needed for a judgement.
     """
 
+    roles: ClassVar[Roles] = Roles(serves=("service",))
     service: str
     field: Annotated[str, FieldOf("service", "_Response")]
     formula: Annotated[FieldFormula, FieldOf("service", "_Request", formula=True)]
@@ -286,6 +290,7 @@ class ServiceSequence(FewSuffice):
         at_least: Number of responses needed for a judgement.
     """
 
+    roles: ClassVar[Roles] = Roles(serves=("service",))
     service: str
     first: float
     step: float
