@@ -73,9 +73,13 @@ if TYPE_CHECKING:
     from grader.core.trace import ServiceEnd as ServiceEnd
     from grader.core.trace import Trace as Trace
     from grader.core.trace import unmet_policy as unmet_policy
+    from grader.judging.charts import Lanes as Lanes
+    from grader.judging.charts import compared_panel as compared_panel
+    from grader.judging.charts import drawn_case as drawn_case
     from grader.judging.charts import gaps_panel as gaps_panel
     from grader.judging.charts import series as series
     from grader.judging.charts import time_chart as time_chart
+    from grader.judging.checks.services import too_few_responses as too_few_responses
     from grader.judging.diagnosis.rules import NO_SOURCE as NO_SOURCE
     from grader.judging.diagnosis.rules import Case as Case
     from grader.judging.diagnosis.rules import Clue as Clue
@@ -145,7 +149,9 @@ if TYPE_CHECKING:
     from grader.judging.findings import only_printed as only_printed
     from grader.judging.findings import partly as partly
     from grader.judging.findings import waiting_for as waiting_for
+    from grader.judging.logs.outputs import number_told as number_told
     from grader.judging.logs.outputs import printed_lines as printed_lines
+    from grader.judging.logs.outputs import shape_of as shape_of
     from grader.judging.logs.outputs import student_records as student_records
     from grader.judging.logs.outputs import written as written
     from grader.judging.plots import Drawing as Drawing
@@ -219,6 +225,7 @@ CONTENTS: dict[str, dict[str, str]] = {
             "met partly not_met only_printed waiting_for explain_fault faulted first_fault fault_sentence "
             "explain_no_message explain_no_subscription explain_no_server explain_no_client fault_hint FAULT_KEY"
         ),
+        "grader.judging.checks.services": "too_few_responses",
     },
     "Parameters": {
         "grader.core.quantities": (
@@ -234,7 +241,7 @@ CONTENTS: dict[str, dict[str, str]] = {
             "Reading Held published delivered published_numbers delivered_numbers held value_at number_at "
             "student_endpoints as_number carries_number heard_from_ns last_of_instant EXACT JITTER_NS"
         ),
-        "grader.judging.logs.outputs": "student_records printed_lines written",
+        "grader.judging.logs.outputs": "student_records printed_lines written shape_of number_told",
         "grader.judging.series": "lag_ns steps_behind",
         "grader.judging.service_calls": "Call calls_of",
     },
@@ -245,7 +252,7 @@ CONTENTS: dict[str, dict[str, str]] = {
     "Charts": {
         "grader.judging.plots": "Drawing Plot threshold_drawing",
         "grader.core.chart": "Chart Panel Series Point Band Level Look Tone",
-        "grader.judging.charts": "series time_chart gaps_panel",
+        "grader.judging.charts": "series time_chart gaps_panel compared_panel drawn_case Lanes",
     },
     "Hint rules": {
         "grader.judging.diagnosis.rules": (

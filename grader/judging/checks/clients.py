@@ -7,14 +7,14 @@ from dataclasses import field
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal
 
-from grader.core.chart import Band, Case, Level, Look, Panel, Point, Tone
+from grader.core.chart import Band, Level, Look, Panel, Point, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, Pattern, counted, seconds
 from grader.core.trace import OutputLine, Trace
-from grader.judging.charts import Lanes, gaps_panel, series
-from grader.judging.checks.logs import LOGGER_HINT, complained
+from grader.judging.charts import Lanes, drawn_case, gaps_panel, series
+from grader.judging.checks.logs import complained
 from grader.judging.findings import (
     explain_fault,
     explain_no_client,
@@ -187,8 +187,8 @@ class WaitsForService:
     def drawing(self, trace: Trace) -> Drawing:
         """Return the calls with what the client wrote, and the time without a server."""
         starts = trace.marks("server_starts", self.service)
-        until_s = seconds(min(starts[0].t_ns if starts else trace.stop_ns, trace.stop_ns))
-        cases = (Case(0.0, until_s, f"{self.service} is not there"),)
+        until_ns = min(starts[0].t_ns if starts else trace.stop_ns, trace.stop_ns)
+        cases = (drawn_case(0, until_ns, f"{self.service} is not there"),)
         panels = []
         if not calls_of(trace, self.service, "student"):
             lanes = Lanes()
@@ -242,7 +242,7 @@ class WaitsForService:
                 f"{waited}; {counted(len(records), 'record')} meanwhile: {quote(records[-1].text, 80)}", evidence
             )
         if lines:
-            return only_printed(f"{waited}; that it waits is printed, not logged", evidence, LOGGER_HINT)
+            return only_printed(f"{waited}; that it waits is printed, not logged", evidence)
         return not_met(
             f"{waited}, but logs nothing while it waits", evidence, hint=_WAIT_HINT, problem=ProblemKind.NOT_LOGGED
         )
@@ -310,7 +310,7 @@ class ReactsToResponses:
         if not student_records(trace, self.process) or all(e.kind is CallKind.LOW for e, _ in wrong):
             printed = self._by_printing(mine, episodes)
             if printed:
-                return only_printed(f"{self.process}: {printed}", evidence, LOGGER_HINT)
+                return only_printed(f"{self.process}: {printed}", evidence)
         return self._explain(trace, wrong, evidence)
 
     def drawing(self, trace: Trace) -> Drawing:
@@ -351,7 +351,7 @@ class ReactsToResponses:
         telling = [words.telling(e) for e in mine if e.kind is CallKind.GOOD]
         printed = any(told and all(isinstance(o, OutputLine) for o in told) for told in telling)
         if printed or not student_records(trace, self.process):
-            return only_printed(f"{reason}, printed and not logged", evidence, LOGGER_HINT)
+            return only_printed(f"{reason}, printed and not logged", evidence)
         return met(reason, evidence)
 
     def _by_printing(self, mine: Sequence[Episode], episodes: Sequence[Episode]) -> str:
@@ -509,7 +509,7 @@ def _episodes_drawing(check: ReactsToResponses | NoGoWithoutAnswer, trace: Trace
         said, tone = _CASES[e.kind]
         label = f"{said} {limit}" if e.kind in (CallKind.GOOD, CallKind.LOW) else said
         stop_ns = min([e.stop_ns, *(m.t_ns for m in trace.marks("exited", check.process) if m.t_ns >= e.start_ns)])
-        cases.append(Case(seconds(e.asked_ns), seconds(stop_ns), label, tone))
+        cases.append(drawn_case(e.asked_ns, stop_ns, label, tone))
         if e.number is not None:
             points.setdefault((f"number, {label}", tone), []).append((seconds(e.start_ns), e.number))
     level = Level(check.threshold, limit, name="threshold")

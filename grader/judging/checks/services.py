@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby, pairwise
 from typing import Annotated, ClassVar
 
-from grader.core.chart import Look, Panel, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind, Roles
@@ -23,14 +22,14 @@ from grader.core.quantities import (
     within,
 )
 from grader.core.trace import Response, Trace
-from grader.judging.charts import expected_series, series
+from grader.judging.charts import compared_panel
 from grader.judging.findings import explain_fault, explain_no_server, first_fault, met, not_met, waiting_for
 from grader.judging.logs.outputs import number_in
 from grader.judging.plots import Drawing
 from grader.judging.series import curve
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of
-from grader.judging.values import FewSuffice, Reading, RuleOrValue, breach, broken_rules, number_at, rules_text, text_at
-from grader.judging.wording import listed, moment, number, numbers, quote, span
+from grader.judging.values import FewSuffice, RuleOrValue, breach, broken_rules, number_at, rules_text, text_at
+from grader.judging.wording import moment, number, numbers, quote, span
 
 _RETURN_HINT = "a service callback takes (self, request, response) and ends with return response"
 
@@ -429,13 +428,6 @@ def _answers_drawing(check: ServiceFunction | ServiceSequence, answers: Sequence
     """Return the calls, and the number in each response with the expected one."""
     if not answers:
         return Drawing(services=(check.service,))
-    rows = [expected_series([Reading(a.response.t_ns, a.wanted) for a in answers])]
-    read = [(a, a.got) for a in answers if a.got is not None]
-    wrong = len(answers) - len(read)
-    for name, tone, right in (("right", Tone.GOOD, True), ("wrong", Tone.BAD, False)):
-        some = [(seconds(a.response.t_ns), got) for a, got in read if within(got, a.wanted, check.tolerance) is right]
-        rows += [series(name, some, look=Look.DOTS, tone=tone)] if some else []
-        wrong += 0 if right else len(some)
-    said = f"Numbers in the responses: {listed([number(got) for _, got in read], 6)}; {wrong} of {len(answers)} wrong."
-    panel = Panel(f"{check.field} of the response", "", tuple(rows))
-    return Drawing(services=(check.service,), panels=((panel, said),))
+    compared = [(a.response.t_ns, a.got, a.wanted) for a in answers]
+    panel = compared_panel(f"{check.field} of the response", compared, check.tolerance, "the responses")
+    return Drawing(services=(check.service,), panels=(panel,))
