@@ -74,7 +74,7 @@ if TYPE_CHECKING:
     from grader.core.trace import Trace as Trace
     from grader.core.trace import unmet_policy as unmet_policy
     from grader.judging.charts import Lanes as Lanes
-    from grader.judging.charts import compared_panel as compared_panel
+    from grader.judging.charts import compared_panels as compared_panels
     from grader.judging.charts import drawn_case as drawn_case
     from grader.judging.charts import gaps_panel as gaps_panel
     from grader.judging.charts import series as series
@@ -252,7 +252,7 @@ CONTENTS: dict[str, dict[str, str]] = {
     "Charts": {
         "grader.judging.plots": "Drawing Plot threshold_drawing",
         "grader.core.chart": "Chart Panel Series Point Band Level Look Tone",
-        "grader.judging.charts": "series time_chart gaps_panel compared_panel drawn_case Lanes",
+        "grader.judging.charts": "series time_chart gaps_panel compared_panels drawn_case Lanes",
     },
     "Hint rules": {
         "grader.judging.diagnosis.rules": (

@@ -69,17 +69,19 @@ def expected_series(values: Sequence[Reading], look: Look = Look.STEP) -> Series
     return series("expected", points_of(values), look=look, tone=Tone.FAINT)
 
 
-def compared_panel(
+def compared_panels(
     title: str, compared: Sequence[tuple[int, float | None, float]], tolerance: float, where: str
-) -> tuple[Panel, str]:
-    """Return a panel with numbers beside the expected ones, and a sentence about it.
+) -> tuple[tuple[Panel, str], ...]:
+    """Return a panel with numbers beside the expected ones, for `Drawing.panels`; none without numbers.
 
     Args:
         title: Title of the vertical axis.
-        compared: For each number its time in nanoseconds, the number or None, and the expected one; at least one.
+        compared: For each number its time in nanoseconds, the number or None, and the expected one.
         tolerance: Largest difference of a right one.
         where: What the numbers are in, for the sentence.
     """
+    if not compared:
+        return ()
     rows = [expected_series([Reading(t_ns, wanted) for t_ns, _, wanted in compared])]
     read = [(t_ns, got, within(got, wanted, tolerance)) for t_ns, got, wanted in compared if got is not None]
     for name, tone, right in (("right", Tone.GOOD, True), ("wrong", Tone.BAD, False)):
@@ -87,7 +89,7 @@ def compared_panel(
         rows += [series(name, some, look=Look.DOTS, tone=tone)] if some else []
     wrong = len(compared) - sum(fits for *_, fits in read)
     said = f"Numbers in {where}: {listed([number(got) for _, got, _ in read], 6)}; {wrong} of {len(compared)} wrong."
-    return Panel(title, "", tuple(rows)), said
+    return ((Panel(title, "", tuple(rows)), said),)
 
 
 def drawn_case(start_ns: int, stop_ns: int, label: str, tone: Tone = Tone.FAINT) -> Case:

@@ -5,15 +5,12 @@ from __future__ import annotations
 import ast
 
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Outcome, ProblemKind, named, roles_of
-from grader.core.trace import LogRecord
-from grader.judging.checks.clients import ReactsToResponses
+from grader.core.exercise import ProblemKind, named, roles_of
 from grader.judging.diagnosis.names import SPINS
 from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
 from grader.judging.diagnosis.wiring import (
     elsewhere_because,
     goes_to,
-    is_log,
     made,
     reached,
     roots,
@@ -23,9 +20,8 @@ from grader.judging.diagnosis.wiring import (
     text_in_code,
 )
 from grader.judging.facts import OtherEnd
-from grader.judging.service_calls import CallKind, ResponseReader, episodes_of
 from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, parameters, text_of
-from grader.judging.wording import number, quote
+from grader.judging.wording import quote
 
 _THREADS = {"Thread", "start_new_thread", "ThreadPoolExecutor"}
 #: What waits for a future, or asks whether it is done.
@@ -303,58 +299,3 @@ def _another_response(case: Case) -> Clue | None:
                 hint = f"{source.code(new[0])} sends a new, empty response: write return {name}, which is filled in"
                 return Clue(hint, source.place(new[0]))
     return None
-
-
-@hint_rule(ReactsToResponses, outcome=Outcome.NOT_MET, priority=3140)
-def _wrong_level(case: Case) -> Clue | None:
-    """One side logs at the level of the other, or at a level that is not shown."""
-    check: ReactsToResponses = case.check
-    good, low = _after(case, CallKind.GOOD), _after(case, CallKind.LOW)
-    if check.side == "above" and good and low and all(a.warned for a in good + low):
-        lines = set.intersection(*(a.lines("WARN") for a in good)) - set().union(*(a.lines("WARN") for a in low))
-        return _level_clue(case, lines, f"use info above {number(check.threshold)}")
-    if check.side == "at_or_below" and good and low and not any(a.warned for a in good + low):
-        lines = set.intersection(*(a.lines("INFO") for a in low)) - set().union(*(a.lines("INFO") for a in good))
-        return _level_clue(case, lines, "use warning") or _unseen_level(case, "warning")
-    return _unseen_level(case, "info") if check.side == "above" and not any(a.warned for a in good) else None
-
-
-def _level_clue(case: Case, lines: set[int], advice: str) -> Clue | None:
-    calls = [c for line in sorted(lines) for c in case.source.on_line(line, ast.Call) if is_log(case.source, c)]
-    if len(calls) != 1:
-        return None
-    hint = f"{case.source.code(calls[0], 60)} has the wrong level, {last_name(calls[0].func)}: {advice}"
-    return Clue(hint, case.source.place(calls[0]))
-
-
-def _unseen_level(case: Case, level: str) -> Clue | None:
-    """Return the only log of level DEBUG, which nobody sees."""
-    hidden = [c for c in case.source.calls("debug") if is_log(case.source, c)]
-    if len(hidden) != 1 or any(case.source.calls("set_level", "set_logger_level")):
-        return None
-    hint = f"{case.source.code(hidden[0], 60)} is not shown: the level is INFO unless it is changed; use {level}"
-    return Clue(hint, case.source.place(hidden[0]))
-
-
-@dataclass(frozen=True, slots=True)
-class _Reaction:
-    """What a client logged between a response and its next request."""
-
-    records: tuple[LogRecord, ...]
-
-    @property
-    def warned(self) -> bool:
-        return any(r.severity in ("WARN", "ERROR", "FATAL") for r in self.records)
-
-    def lines(self, severity: str) -> set[int]:
-        return {r.line for r in self.records if r.severity == severity}
-
-
-def _after(case: Case, kind: CallKind) -> list[_Reaction]:
-    """Return the reactions to the responses of a kind."""
-    check: ReactsToResponses = case.check
-    success = "" if check.success == "none" else check.success
-    reading = ResponseReader(check.field, success, check.pattern, check.threshold)
-    episodes = episodes_of(case.trace, check.process, check.service, reading)
-    mine = (e for e in episodes if e.kind is kind)
-    return [_Reaction(tuple(o for o in e.sure if isinstance(o, LogRecord))) for e in mine]
