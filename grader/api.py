@@ -73,9 +73,13 @@ if TYPE_CHECKING:
     from grader.core.trace import ServiceEnd as ServiceEnd
     from grader.core.trace import Trace as Trace
     from grader.core.trace import unmet_policy as unmet_policy
+    from grader.judging.charts import Lanes as Lanes
+    from grader.judging.charts import compared_panels as compared_panels
+    from grader.judging.charts import drawn_case as drawn_case
     from grader.judging.charts import gaps_panel as gaps_panel
     from grader.judging.charts import series as series
     from grader.judging.charts import time_chart as time_chart
+    from grader.judging.checks.services import too_few_responses as too_few_responses
     from grader.judging.diagnosis.rules import NO_SOURCE as NO_SOURCE
     from grader.judging.diagnosis.rules import Case as Case
     from grader.judging.diagnosis.rules import Clue as Clue
@@ -146,7 +150,9 @@ if TYPE_CHECKING:
     from grader.judging.findings import partly as partly
     from grader.judging.findings import waiting_for as waiting_for
     from grader.judging.logs.matching import chance as chance
+    from grader.judging.logs.outputs import number_told as number_told
     from grader.judging.logs.outputs import printed_lines as printed_lines
+    from grader.judging.logs.outputs import shape_of as shape_of
     from grader.judging.logs.outputs import student_records as student_records
     from grader.judging.logs.outputs import written as written
     from grader.judging.plots import Drawing as Drawing
@@ -227,6 +233,7 @@ CONTENTS: dict[str, dict[str, str]] = {
             "met partly not_met only_printed waiting_for explain_fault faulted first_fault fault_sentence "
             "explain_no_message explain_no_subscription explain_no_server explain_no_client fault_hint FAULT_KEY"
         ),
+        "grader.judging.checks.services": "too_few_responses",
     },
     "Parameters": {
         "grader.core.quantities": (
@@ -243,7 +250,7 @@ CONTENTS: dict[str, dict[str, str]] = {
             "student_endpoints as_number carries_number heard_from_ns last_of_instant per_trace EXACT "
             "JITTER_NS"
         ),
-        "grader.judging.logs.outputs": "student_records printed_lines written",
+        "grader.judging.logs.outputs": "student_records printed_lines written shape_of number_told",
         "grader.judging.texts": "Printed printed_numbers clean with_decimal_points segments template_of",
         "grader.judging.logs.matching": "chance",
         "grader.judging.series": "lag_ns steps_behind",
@@ -256,7 +263,7 @@ CONTENTS: dict[str, dict[str, str]] = {
     "Charts": {
         "grader.judging.plots": "Drawing Plot threshold_drawing",
         "grader.core.chart": "Chart Panel Series Point Band Level Look Tone",
-        "grader.judging.charts": "series time_chart gaps_panel",
+        "grader.judging.charts": "series time_chart gaps_panel compared_panels drawn_case Lanes",
     },
     "Hint rules": {
         "grader.judging.diagnosis.rules": (

@@ -244,9 +244,10 @@ class Finding:
 class Roles:
     """What the parameters of a check are, by their names; a name that the check does not have is ignored.
 
-    A parameter with one of the usual names, which are the defaults here, needs no declaration. `hears` and `speaks`
-    have no usual name: a check that declares them lets the general hint rules explain a silent or unheard topic. With
-    `logs`, the general rules explain missing logs, and criteria that need a sign of the data wait for this one.
+    A parameter with one of the usual names, which are the defaults here, needs no declaration. The last five have no
+    usual name: a check that declares them lets the general hint rules explain a topic that is silent or that nobody
+    subscribes to, missing logs, and a service that nobody offers or calls. Criteria that need a sign of the data wait
+    for one that declares `logs`.
     """
 
     topics: tuple[str, ...] = ("input", "topic", "output", "forward", "back", "publishes", "subscribes")
@@ -258,6 +259,8 @@ class Roles:
     hears: tuple[str, ...] = ()  # topics to which a node of the student's has to subscribe
     speaks: tuple[str, ...] = ()  # topics on which the check itself misses messages of the student's nodes
     logs: tuple[str, ...] = ()  # topics of which the process has to log what arrives
+    serves: tuple[str, ...] = ()  # services that a node of the student's has to offer
+    calls: tuple[str, ...] = ()  # services that a node of the student's has to call
 
 
 #: The value of `drawing` of a check whose picture is the graph of nodes and topics.

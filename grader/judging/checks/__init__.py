@@ -1,7 +1,7 @@
 """The general checks that rubrics can use; CHECKS lists all of them."""
 
 from grader.judging.checks.actions import ActionFeedback, ActionResult, LifecycleStates
-from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
+from grader.judging.checks.clients import CallsOfClient, WaitsForService
 from grader.judging.checks.closed_loop import ReachesGoal, StaysInRange
 from grader.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange, FieldMonotone, RandomInRange
 from grader.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
@@ -22,7 +22,6 @@ from grader.judging.checks.services import (
     ServiceAvailable,
     ServiceFunction,
     ServiceResponse,
-    ServiceSequence,
 )
 from grader.judging.checks.timing import Latency, Period, Reaction, Silence
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes, Transform
@@ -48,11 +47,8 @@ CHECKS: dict[str, type] = {
     "service_answers_all": ServiceAnswersAll,
     "service_response": ServiceResponse,
     "service_function": ServiceFunction,
-    "service_sequence": ServiceSequence,
     "service_calls": CallsOfClient,
     "waits_for_service": WaitsForService,
-    "reacts_to_responses": ReactsToResponses,
-    "no_go_without_answer": NoGoWithoutAnswer,
     "reaction": Reaction,
     "period": Period,
     "latency": Latency,
