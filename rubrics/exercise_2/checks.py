@@ -112,7 +112,7 @@ class LogsPosition:
         topic: Topic of the odometry.
     """
 
-    roles: ClassVar[Roles] = Roles(logs=("topic",))
+    roles: ClassVar[Roles] = Roles(logs=("topic",), given=("topic",))
     process: str
     topic: str
 
@@ -210,6 +210,7 @@ class LogPeriod:
         tolerance: Largest difference of the average, as a share of the period; the edge is inside.
     """
 
+    roles: ClassVar[Roles] = Roles(given=("topic",))
     process: str
     topic: str
     period: DurationNs

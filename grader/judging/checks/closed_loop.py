@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import DurationNs, FieldNumber, FieldOf, Topic, counted, seconds
 from grader.core.trace import Delivery, Trace
 from grader.judging.findings import explain_fault, faulted, first_fault, met, not_met
@@ -52,6 +52,7 @@ class ReachesGoal:
         stays: Whether it must not leave again.
     """
 
+    roles: ClassVar[Roles] = Roles(given=("topic", "goals"))
     topic: Topic
     goals: Topic
     fields: Annotated[Mapping[str, str], FieldOf("topic", values="goals")]
@@ -144,6 +145,7 @@ class StaysInRange:
         after: Messages before this time are not judged.
     """
 
+    roles: ClassVar[Roles] = Roles(given=("topic",))
     topic: Topic
     field: Annotated[str, FieldOf("topic")]
     low: FieldNumber | None = None
