@@ -183,9 +183,9 @@ def never_asked(trace: Trace, service: str) -> Finding:
     """
     if not trace.service_ends("service", service):
         return waiting_for("service_available", explain_no_server(trace, service))
-    if crashed := explain_fault(trace, f"{service} could not be asked"):
+    if crashed := explain_fault(trace, f"{service} could not be called"):
         return crashed
-    raise HarnessError(f"{service}: nothing was asked of it, or too late to be answered")
+    raise HarnessError(f"{service}: it was not called, or too late for a response")
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,9 +299,9 @@ class ServiceSequence(FewSuffice):
     @property
     def expected(self) -> str:
         text = (
-            f"{self.field} of {self.service} tells {number(self.first)} first, then {number(self.step)} more each time"
+            f"{self.field} of {self.service} is {number(self.first)} first and changes by {number(self.step)} each time"
         )
-        again = "" if self.reset_to is None else f"; {number(self.reset_to)} instead of a number beyond it"
+        again = "" if self.reset_to is None else f"; a number beyond it becomes {number(self.reset_to)}"
         return text + (f", not beyond {number(self.floor)}{again}" if self.floor is not None else "")
 
     def judge(self, trace: Trace) -> Finding:
