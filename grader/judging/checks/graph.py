@@ -22,8 +22,8 @@ class BidirectionalGraph:
     """At one moment, the live graph connects two processes by two topics, one in each direction, with matching types.
 
     Attributes:
-        forward: Topic that the first process publishes and the second subscribes to, e.g. `/temperature`.
-        back: Topic of the other direction, e.g. `/fan_speed`.
+        forward: Topic that the first process publishes and the second subscribes to, e.g. `/ping`.
+        back: Topic of the other direction, e.g. `/pong`.
     """
 
     drawing: ClassVar[str] = NODE_GRAPH
