@@ -78,7 +78,7 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
         evidence: Plain JSON values behind it.
         hint: One thing to do.
         fault: The fault that explains it; it becomes the location and part of the evidence.
-        blocked_by: Criterion id, or name of a check in the same scenario, that must be met first.
+        blocked_by: The criterion that must be met first: its id, its check, or a topic whose logs it judges.
         problem: The problem, where a check tells several apart; a fault needs none.
         brief: The reason in a few words, if it is long; for a fault, its own text unless given.
         facts: A record for hint rules.

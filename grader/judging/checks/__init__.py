@@ -7,7 +7,6 @@ from grader.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange
 from grader.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
 from grader.judging.checks.heard import LogsResponse, LogsTexts
 from grader.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
-from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.programs import (
     CleanShutdown,
     NoFault,
@@ -26,6 +25,7 @@ from grader.judging.checks.services import (
 )
 from grader.judging.checks.timing import Latency, Period, Reaction, Silence
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes, Transform
+from grader.judging.checks.waiting import WaitsGracefully
 
 #: Name in a rubric -> check class; the fields of the class are the parameters.
 CHECKS: dict[str, type] = {
@@ -34,8 +34,6 @@ CHECKS: dict[str, type] = {
     "field_values": FieldValues,
     "uses_logger": UsesLogger,
     "subscribes": Subscribes,
-    "logs_position": LogsPosition,
-    "log_period": LogPeriod,
     "waits_gracefully": WaitsGracefully,
     "random_in_range": RandomInRange,
     "logs_received": LogsReceived,
