@@ -73,7 +73,7 @@ def test_a_message_without_a_listener_counts_if_the_rubric_says_so(
     """The note is there in either case, and a program with a timer gets none."""
     found, text = graded(tmp_path, rubric, program)
     assert found == points
-    assert ("on a real system nobody would have heard it" in text) == noted
+    assert ("on a real system no subscription would have heard it" in text) == noted
     assert ("nobody can have discovered it by then" in text) == (points == 0)
 
 

@@ -344,7 +344,7 @@ def test_a_fault_has_the_hint_of_the_report(tmp_path: Path, clock: str) -> None:
     """In the text and in JSON; the traceback shows the program's own lines."""
     summary = seen(tmp_path, clock, node=TALKER.format(sent='"hello"', given=""))
     text, told = render_summary(summary), json.loads(summary_to_json(summary))
-    hint = "this publisher sends String objects, not str: make one, set its fields and publish it"
+    hint = "this publisher sends String objects, not str: create one, set its fields and publish it"
     assert f"    hint: {hint}\n" in text
     assert [fault["hint"] for fault in told["faults"]] == [hint]
     shown = [line for line in text.splitlines() if "stderr: " in line]

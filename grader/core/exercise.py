@@ -246,8 +246,8 @@ class Roles:
 
     A parameter with one of the usual names, which are the defaults here, needs no declaration. The last five have no
     usual name: a check that declares them lets the general hint rules explain a topic that is silent or that nobody
-    subscribes to, logs that are missing, and a service that nobody offers or calls. Criteria that need a sign of the
-    data wait for a check with `logs`.
+    subscribes to, missing logs, and a service that nobody offers or calls. Criteria that need a sign of the data wait
+    for one that declares `logs`.
     """
 
     topics: tuple[str, ...] = ("input", "topic", "output", "forward", "back", "publishes", "subscribes")

@@ -343,9 +343,9 @@ def _ends(virtual: _Window, wall: _Window) -> Iterator[Difference]:
     for process in sorted({f.process for w in (virtual, wall) for f in w.trace.faults()}):
         one, other = (_first(window, process) for window in (virtual, wall))
         if one is not None and one.t_ns < virtual.stop_ns - EDGE_NS and other is None:
-            yield Difference(Aspect.END, process, "failed", "went on")
+            yield Difference(Aspect.END, process, "failed", "kept running")
         elif other is not None and other.t_ns < wall.stop_ns and not faults_before_stop(virtual.trace, process):
-            yield Difference(Aspect.END, process, "went on", "failed")
+            yield Difference(Aspect.END, process, "kept running", "failed")
 
 
 def _first(window: _Window, process: str) -> Fault | None:

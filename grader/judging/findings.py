@@ -227,7 +227,7 @@ _WORDINGS = {
         "subscribe to {name} with {type}",
     ),
     "service": _of_service("server", "offers", "offer"),
-    "client": _of_service("client", "asks", "ask"),
+    "client": _of_service("client", "calls", "call"),
 }
 
 
@@ -306,7 +306,7 @@ def _too_early(messages: list[Message], topic: str, type_: str | None) -> Findin
     some = "the only message was" if len(early) == 1 else f"all {len(early)} messages were"
     reason = f"{moment(early[0].t_ns)}, {topic}: {some} sent as soon as the publisher was created"
     evidence = {"topic": topic, "type": early[0].type, "messages": 0, "before_discovery": len(early)}
-    reason += ": nobody can have discovered it by then"
+    reason += ", before any subscription could discover it"
     return not_met(reason, evidence, hint=SEND_LATER, problem=ProblemKind.TOO_EARLY)
 
 

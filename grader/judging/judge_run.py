@@ -156,8 +156,8 @@ def _unheard(topic: str, early: int, messages: int) -> str:
     which = ("all" if early > 1 else "the only") if early == messages else "the first"
     what, it = ("messages were", "them") if early > 1 else ("message was", "it")
     return (
-        f"{topic}: {which} {what} published as soon as the publisher was created; on a real system nobody would have "
-        f"heard {it}, because discovery takes a moment: {SEND_LATER}"
+        f"{topic}: {which} {what} published as soon as the publisher was created; on a real system no subscription "
+        f"would have received {it}, because discovery takes a moment: {SEND_LATER}"
     )
 
 

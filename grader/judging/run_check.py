@@ -30,7 +30,7 @@ _ORDINARY_WAIT, _LONGEST_WAIT, _SPEEDS = 0.03, 0.5, 8
 _FEWEST_GAPS = 5
 
 #: What to do about a launch file that the grader can only run in part.
-_LEFT_OUT_HINT = "look at this criterion by hand, or leave that out of the launch file and grade again"
+_LEFT_OUT_HINT = "grade this criterion by hand, or remove that from the launch file and grade again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ def run_check(
         if any(finding is not None and finding.credit > answer.finding.credit for finding in faster):
             waited = f"{span(trace.most_starved_ns)} of {span(trace.stop_ns)}"
             return Answer(
-                problem=f"the machine was too busy: the nodes waited {waited} for a processor, which can be why"
+                problem=f"the machine was too busy: the nodes waited {waited} for a processor, which may be the reason"
             )
         at_once = trace.once("first at once", lambda: _with_first_at_once(trace))
         finding = None if at_once is None else _judged(criterion, scenario, at_once, sources).finding
@@ -129,7 +129,7 @@ def _for_older_python(answer: Answer, scenario: Scenario, trace: Trace) -> Answe
     if lack is None:
         return answer
     fault = next((f for f in trace.faults(lack.process) if (f.file, f.line) == (lack.file, lack.line)), None)
-    hint = f"grade again on Python {_version(lack.python)}, or write it as Python {_version(lack.here)} knows it"
+    hint = f"grade again on Python {_version(lack.python)}, or write it for Python {_version(lack.here)}"
     return Answer(problem=lack.sentence, hint=hint, fault=fault)
 
 
@@ -143,7 +143,7 @@ def _for_what_is_lacking(
     lost = answer.finding is not None and answer.finding.credit < 1
     excuse = next(excuses(criterion.check, trace), "") if lost else ""
     if excuse:
-        problem = f"{excuse}, which can be why this is not met"
+        problem = f"{excuse}, which may be the reason why this is not met"
         return Answer(problem=problem, hint=_LEFT_OUT_HINT, suspected=True)
     lack = lacking_package(trace, scenario.processes, sources) if lost else None
     if lack is None:

@@ -169,7 +169,7 @@ _MOST_DECIMALS = 5
 _COUNT_HINT = "count the messages: n grows by 1 with each"
 _FIRST_HINT = "publish first and count afterwards: the first message is n = 0"
 _PACE_HINT = "compare the factor of n with the one in the task"
-_RADIAN_HINT = "sine and cosine take radians here: convert nothing"
+_RADIAN_HINT = "sine and cosine take radians: do not convert the angle"
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,7 +232,7 @@ def _ways(wanted: Curve) -> Iterator[tuple[Instead, _Wanted]]:
     for repeats in _REPEATS:
         yield Instead(f"each value is published {repeats} times", _COUNT_HINT), partial(_at, wanted, repeats=repeats)
     if wanted.mistaken is not None:
-        hint = "sine and cosine are taken for each other"
+        hint = "sine and cosine are swapped"
         yield Instead(f"the values follow {wanted.mistaken.text}", hint), partial(_at, wanted.mistaken)
     for decimals in range(_MOST_DECIMALS + 1):
         clause = f"the values are rounded to {counted(decimals, 'decimal')}"
@@ -250,7 +250,7 @@ def _scaled(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Inste
         return None
     clause = f"each value is {number(factor)} times the one expected"
     if math.isclose(factor, -1.0, rel_tol=1e-6):
-        return Instead(clause, "the sign is the wrong way round")
+        return Instead(clause, "the sign is inverted")
     if any(math.isclose(factor, f, rel_tol=1e-3) for f in (_DEGREES, 1 / _DEGREES)):
         return Instead(clause, "that is the factor between degrees and radians: publish the value unconverted")
     return Instead(clause)

@@ -222,12 +222,12 @@ class ThresholdResponse:
             return faulted(fault, reason, evidence, last=True)
         both = {a.value for a in every if a.t_ns == first.t_ns and first.got is not None}
         if len(both) > 1:
-            cause = f"; {' and '.join(map(number, sorted(both)))} are published at one instant"
+            cause = f"; {' and '.join(map(number, sorted(both)))} are published at the same time"
             hint = f"publish one answer to each number on {self.input}"
             return not_met(reason + cause, evidence, hint=hint, problem=ProblemKind.CONTRADICTION, brief=brief)
         lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
         if lag is not None:
-            reason += f"; the answers are right for what was published {span(lag)} before"
+            reason += f"; the answers match what was published {span(lag)} earlier"
             hint = f"answer the newest message on {self.input}"
             known = evidence | {"lag_s": seconds(lag)}
             return not_met(reason, known, hint=hint, problem=ProblemKind.BEHIND, brief=brief)
@@ -250,7 +250,7 @@ class ThresholdResponse:
         low = all(v.got is not None and within(v.got, self.otherwise, EXACT) for v in violations)
         near = self.side == "above" and low and all(0 < v - self.threshold <= 1 for v in mistaken)
         if near and any(h.value > self.threshold + 1 for h in inputs):
-            return "", f"every value above {limit} counts, however little: compare it as it is, without rounding"
+            return "", f"a value just above {limit} counts too: compare it without rounding"
         return "", rule
 
     def _logic(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> str:
@@ -393,7 +393,7 @@ class AnswersTogether:
     def expected(self) -> str:
         limit = f"{number(self.threshold)}{in_unit(self.unit)}"
         answers = f"{number(self.above)} above {limit}, {number(self.otherwise)} otherwise"
-        return f"every {self.input} of the one node answered by the other on {self.output}: {answers}"
+        return f"every {self.input} message of one node answered by the other on {self.output}: {answers}"
 
     def judge(self, trace: Trace) -> Finding:
         sent, answered = published(trace, self.input), published(trace, self.output)
@@ -456,7 +456,7 @@ class AnswersTogether:
             if any(within(one.value, self._expected(r.value), EXACT) for r in recent):
                 continue
             both = " and ".join(map(number, sorted((one.value, following.value))))
-            reason = f"{moment(one.t_ns)}, {self.output}: {both} at one instant for {number(recent[-1].value)}"
+            reason = f"{moment(one.t_ns)}, {self.output}: {both} at the same time for {number(recent[-1].value)}"
             reason += f"{in_unit(self.unit)} on {self.input}, expected {number(self._expected(recent[-1].value))} only"
             hint = f"publish one answer to each number on {self.input}"
             known = evidence | {"first_wrong_s": seconds(one.t_ns)}
@@ -542,7 +542,7 @@ class AnswersTogether:
 
     def _stopped(self, trace: Trace, topic: str, last_ns: int, evidence: dict[str, int]) -> Finding:
         fault = next((f for f in trace.faults() if f.t_ns <= trace.stop_ns), None)
-        reason = f"{topic}: nothing after {moment(last_ns)}, expected to go on to {span(trace.stop_ns)}"
+        reason = f"{topic}: no message after {moment(last_ns)}, expected messages until {span(trace.stop_ns)}"
         known, problem = evidence | {"last_s": seconds(last_ns)}, Problem(ProblemKind.STOPPED, (topic,))
         if fault is None:
             return not_met(reason, known, problem=problem)
@@ -556,7 +556,7 @@ class AnswersTogether:
         fixed = Problem(ProblemKind.NEVER_CHANGES, (self.input, self.output))
         if len({r.value for r in inputs}) == 1:
             reason = f"{self.output}: never changes, because {self.input} is {number(inputs[0].value)}"
-            return not_met(f"{reason}{in_unit(self.unit)} all the time", evidence, problem=fixed)
+            return not_met(f"{reason}{in_unit(self.unit)} throughout", evidence, problem=fixed)
         if len(set(expected)) == 1 and _stays(inputs):
             low, high = min(r.value for r in inputs), max(r.value for r in inputs)
             reason = f"{self.output}: never changes, because {self.input} stays between {number(low)} and "
@@ -575,7 +575,7 @@ class AnswersTogether:
         reason = (
             f"{self.output}: {counted(len(answers), 'answer')} to {counted(len(inputs), 'value')} on {self.input}, "
         )
-        return met(f"{reason}all right; the answer changed {counted(evidence['answer_changes'], 'time')}", evidence)
+        return met(f"{reason}all correct; the answer changed {counted(evidence['answer_changes'], 'time')}", evidence)
 
     def drawing(self, trace: Trace) -> Drawing:
         """Return the messages between the student's two nodes, with the threshold and the expected answers."""

@@ -146,7 +146,7 @@ def _stored_late(late: _Subscriber) -> Clue | None:
             stores = [s for s in source.stores(name) if source.function_of(s) is source.function_of(test)]
             if len(stores) == 1 and first_line(stores[0]) > first_line(test):
                 stored = source.code(source.parents.get(stores[0], stores[0]), 40)
-                hint = f"{source.code(test, 40)} is asked before '{stored}': it sees the value that came before"
+                hint = f"{source.code(test, 40)} is checked before '{stored}', so it sees the previous value"
                 return Clue(hint, source.place(test), key="late_answer")
     return None
 
@@ -159,7 +159,7 @@ def _oldest_compared(late: _Subscriber) -> Clue | None:
         for node in subtree(test):
             first = isinstance(node, ast.Subscript) and number_in_code(source, node.slice) == 0
             if isinstance(node, ast.Subscript) and first and _grows(source, node.value):
-                hint = f"{source.code(node, 40)} is the oldest of the values that are kept: compare the newest"
+                hint = f"{source.code(node, 40)} is the oldest stored value: compare the newest"
                 return Clue(hint, source.place(test), key="late_answer")
     return None
 
@@ -178,7 +178,7 @@ def _put_off(late: _Subscriber) -> Clue | None:
         if isinstance(node, ast.Call) and name in ("Timer", "create_timer", "sleep", "call_later"):
             worth = number_in_code(source, node.args[0] if node.args else None)
             if worth is not None and worth > _PROMPT_S:
-                hint = f"{source.code(node, 50)} puts the answer off by {number(worth)} s: answer at once"
+                hint = f"{source.code(node, 50)} delays the answer by {number(worth)} s: answer immediately"
                 return Clue(hint, source.place(node), key="late_answer")
     return None
 
@@ -193,7 +193,7 @@ def _compared_as_text(case: Case) -> Clue | None:
         if not is_number or not isinstance(test.ops[0], _ORDERS):
             continue
         limit = number(case.check.threshold)
-        hint = f"{source.code(test, 50)} compares texts, letter by letter: compare the number itself with {limit}"
+        hint = f"{source.code(test, 50)} compares strings, not numbers: compare the number itself with {limit}"
         return Clue(hint, source.place(test), key="as_text")
     return None
 
@@ -206,7 +206,7 @@ def _compared_mean(case: Case) -> Clue | None:
             counted = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div) and _sum_by_count(node)
             averaged = isinstance(node, ast.Call) and last_name(node.func) in _MEANS
             if (counted or averaged) and text_of(node) is None:
-                hint = f"{source.code(node, 50)} is made of several values: compare the newest alone"
+                hint = f"{source.code(node, 50)} combines several values: compare only the newest"
                 return Clue(hint, source.place(test), key="of_many")
     return None
 
@@ -307,8 +307,8 @@ def _other_threshold(controller: _Controller) -> Clue | None:
         return None
     hint = f"{source.code(others[0].node, 40)} compares with {number(others[0].limit.value)}: the limit is "
     if _switches(source, check.threshold):
-        hint = f"{source.code(others[0].node, 40)} leaves the old answer between {number(lower)} and {number(upper)}: "
-        hint += "the one limit is "
+        hint = f"{source.code(others[0].node, 40)} keeps the old answer between {number(lower)} and {number(upper)}: "
+        hint += "the only limit is "
     return Clue(f"{hint}{number(check.threshold)}", source.place(others[0].limit.origin), key="other_threshold")
 
 
@@ -393,7 +393,7 @@ def _sends_what_came(controller: _Controller) -> Clue | None:
         own = [s for s in source.all(ast.Assign) if isinstance(s.value, ast.Call) and chain(s.targets[0])]
         answers = [chain(s.targets[0]) for s in own if source.function_of(s) is source.function_of(call)]
         right = f": publish {answers[0]}" if len(answers) == 1 else ": publish the answer"
-        return Clue(f"{source.code(call)} sends back what came{right}", source.place(call))
+        return Clue(f"{source.code(call)} sends back the input{right}", source.place(call))
     return None
 
 
@@ -431,9 +431,7 @@ def _answered_once(controller: _Controller) -> Clue | None:
             function = source.function_of(call)
             stores = [s for name in names for s in source.stores(name) if source.function_of(s) is function]
             if stores and function is not None and is_flag(test.test):
-                hint = (
-                    f"'if {source.code(test.test, 40)}' lets one answer through: answer each message on {check.input}"
-                )
+                hint = f"'if {source.code(test.test, 40)}' allows only one answer: answer each message on {check.input}"
                 return Clue(hint, source.place(test), key="answered_once")
     return None
 
@@ -451,7 +449,7 @@ def _sent_in_one_branch(controller: _Controller) -> Clue | None:
     if test is not None and test.orelse and _tests_threshold(source, test.test, check.threshold):
         inside = any(call in set(subtree(s)) for s in test.orelse)
         where = "inside else" if inside else f"inside 'if {source.code(test.test, 40)}'"
-        hint = f"{code} stands {where}, so that only one of the answers is sent: move it to the left"
+        hint = f"{code} is {where}, so that only one of the answers is sent: dedent it"
         return Clue(hint, source.place(call), key="one_branch")
     answer = chain(call.args[0]) if len(call.args) == 1 else ""
     early = [t for t in conditions(source, call) if call not in set(subtree(t))]
@@ -505,8 +503,8 @@ def _latched(controller: _Controller) -> Clue | None:
             read = any(chain(n) == chain(store) and isinstance(n.ctx, ast.Load) for n in source.all(ast.Attribute))
             once = _asks_none(node.test, chain(store)) or _tests_threshold(source, node.test, check.threshold)
             if not others and read and once:
-                hint = f"{chain(store)} is set under 'if {source.code(node.test, 40)}' and never again"
-                return Clue(f"{hint}: decide anew for each value", source.place(node), key="latched")
+                hint = f"{chain(store)} is set under 'if {source.code(node.test, 40)}' and never reset"
+                return Clue(f"{hint}: decide again for each value", source.place(node), key="latched")
     return None
 
 
@@ -532,8 +530,8 @@ def _callback_sleeps(case: Case) -> Clue | None:
         for node in late.reached:
             slept = number_in_code(late.source, node.args[0]) if isinstance(node, ast.Call) and node.args else None
             if isinstance(node, ast.Call) and last_name(node.func) == "sleep" and (slept or 0) > _PROMPT_S:
-                hint = f"{late.source.code(node, 50)} holds up the callback: what comes meanwhile is answered late"
-                return Clue(f"{hint}; take it out", late.source.place(node), key="late_answer")
+                hint = f"{late.source.code(node, 50)} blocks the callback, so later messages are answered late"
+                return Clue(f"{hint}; remove it", late.source.place(node), key="late_answer")
     return None
 
 

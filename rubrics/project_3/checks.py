@@ -111,9 +111,9 @@ class ServiceSequence:
     @property
     def expected(self) -> str:
         text = (
-            f"{self.field} of {self.service} tells {number(self.first)} first, then {number(self.step)} more each time"
+            f"{self.field} of {self.service} is {number(self.first)} first and changes by {number(self.step)} each time"
         )
-        again = "" if self.reset_to is None else f"; {number(self.reset_to)} instead of a number beyond it"
+        again = "" if self.reset_to is None else f"; a number beyond it becomes {number(self.reset_to)}"
         return text + (f", not beyond {number(self.floor)}{again}" if self.floor is not None else "")
 
     def judge(self, trace: Trace) -> Finding:

@@ -137,7 +137,7 @@ def test_roles_open_the_general_hint_rules(tmp_path: Path, *, declared: bool) ->
     submission = Submission("s", "s", Path("s"), "sha256:1", {"pump.py": StudentFile("pump.py", "pump.py")})
     report = judge_exercise(read_rubric(tmp_path / "pump.yaml"), {"alone": trace}, submission, {"pump.py": SOURCE})
     hint = report.verdicts[0].hint
-    assert ("publishes on /flux: the topic asked for is /flow" in hint) == declared
+    assert ("publishes on /flux: the task asks for /flow" in hint) == declared
 
 
 SERVICES = '''\

@@ -173,7 +173,7 @@ def test_rules_are_never_taken_from_students(tmp_path: Path) -> None:
     [
         ("return 1 / 0", "pump_hints.py:9: the rule slow_pump: ZeroDivisionError: division by zero"),
         ("return 'x'", "pump_hints.py: the rule slow_pump: TypeError: expected a Clue or None, found a str"),
-        ("return Clue(1)", "pump_hints.py: the rule slow_pump: TypeError: expected a clue with a text as hint"),
+        ("return Clue(1)", "pump_hints.py: the rule slow_pump: TypeError: expected a clue with a string as hint"),
         ("return Clue('x', 3)", "pump_hints.py: the rule slow_pump: TypeError: expected a clue with a Location"),
         ("return Clue('')", "pump_hints.py: the rule slow_pump: TypeError: expected a clue with a hint"),
         ("return Clue('x', same_as='y')", "TypeError: expected the id of an earlier criterion that was not met"),

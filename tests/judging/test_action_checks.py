@@ -65,7 +65,7 @@ def one(**kw: Any) -> Recording:
         (RESULT, one(status=6), 0, "goal 1: aborted, expected that it succeeds"),
         (RESULT, one(status=0), 0, "status 0, expected"),
         (RESULT, one(accepted=False), 0, "rejected, expected that it succeeds"),
-        (RESULT, one(accepted=None), 0, "no answer to the goal"),
+        (RESULT, one(accepted=None), 0, "no response to the goal"),
         (RESULT, one(status=None), 0, "no result in 9.0 s"),
         (RESULT, goal(one(), 2, 5.0, result=[]), 0, "t = 5.000 s, /fibonacci, goal 2: in its result sequence is []"),
         (ActionResult(NAME), one(result=[7]), 1, "1 goal succeeded"),

@@ -23,7 +23,7 @@ def test_no_client_is_explained() -> None:
     crashed = Recording(9, process=CLIENT).crashed(0.0, process=CLIENT)
     assert FAULT_KEY in CALLS.judge(crashed.trace()).evidence
     other = Recording(9, process=CLIENT).service("client", "/get_status", TRIGGER)
-    assert "asks /get_status" in CALLS.judge(other.trace()).reason
+    assert "calls /get_status" in CALLS.judge(other.trace()).reason
     assert CALLS.judge(Recording(9).trace()).credit == 0
 
 

@@ -40,7 +40,7 @@ def test_a_goal_is_reached_in_time_and_kept() -> None:
     assert reached(trace).credit == 1
     late = reached(trace, 3.0)
     assert late.credit == 0
-    assert "not reached within 3.0 s, the nearest was 0.5 away, expected at most 0.1" in late.reason
+    assert "not reached within 3.0 s, the closest was 0.5 away, expected at most 0.1" in late.reason
 
 
 def test_a_goal_that_is_passed_counts_only_where_it_need_not_be_kept() -> None:
@@ -95,7 +95,7 @@ def test_a_robot_whose_node_has_crashed_misses_its_goal_because_of_that() -> Non
     recording = drive(lambda _: 0.0, (0.0, 2.0))
     recording.add(Fault(NS_PER_S, "node.py", FaultKind.EXCEPTION, "ValueError: no", "node.py", 3))
     found = reached(recording.trace())
-    assert "the nearest was 2 away" in found.reason
+    assert "the closest was 2 away" in found.reason
     assert "ValueError: no" in found.reason
 
 

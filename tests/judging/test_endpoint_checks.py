@@ -164,7 +164,7 @@ def stopping(ended_s: float | None) -> Recording:
         (stopping(None), 0, "still running 2.0 s after Ctrl-C at t = 5.000 s"),
         (stopping(None).crashed(5.1, "RuntimeError: no"), 0, "t = 5.100 s, after Ctrl-C: node.py:12: RuntimeError"),
         (stopping(None).fault(7.0, FaultKind.HUNG, "did not end"), 0, "did not end"),
-        (Recording().crashed(1.0), 0, "could not be stopped any more"),
+        (Recording().crashed(1.0), 0, "it ended before Ctrl-C"),
         (Recording().mark(1.0, "exited", "node.py"), 0, "ended by itself at t = 1.000 s"),
     ],
 )

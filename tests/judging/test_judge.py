@@ -189,7 +189,7 @@ def test_a_rate_that_a_busy_machine_can_have_lowered_is_undecided(rate: float, s
     assert outcomes(given) == {"rate": outcome}
     if outcome == "undecided":
         assert given.verdicts[0].reason == (
-            "the machine was too busy: the nodes waited 1.2 s of 10.0 s for a processor, which can be why"
+            "the machine was too busy: the nodes waited 1.2 s of 10.0 s for a processor, which may be the reason"
         )
 
 

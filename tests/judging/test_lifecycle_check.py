@@ -47,11 +47,11 @@ def living(
         (living(), 1, "4 transitions made; states: unconfigured, inactive, active, inactive, finalized"),
         (living(by_number=True), 1, "4 transitions made"),
         (living(messages=(4.0, 5.0, 6.0)), 1, ""),
-        (living(messages=(3.9, 5.0)), 0, "t = 3.900 s, /chatter: a message though the node is not active"),
+        (living(messages=(3.9, 5.0)), 0, "t = 3.900 s, /chatter: a message while the node is not active"),
         (living(messages=(5.0, 6.1)), 0, "t = 6.100 s"),
         (living(messages=()), 0, "/chatter: no publisher"),
         (living(refused="activate"), 0, "t = 4.000 s: the transition activate failed"),
-        (living(silent="configure"), 0, "no answer to the transition configure"),
+        (living(silent="configure"), 0, "no response to the transition configure"),
         (living(("unconfigured", "unconfigured", *STATES[2:])), 0, "the state is unconfigured, expected inactive"),
     ],
 )
@@ -83,8 +83,7 @@ def test_a_node_that_is_mute_when_active_is_named() -> None:
 def test_a_node_without_a_lifecycle_and_a_crash_are_explained() -> None:
     """A recording that asks too little is ours."""
     assert (
-        "no node of the program has a lifecycle"
-        in CHECK.judge(Recording().endpoint("publisher", "/chatter").trace()).reason
+        "the program has no lifecycle node" in CHECK.judge(Recording().endpoint("publisher", "/chatter").trace()).reason
     )
     assert FAULT_KEY in CHECK.judge(Recording().crashed(0.0).trace()).evidence
     gone = CHECK.judge(living(STATES[:2]).crashed(4.2).trace())  # what is gone cannot be asked

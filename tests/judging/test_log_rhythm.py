@@ -72,16 +72,16 @@ def test_one_log_for_ten_messages_is_met(rec: Recording) -> None:
 def test_the_reason_holds_count_and_text() -> None:
     """As the student wrote it."""
     reason = CHECK.judge(RIGHT["chapter"].trace()).reason
-    assert reason.startswith("simple_publisher.py: 10 times logged, one for 10 messages on /joint_commands: sent")
+    assert reason.startswith("simple_publisher.py: logged 10 times, one for 10 messages on /joint_commands: sent")
 
 
 WRONG = {
-    "every message": (written(chapter, lambda n: True), "with 100 of 100 messages"),
+    "every message": (written(chapter, lambda n: True), "for 100 of 100 messages"),
     "every message, and others": (
         written(chapter, lambda n: True).log(3.0, "go to the kitchen").log(4.0, "0.5 rad").log(5.0, "0.6 rad"),
-        "with 100 of 100 messages",
+        "for 100 of 100 messages",
     ),
-    "every second": (written(chapter, lambda n: n % 2 == 0), "with 50 of 100 messages"),
+    "every second": (written(chapter, lambda n: n % 2 == 0), "for 50 of 100 messages"),
     "every fifth": (written(chapter, lambda n: n % 5 == 0), "one for 5 messages"),
     "every ninth": (written(chapter, lambda n: n % 9 == 0), "one for 9 messages"),
     "every eleventh": (written(chapter, lambda n: n % 11 == 0), "one for 11 messages"),
@@ -92,7 +92,7 @@ WRONG = {
     "one missing": (written(chapter, lambda n: n % 10 == 0 and n != 50), "one for 11.25 messages"),
     "each and every tenth": (
         written(lambda n, v: f"sent{'|angle ' + str(v) if n % 10 == 0 else ''}", lambda n: True),
-        "with 100 of 100 messages",
+        "for 100 of 100 messages",
     ),
     "logged after the end": (written(lambda n, v: "").log(12.0, "Publishing 0.1"), "nothing is logged"),
 }

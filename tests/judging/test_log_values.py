@@ -81,8 +81,8 @@ def test_the_wall_clock_may_be_a_little_off() -> None:
 
 
 WRONG: dict[str, tuple[Callable[[float], str], str]] = {
-    "only radians": (lambda a: f"angle {a:.3f} rad", "the value in degrees is not there, only the value itself"),
-    "only degrees": (lambda a: f"angle {math.degrees(a):.3f}", "the value itself is not there"),
+    "only radians": (lambda a: f"angle {a:.3f} rad", "the value in degrees is missing, only the value itself"),
+    "only degrees": (lambda a: f"angle {math.degrees(a):.3f}", "the value itself is missing"),
     "gradians": (lambda a: f"{a:.3f} rad ({a * 200 / math.pi:.1f})", "gradians"),
     "inverted": (lambda a: f"{a:.3f} rad ({math.radians(a):.4f})", "inverse"),
     "pi is 3": (lambda a: f"{a:.3f} rad ({a * 180 / 3:.2f})", "3 for pi"),

@@ -54,7 +54,7 @@ def asked(value: Any, node: str = "/driver", answered: bool = True, absent: bool
         (DECLARED, asked(0.5, absent=True), 0, "has no parameter speed"),
         (ParameterDeclared("speed", node="/other"), asked(0.5), 0, "/other: not in the ROS graph"),
         (ParameterDeclared("speed", node="/driver", value=0.5), asked(0.5), 1, ""),
-        (DECLARED, asked(0.5, answered=False), 0, "no answer to the question for speed"),
+        (DECLARED, asked(0.5, answered=False), 0, "no response to the request for the parameter speed"),
         (ParameterDeclared("speed"), asked([1.0, 2.0]), 1, "is [1, 2] [double_array]"),
     ],
 )

@@ -63,7 +63,7 @@ def test_bands_are_inclusive(rate: float, credit: Fraction) -> None:
         (10, "1/20 = 0.05"),
         (40, "1/20 = 0.05"),
         (2, "period in seconds"),
-        (5000, "no pacing"),
+        (5000, "no pause"),
         (18.5, "loop with sleep"),
     ],
 )

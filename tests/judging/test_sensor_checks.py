@@ -138,7 +138,7 @@ def test_one_message_behind_is_no_log_of_what_came() -> None:
         rec.log(t, f"fan {held_at(t - 0.2, SPEEDS) or 0.0}")
     finding = LOGS.judge(rec.trace())
     assert finding.credit == 0
-    assert "the number of the previous one: 100 at t = 2.500 s, when 0 was received" in finding.reason
+    assert "the number of the previous message on /fan_speed: 100 at t = 2.500 s, when 0 was received" in finding.reason
     assert finding.problem == Problem(ProblemKind.BEHIND)
     for t in times:
         rec.number(t, "/temperature", 24.0)
@@ -149,7 +149,7 @@ def test_something_of_its_own_is_seen_through() -> None:
     """A sensor that logs 100 or 0 by its own temperature never shows the drawn values."""
     finding = LOGS.judge(hearing(lambda v: f"fan {100 if v > 50 else 0}").trace())
     assert finding.credit == 0
-    assert "what is logged is not what was received" in finding.reason
+    assert "the log does not show what was received" in finding.reason
 
 
 def test_a_first_value_only_is_not_enough() -> None:

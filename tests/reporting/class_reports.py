@@ -20,22 +20,22 @@ from grader.rubrics.loader import read_rubric
 MISTAKES = {
     "publishes_twist": [
         (4, "topic_name", "/cmd_vel: no message; /{n}/cmd_vel has {i} messages of type geometry_msgs/msg/Twist",
-         "self.create_publisher(Twist, '/{n}/cmd_vel', 10) publishes on /{n}/cmd_vel: the topic asked for is /cmd_vel"),
+         "self.create_publisher(Twist, '/{n}/cmd_vel', 10) publishes on /{n}/cmd_vel: the task asks for /cmd_vel"),
     ],
     "rate": [
         (14, "period", "/cmd_vel: average rate: {a:.3f} Hz, min: 0.100 s, max: 0.100 s, std dev: 0.00000 s, window: "
          "{i}; expected 20 ± 1 Hz over 10.0 s",
-         "create_timer({b:.3f}, self.{n}) is called every {b:.3f} s, which is {a:.3f} Hz; 20 Hz is a period of 0.05 s"),
+         "create_timer({b:.3f}, self.{n}) fires every {b:.3f} s, which is {a:.3f} Hz; 20 Hz needs a period of 0.05 s"),
         (3, "period", "/cmd_vel: 1 message, at t = 20.000 s; expected 20 ± 1 Hz over 10.0 s",
-         "create_timer(20, self.{n}) is called every 20 s: 20 is the rate; the period is 1/20 = 0.05 s"),
+         "create_timer(20, self.{n}) fires every 20 s: 20 is the rate, the period is 1/20 = 0.05 s"),
     ],
     "linear_velocity": [
         (5, "exchanged", "t = 0.050 s, /cmd_vel: linear.x is 0.1, expected 0.5; wrong in all {i} messages",
-         "linear.x and angular.z are exchanged: self.{n}.linear.x = 0.1 must get 0.5"),
+         "linear.x and angular.z are swapped: self.{n}.linear.x = 0.1 must get 0.5"),
     ],
     "angular_velocity": [
         (7, "sign", "t = 0.050 s, /cmd_vel: angular.z is -{b:.2f}, expected 0.1; wrong in all {i} messages",
-         "msg.angular.z = -{b:.2f} has the wrong sign: angular.z is 0.1"),
+         "msg.angular.z = -{b:.2f} has the wrong sign: angular.z must be 0.1"),
     ],
     "logging": [
         (12, "prints", "velocity_publisher.py: {i} lines printed, none through the logger",
@@ -43,7 +43,7 @@ MISTAKES = {
     ],
     "subscribes_odom": [
         (5, "topic_name", "/odom: no subscription; the nearest is /{n}",
-         "self.create_subscription(Odometry, '/{n}', self.{n}, 10) listens to /{n}: the topic asked for is /odom"),
+         "self.create_subscription(Odometry, '/{n}', self.{n}, 10) subscribes to /{n}: the task asks for /odom"),
     ],
     "logs_position": [
         (9, "velocity_for_position", "odom_subscriber.py: the logged values are the linear velocity (twist), not the "

@@ -80,7 +80,7 @@ class ActionResult:
     def _flaw(self, trace: Trace, goal: Call, results: Sequence[Call]) -> tuple[str, str]:
         """Describe what is wrong with the end of a goal, and a hint; empty if nothing is."""
         if goal.response is None:
-            return "no answer to the goal", "spin the node, and return a GoalResponse from its goal callback"
+            return "no response to the goal", "spin the node, and return a GoalResponse from its goal callback"
         accepted = goal.response.value.get("accepted") is True
         if self.status == "rejected":
             return ("accepted, expected that it is rejected", "") if accepted else ("", "")
@@ -248,7 +248,7 @@ def explain_no_action(trace: Trace, action: str) -> Finding:
     ends = [e.service for e in trace.service_ends("service")]
     seen = sorted({e.partition("/_action/")[0] for e in ends if "/_action/" in e})
     if action in seen:
-        raise HarnessError(f"{action}: the recording sends it no goal")
+        raise HarnessError(f"{action}: the recording sends no goal to it")
     near = nearest(action, seen) or (seen[0] if len(seen) == 1 else None)
     found = f"; seen: {listed(seen)}" if seen else ""
     hint = f"name the action {action} instead of {quote(near)}" if near else ""
@@ -288,7 +288,7 @@ class LifecycleStates:
 
     @property
     def expected(self) -> str:
-        states = f", telling {', '.join(self.states)}" if self.states else ""
+        states = f", reporting {', '.join(self.states)}" if self.states else ""
         topic = f", publishing {self.topic} only while active" if self.topic else ""
         return f"every transition made{states}{topic}"
 
@@ -340,7 +340,7 @@ class LifecycleStates:
     def _transition_flaw(self, changes: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         for call in changes:
             if call.response is None:
-                reason = f"{moment(call.request.t_ns)}: no answer to the transition {_label(call)}"
+                reason = f"{moment(call.request.t_ns)}: no response to the transition {_label(call)}"
                 return not_met(reason, evidence, problem=ProblemKind.NO_ANSWER)
             if not _succeeded(call):
                 reason = f"{moment(call.response.t_ns)}: the transition {_label(call)} failed"
@@ -370,7 +370,7 @@ class LifecycleStates:
         times = [m.t_ns for m in published(trace, topic)]
         stray = next((t for t in times if not any(a - jitter <= t <= b + jitter for a, b in spans)), None)
         if stray is not None:
-            reason = f"{moment(stray)}, {topic}: a message though the node is not active"
+            reason = f"{moment(stray)}, {topic}: a message while the node is not active"
             hint = "create the publisher with create_lifecycle_publisher, and call super().on_activate(state)"
             return not_met(
                 reason, evidence | {"first_stray_s": seconds(stray)}, hint=hint, problem=ProblemKind.TOO_MANY
@@ -391,8 +391,8 @@ class LifecycleStates:
             reason, problem = f"{self.node}: not in the ROS graph", ProblemKind.OTHER_NAME
             return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=problem)
         if any(e.service.endswith("/change_state") for e in trace.service_ends("service")):
-            raise HarnessError("the recording asks for no transition and no state")
-        reason = "no node of the program has a lifecycle, so no transition can be requested"
+            raise HarnessError("the recording requests neither a transition nor a state")
+        reason = "the program has no lifecycle node, so no transition can be requested"
         return not_met(reason, hint="derive it from rclpy.lifecycle.Node", problem=ProblemKind.ABSENT)
 
 

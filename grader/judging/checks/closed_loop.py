@@ -61,7 +61,7 @@ class ReachesGoal:
 
     @property
     def expected(self) -> str:
-        stays = ", and there until the next goal" if self.stays else ""
+        stays = ", and staying there until the next goal" if self.stays else ""
         return f"{self.topic} within {number(self.tolerance)} of each goal after {span(self.within)} at most{stays}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -113,7 +113,7 @@ class ReachesGoal:
         told = f"the goal of {moment(goal.t_ns)}"
         if not near or near[0][0].t_ns > due_ns:
             best = min(d for s, d in pairs if s.t_ns <= due_ns)
-            text = f"{told} was not reached within {span(self.within)}, the nearest was {number(best)} away"
+            text = f"{told} was not reached within {span(self.within)}, the closest was {number(best)} away"
             return f"{text}, expected at most {number(self.tolerance)}"
         left = next(((s, d) for s, d in pairs if s.t_ns > due_ns and d > self.tolerance + _EDGE), None)
         if left is None or not self.stays:
@@ -168,7 +168,7 @@ class StaysInRange:
         states = self._states(trace)
         if not states:
             after = f" after {span(self.after)}" if self.after else ""
-            return _cut_short(trace, f"{self.topic}: no simulation published anything there{after}")
+            return _cut_short(trace, f"{self.topic}: the simulation published nothing{after}")
         each = [(state, self._numbers(state)) for state in states]
         outside = [
             (state, bad[0]) for state, values in each if (bad := [v for v in values if not self._rule.allows(v)])

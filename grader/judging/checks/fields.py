@@ -121,7 +121,7 @@ class FieldInRange(FewSuffice):
             return met(f"{reason}{counted(len(values), 'message')}, expected {rule.wanted}", evidence)
         message, value = outside[0]
         reason = f"{moment(message.t_ns)}, {self.topic}: {self.field} is {number(value)}, expected {rule.wanted}; "
-        reason += f"{len(outside)} of {counted(len(values), 'value')} lie outside"
+        reason += f"{len(outside)} of {counted(len(values), 'value')} are outside"
         return not_met(reason, evidence | {"first_outside_s": seconds(message.t_ns)}, problem=ProblemKind.WRONG_VALUE)
 
     def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
@@ -166,12 +166,12 @@ class FieldMonotone(FewSuffice):
         if wrong:
             k = wrong[0]
             reason = f"{moment(messages[k].t_ns)}, {self.topic}: {self.field} goes from {number(values[k - 1])} to "
-            reason += f"{number(values[k])}, expected it {self.direction}; so {counted(len(wrong), 'time')}"
+            reason += f"{number(values[k])}, expected {self.direction} values; {counted(len(wrong), 'time')} in all"
             known = evidence | {"first_wrong_s": seconds(messages[k].t_ns)}
             return not_met(reason, known, problem=ProblemKind.WRONG_VALUE)
         ends = f"from {number(values[0])} to {number(values[-1])} in {counted(len(values), 'message')}"
         if values[0] == values[-1]:
-            reason = f"{self.topic}: {self.field} never moves, {ends}, expected it {self.direction}"
+            reason = f"{self.topic}: {self.field} never changes, {ends}, expected {self.direction} values"
             return not_met(reason, evidence, problem=ProblemKind.CONSTANT)
         return met(f"{self.topic}: {self.field} only {self.direction}, {ends}", evidence)
 
@@ -240,7 +240,7 @@ class FieldFunction:
 
     @property
     def expected(self) -> str:
-        return f"{self.field} = {self.formula} in every message on {self.topic}, n being 0 in the first one"
+        return f"{self.field} = {self.formula} in every message on {self.topic}, with n = 0 in the first one"
 
     def of_beginning(self) -> FieldFunction:
         """Return the check for a beginning, in which messages sent before discovery may be lost."""
@@ -275,7 +275,7 @@ class FieldFunction:
             return replace(self._differs(wanted, messages, samples, (start, wrong), evidence), facts=facts)
         if len(samples) < self.at_least:
             return replace(self._few(trace, samples, evidence), facts=facts)
-        lost = f", the first one seen being n = {start}" if start else ""
+        lost = f", where the first one seen is n = {start}" if start else ""
         reason = f"{self.topic}: {self.field} follows {self.formula} in {counted(len(samples), 'message')}{lost}"
         return met(reason, evidence)
 
@@ -398,7 +398,7 @@ class RandomInRange:
         side = f"above {number(self.high)}" if first.value > self.high else f"below {number(self.low)}"
         side = "that is not a number" if math.isnan(first.value) else f"{side}{unit}"
         reason = f"{self.topic}: first {side} at {moment(first.t_ns)} ({number(first.value)}{unit}); "
-        reason += f"{len(bad)} of {len(values)} values lie outside {number(self.low)} to {number(self.high)}{unit}"
+        reason += f"{len(bad)} of {len(values)} values are outside {number(self.low)} to {number(self.high)}{unit}"
         evidence = self._evidence(values) | {"outside": len(bad), "first_outside_s": seconds(first.t_ns)}
         facts = DrawFacts(min(r.value for r in values), max(r.value for r in values), outside=len(bad))
         return not_met(reason, evidence, hint=self._hint, problem=ProblemKind.WRONG_VALUE, facts=facts)
@@ -409,9 +409,8 @@ class RandomInRange:
         if pattern is None:
             return None
         if pattern == "constant" and len(got) < _FEWEST_FOR_CONSTANT:
-            reason = (
-                f"{self.topic}: {counted(len(got), 'value')} ({numbers(got)}{in_unit(self.unit)}) cannot show chance"
-            )
+            few = f"{counted(len(got), 'value')} ({numbers(got)}{in_unit(self.unit)})"
+            reason = f"{self.topic}: {few} cannot show whether they are random"
             return not_met(
                 reason, self._evidence(values), hint=self._hint, blocked_by="topic_rate", problem=ProblemKind.TOO_FEW
             )

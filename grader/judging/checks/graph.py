@@ -158,7 +158,7 @@ class Qos:
         if fitting:
             return met(f"{self.topic}: the {self.kind} of {quote(fitting[0].node)} has {self._wanted}", evidence)
         if unknown:
-            raise HarnessError(f"{self.topic}: the middleware does not tell the depth of the {self.kind}")
+            raise HarnessError(f"{self.topic}: the middleware does not report the depth of the {self.kind}")
         reason = f"{self.topic}: the {self.kind} of {quote(mine[0].node)} has {_policies(mine[0])}"
         return not_met(f"{reason}, expected {self._wanted}", evidence, hint=_QOS_HINT.format(kind=self.kind))
 

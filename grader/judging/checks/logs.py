@@ -35,7 +35,7 @@ from grader.judging.wording import listed, moment, number, quote, span
 
 def no_node(trace: Trace, process: str, evidence: dict[str, object]) -> Finding:
     """Return no credit for output of a process without a node."""
-    reason = f"{process}: no node in the ROS graph in {span(trace.stop_ns)}; what is written without one does not count"
+    reason = f"{process}: no node in the ROS graph in {span(trace.stop_ns)}; output without a node does not count"
     fault = first_fault(trace, process)
     if fault is not None:
         reason = f"{fault_sentence(fault)}; {reason}"
@@ -193,7 +193,7 @@ class LogsMatching:
         if self.period is None:
             return ""
         if len(found) < 2:
-            return f"{counted(len(found), 'record')}, too few to have a period"
+            return f"{counted(len(found), 'record')}, too few to measure a period"
         average = (found[-1].t_ns - found[0].t_ns) / (len(found) - 1)
         if within(average, self.period, self.tolerance * self.period):
             return ""
@@ -327,7 +327,7 @@ class LogsEvery:
         most = max(found, key=lambda rhythm: len(rhythm.places), default=_Rhythm(()))
         if self.every < 3 or len(most.places) < _FLOOD * len(messages):
             return None
-        reason = f"{self.process}: something is written with {len(most.places)} of {len(messages)} messages; "
+        reason = f"{self.process}: there is output for {len(most.places)} of {len(messages)} messages; "
         hint = f"count the messages, and log when the count is divisible by {self.every}: count % {self.every} == 0"
         return not_met(
             reason + self._wanted, self._evidence(most, messages), hint=hint, problem=ProblemKind.ONE_PER_MESSAGE
@@ -338,7 +338,7 @@ class LogsEvery:
         return f"expected one log for every {self.every} messages on {self.topic}"
 
     def _said(self, found: _Rhythm, outputs: Sequence[Output], how: str) -> str:
-        reason = f"{self.process}: {counted(len(found.places), 'time')} {how}, one for {number(found.average)} messages"
+        reason = f"{self.process}: {how} {counted(len(found.places), 'time')}, one for {number(found.average)} messages"
         first = next((o for o in outputs if numbers_in(o.text)), outputs[0])
         return f"{reason} on {self.topic}: {quote(first.text, 80)}"
 
@@ -347,7 +347,7 @@ class LogsEvery:
         return {"messages": len(messages), "logs": len(found.places), "with_message": places, "every": self.every}
 
     def _few(self, trace: Trace, messages: Sequence[Message]) -> Finding:
-        reason = f"{self.topic}: {counted(len(messages), 'message')} cannot show one log for every {self.every}"
+        reason = f"{self.topic}: {counted(len(messages), 'message')} are too few to show one log for every {self.every}"
         few = not_met(reason, {"messages": len(messages)}, blocked_by="topic_rate", problem=ProblemKind.TOO_FEW)
         return explain_fault(trace, reason, process=self.process) or few
 

@@ -107,9 +107,9 @@ def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Fi
         return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=ProblemKind.OTHER_NAME)
     if asked:
         who = node or "the node"
-        reason, hint = f"{who}: no answer to the question for {name}", "spin the node: rclpy.spin(node)"
+        reason, hint = f"{who}: no response to the request for the parameter {name}", "spin the node: rclpy.spin(node)"
         return not_met(reason, hint=hint, problem=ProblemKind.NO_ANSWER)
-    raise HarnessError(f"the recording does not ask for the parameter {name}")
+    raise HarnessError(f"the recording does not request the parameter {name}")
 
 
 #: More messages than this, and twice as many as asked for, are a flood.
@@ -213,7 +213,7 @@ class ParameterTakesEffect:
             rate = None if self.effect == "field" else self._rate(one)
             # A recording that is full of messages ends early.
             if rate is None or len(at_once) <= _FLOOD + 2 * rate * seconds(self.within):
-                raise HarnessError(f"{self.name}: the next value, or the end, is due before the effect has to show")
+                raise HarnessError(f"{self.name}: the next value or the end comes before the effect is due")
             took_s = seconds(stop_ns - one.t_ns)
             return f"{len(at_once)} messages on {self.topic} within {took_s:.3f} s, expected {number(rate)} Hz", hint
         after = [m for m in messages if start_ns <= m.t_ns < stop_ns]
@@ -314,7 +314,7 @@ class CleanShutdown:
         if not signals:
             if faults:
                 first = min(faults, key=lambda f: f.t_ns)
-                reason = f"{fault_sentence(first)}; it could not be stopped any more"
+                reason = f"{fault_sentence(first)}; it ended before Ctrl-C"
                 return not_met(reason, hint=fault_hint(first), fault=first)
             ended = trace.marks("exited", self.process)
             if ended:
@@ -346,7 +346,7 @@ class _OfSource:
     process: str
 
     def judge(self, trace: Trace) -> Finding:  # noqa: ARG002 - as every check
-        raise HarnessError(f"{self.process}: its text was not kept")
+        raise HarnessError(f"{self.process}: its source was not kept")
 
 
 @dataclass(frozen=True, slots=True)
@@ -388,7 +388,7 @@ class SourceUses(_OfSource):
             return not_met(f"{self.process}: expected {' and '.join(missing)}, found none", evidence)
         told = [f"class {quote(c.name, 40)} in line {c.lineno}" for c in classes[:1]]
         told += [f"{name} in line {calls[0].lineno}" for name, calls in found.items()]
-        return met(f"{self.process}: {', '.join(told) or 'nothing was asked'}", evidence)
+        return met(f"{self.process}: {', '.join(told) or 'nothing was required'}", evidence)
 
 
 @dataclass(frozen=True, slots=True)
@@ -449,7 +449,7 @@ def _source(trace: Trace, sources: Mapping[str, str], process: str) -> Source | 
         HarnessError: The file is missing, or too long to be read.
     """
     if process not in sources:
-        raise HarnessError(f"{process}: its text was not kept; there are {listed(sorted(sources)) or 'no texts'}")
+        raise HarnessError(f"{process}: its source was not kept; there are {listed(sorted(sources)) or 'no sources'}")
     source = read(process, sources[process])
     if source.tree is not None:
         return source

@@ -203,7 +203,7 @@ class TopicRate:
         period = self._period_s
         rule = f"create_timer({period}, ...): the argument is the period in seconds, 1/{number(self.rate)} = {period}"
         if rate_hz > 20 * self.rate:
-            return f"the loop has no pacing; use {rule}"
+            return f"the loop has no pause; use {rule}"
         if 0.8 * self.rate <= rate_hz < self.rate:
             return f"a loop with sleep adds the time of its own work to each period; use {rule}"
         return rule

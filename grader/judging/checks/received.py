@@ -291,7 +291,7 @@ class LogsValues:
         if len(silent) == len(received):
             return "", rule
         if len(silent) > len(received) / 2:
-            return f"nothing is logged at {len(silent)} of the messages", rule
+            return f"nothing is logged for {len(silent)} of the messages", rule
         logged = [LoggedNumbers(r.value, self._numbers(r, outputs)) for r in received]
         if any(self._behind(logged, f) for f in self.unit_factors):
             return "each log has the number of the previous message", "store the number before you log it, not after"
@@ -302,7 +302,7 @@ class LogsValues:
             if cause:
                 return f"{times(factor)}: {cause}", hint
             if right and all(len(h.numbers) <= len(right) for h in logged):
-                return f"{times(factor)} is not there, only {' and '.join(map(times, right))}", ""
+                return f"{times(factor)} is missing, only {' and '.join(map(times, right))}", ""
         return "", ""
 
     def _numbers(self, one: _Received, outputs: Sequence[Output]) -> tuple[Printed, ...]:
@@ -429,7 +429,7 @@ class LogsReceived:
             return ""
         t_ns, old, new = changes[0]
         return (
-            f"{self.process}: it logs at each message on {self.topic}, but the number of the previous one: "
+            f"{self.process}: it logs the number of the previous message on {self.topic}: "
             f"{number(old)} at {moment(t_ns)}, when {number(new)} was received"
         )
 
@@ -460,7 +460,7 @@ class LogsReceived:
         sent, logged = {v.value for v in values}, {v.value for v in values} - {v.value for v in unlogged}
         if logged and logged <= (ends := {min(sent), max(sent)}) and len(sent - ends) >= _BETWEEN:
             only = f"{' and '.join(map(number, sorted(logged)))} {'is' if len(logged) == 1 else 'are'}"
-            reason += f"; only {only}, so what is logged is not what was received"
+            reason += f"; only {only}, so the log does not show what was received"
         if all(e.durability == "transient_local" for e in subscriptions):
             reason += (
                 "; the subscription asks for transient_local durability, which a volatile publisher does not offer"
@@ -480,7 +480,7 @@ def _judged(check: LogsValues | LogsReceived, trace: Trace, came: Sequence[Any])
     records, lines = student_records(trace, check.process), printed_lines(trace, check.process)
     unlogged: list[Any] = list(check.unlogged_in(trace, came, records))
     if isinstance(check, LogsValues) and (swapped := check.swapped_units(came, records)):
-        hint = "name the unit that each number has"
+        hint = "log the unit of each number"
         return not_met(swapped, check.evidence_of(came, unlogged), hint=hint, problem=ProblemKind.WRONG_VALUE)
     if check.is_enough(came, unlogged):
         return check.when_logged(trace, came, unlogged, records)

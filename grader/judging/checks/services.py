@@ -182,9 +182,9 @@ def never_asked(trace: Trace, service: str) -> Finding:
     """
     if not trace.service_ends("service", service):
         return waiting_for("service_available", explain_no_server(trace, service))
-    if crashed := explain_fault(trace, f"{service} could not be asked"):
+    if crashed := explain_fault(trace, f"{service} could not be called"):
         return crashed
-    raise HarnessError(f"{service}: nothing was asked of it, or too late to be answered")
+    raise HarnessError(f"{service}: it was not called, or too late for a response")
 
 
 #: Numbers in the evidence, at most.

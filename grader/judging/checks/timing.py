@@ -239,7 +239,7 @@ class Silence:
     @property
     def expected(self) -> str:
         parts = [f"{word} {mark}" for word, mark in (("after", self.after), ("before", self.before)) if mark]
-        grace = f", {_ms(self.grace)} of grace" if self.grace else ""
+        grace = f", {_ms(self.grace)} of tolerance" if self.grace else ""
         return f"no message on {self.topic} {' and '.join(parts).replace('_', ' ')}{grace}".replace("  ", " ")
 
     def judge(self, trace: Trace) -> Finding:
@@ -247,10 +247,10 @@ class Silence:
         start_ns, stop_ns = self._window(trace)
         if start_ns is None or stop_ns is None:
             if fault is not None:
-                return faulted(fault, "the window of silence was never reached")
+                return faulted(fault, "it ended before the silent period began")
             raise HarnessError(f"{self.topic}: the recording has no moment {self.after or self.before}")
         if stop_ns <= start_ns and fault is None:
-            raise HarnessError(f"{self.topic}: the window of silence has no length")
+            raise HarnessError(f"{self.topic}: the silent period has no length")
         found = [m.t_ns for m in published(trace, self.topic) if start_ns <= m.t_ns < stop_ns]
         evidence = {"topic": self.topic, "window_s": [seconds(start_ns), seconds(stop_ns)], "messages": len(found)}
         window = f"from {seconds(start_ns):.3f} s to {seconds(stop_ns):.3f} s"
@@ -258,7 +258,7 @@ class Silence:
             reason = f"{self.topic}: {counted(len(found), 'message')} {window}, the first at {moment(found[0])}"
             return not_met(f"{reason}; expected none", evidence | {"first_s": seconds(found[0])})
         if fault is not None and fault.t_ns < stop_ns:
-            return faulted(fault, f"the silence {window} does not count", evidence)
+            return faulted(fault, f"the silence {window} earns no points", evidence)
         return met(f"{self.topic}: no message {window}", evidence)
 
     def _window(self, trace: Trace) -> tuple[int, int] | tuple[None, None]:

@@ -64,7 +64,7 @@ class Subscribes:
 
     @property
     def expected(self) -> str:
-        return f"a subscription to {self.topic} with type {self.type} that an ordinary publisher reaches"
+        return f"a subscription to {self.topic} with type {self.type} that an ordinary publisher can reach"
 
     def judge(self, trace: Trace) -> Finding:
         mine = [e for e in student_endpoints(trace, "subscription") if (e.topic, e.type) == (self.topic, self.type)]
@@ -207,7 +207,7 @@ def _sign_or_unit(path: str, got: float, want: float) -> str:
         return ""
     ratio = got / want
     if math.isclose(ratio, -1.0, rel_tol=1e-6):
-        return f"the sign of {path} is the wrong way round"
+        return f"the sign of {path} is inverted"
     angular = "angular" in path
     if angular and (
         math.isclose(abs(ratio), 180 / math.pi, rel_tol=0.01) or math.isclose(abs(ratio), math.pi / 180, rel_tol=0.01)

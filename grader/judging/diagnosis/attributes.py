@@ -56,12 +56,12 @@ def _class_for_object(crash: Crash) -> Clue | None:
             value = statement.value if isinstance(statement, ast.Assign) else None
             if isinstance(value, (ast.Name, ast.Attribute)) and last_name(value) in classes:
                 code = source.code(value, 40)
-                hint = f"{code} is the class: write {name.id} = {code}(), which makes an object of it"
+                hint = f"{code} is the class: write {name.id} = {code}() to create an object"
                 return Clue(hint, source.place(store))
     direct = next((n for n in on_line if n.id in classes and isinstance(source.parents.get(n), ast.Attribute)), None)
     if direct is None:
         return None
-    return Clue(f"{direct.id} is the class: make an object first, msg = {direct.id}(), and use msg instead")
+    return Clue(f"{direct.id} is the class: create an object first, msg = {direct.id}(), and use msg instead")
 
 
 @crash_rule(
@@ -75,7 +75,7 @@ def _message_info(crash: Crash) -> Clue | None:
             if found is not None and found.count == 2:
                 own = "self, " if crash.source.is_method(function) else ""
                 last = parameters(function)[-1]
-                hint = f"the message comes first, and {last} is only what is known about it: "
+                hint = f"the message is the first argument, and {last} is its MessageInfo: "
                 return Clue(f"{hint}def {function.name}({own}{last}):", crash.source.place(function))
     return None
 
@@ -89,7 +89,7 @@ def _package_attribute(crash: Crash) -> Clue | None:
     """`import geometry_msgs`, and `geometry_msgs.Twist`: the classes are one level further down."""
     package, name = crash.found.groups()
     right = import_of(name) or f"from {package}.msg import {name}"
-    return Clue(f"{name} is not in {package} itself: {right}, and write {name} alone")
+    return Clue(f"{name} is not in {package} itself: {right}, and write just {name}")
 
 
 @crash_rule(
@@ -106,7 +106,7 @@ def _plain_value(crash: Crash) -> Clue | None:
         stores = [n for n in source.stored.get(node.value.id, ()) if first_line(n) < crash.line]
         if stores:
             name, right = node.value.id, next(iter(types))
-            return Clue(f"{name} is no message here: write {name} = {right}()", source.place(stores[-1]))
+            return Clue(f"{name} is not a message here: write {name} = {right}()", source.place(stores[-1]))
     return None
 
 
@@ -168,7 +168,7 @@ def _of_a_function(crash: Crash, name: str) -> Clue | None:
     for node in crash.source.on_line(crash.line, ast.Attribute):
         if node.attr == name and isinstance(node.value, (ast.Attribute, ast.Name)):
             code = crash.source.code(node.value, 40)
-            return Clue(f"{code} is named, not called: write {code}().{name}")
+            return Clue(f"{code} is not called: write {code}().{name}")
     return None
 
 
@@ -188,7 +188,7 @@ def _hidden_by_variable(crash: Crash) -> Clue | None:
     for node in source.on_line(crash.line, ast.Attribute):
         owner = node.value.id if node.attr == crash.found[1] and isinstance(node.value, ast.Name) else ""
         if owner in FUNCTIONS and crash.found[1] in FUNCTIONS[owner] and source.stored.get(owner):
-            hint = f"{owner} gets a value here, which hides the module {owner}: choose another name"
+            hint = f"{owner} is assigned here, which hides the module {owner}: choose another name"
             return Clue(hint, source.place(source.stored[owner][0]))
     return None
 
@@ -200,7 +200,7 @@ def _published_through(crash: Crash, owner: str) -> Clue | None:  # noqa: PLR091
     publishers = made(source, "publisher")
     names = [t for m in publishers if (t := target_of(source, m.call)).startswith("self.")]
     if owner in MESSAGE_FIELDS and len(names) == 1:
-        return Clue(f"a message is published by the publisher: {names[0]}.publish(...)")
+        return Clue(f"publish is a method of the publisher: write {names[0]}.publish(...)")
     if owner == "Subscription" and len(names) == 1:
         return Clue(f"a subscription only receives: write {names[0]}.publish(...)")
     if not own:
@@ -208,10 +208,10 @@ def _published_through(crash: Crash, owner: str) -> Clue | None:  # noqa: PLR091
     if not all(_is_called(source, n) for n in _named(crash)):
         return _callback_meant(crash)
     if len(names) == 1:
-        return Clue(f"publish belongs to the publisher, which is {names[0]}: write {names[0]}.publish(...)")
+        return Clue(f"publish is a method of the publisher, {names[0]}: write {names[0]}.publish(...)")
     unstored = [m for m in publishers if not target_of(source, m.call).startswith("self.")]
     if len(publishers) == 1 and unstored:
-        hint = "publish belongs to the publisher: keep it here as self.publisher = ..., and call self.publisher.publish"
+        hint = "publish is a method of the publisher: store it as self.publisher, and call self.publisher.publish"
         return Clue(f"{hint}(...)", source.place(unstored[0].call))
     return None
 
@@ -235,9 +235,9 @@ def _callback_meant(crash: Crash) -> Clue | None:
     methods = [f for f in source.functions() if source.is_method(f) and not f.name.startswith("__")]
     unused = [f for f in methods if not used(source, f)]
     if len(unused) == 1:
-        hint = f"there is no method {crash.found[2]}: self.{unused[0].name} is called by nothing, pass that"
+        hint = f"there is no method {crash.found[2]}: self.{unused[0].name} is not called by anything, pass that"
         return Clue(hint)
-    return Clue(f"there is no method {crash.found[2]}: write def {crash.found[2]}(self) into the class")
+    return Clue(f"there is no method {crash.found[2]}: write def {crash.found[2]}(self) in the class")
 
 
 def _message_field(owner: str, name: str) -> Clue | None:
@@ -254,7 +254,7 @@ def _message_field(owner: str, name: str) -> Clue | None:
         return Clue(f"{name} should be {near}")
     fields = ", ".join(MESSAGE_FIELDS[owner])
     called = owner.replace("_Response", " response").replace("_Request", " request")
-    return Clue(f"{a} {called} has {fields}, no {name}")
+    return Clue(f"{a} {called} has {fields}, but no {name}")
 
 
 def _own_attribute(crash: Crash, owner: str, name: str) -> Clue | None:
@@ -269,7 +269,7 @@ def _own_attribute(crash: Crash, owner: str, name: str) -> Clue | None:
     local = next((m for m in items if target_of(source, m.call) == name), None)
     if local is not None:
         owned_by = source.function_name(local.call) or "the file"
-        hint = f"{name} is a variable of {owned_by} only: write self.{name} = ..."
+        hint = f"{name} is local to {owned_by}: write self.{name} = ..."
         return Clue(hint, source.place(local.call))
     publishers = [t for m in items if m.kind == "publisher" and (t := target_of(source, m.call)).startswith("self.")]
     if f"self.{name}.publish(" in source.line(crash.line) and len(publishers) == 1:
@@ -292,7 +292,7 @@ def _of_rclpy(crash: Crash, name: str) -> Clue | None:
         given = owner if name.startswith("spin") else ""
         return Clue(f"{name} is a function of rclpy: write rclpy.{name}({given})")
     if name in LOG_METHODS:
-        return Clue(f"{name} belongs to the logger: write {owner}.get_logger().{name}(...)")
+        return Clue(f"{name} is a method of the logger: write {owner}.get_logger().{name}(...)")
     called = node is not None and (_is_called(source, node) or NODE_SLIPS.get(name, "").endswith("()"))
     if name in NODE_SLIPS and called and not source.stores(f"self.{name}"):
         return Clue(f"{owner}.{name} should be {owner}.{NODE_SLIPS[name]}")
@@ -320,7 +320,7 @@ def _local_only(source: Source, owner: str, name: str) -> Clue | None:
         inside = function is not None and source.is_method(function)
         class_ = source.class_of(node)
         if function is not None and inside and class_ is not None and class_.name == owner:
-            hint = f"{name} is a variable of {function.name} only: write self.{name} = ..."
+            hint = f"{name} is local to {function.name}: write self.{name} = ..."
             return Clue(hint, source.place(node))
     return None
 
@@ -332,10 +332,10 @@ def _kept_nowhere(crash: Crash, owner: str, name: str) -> Clue | None:
         return None
     if source.stores(f"self.{name}"):
         counted = source.code(source.parents[source.stores(f"self.{name}")[0]], 40)
-        return Clue(f"{counted} needs a value to begin with: set self.{name} = 0 in __init__")
+        return Clue(f"{counted} needs an initial value: set self.{name} = 0 in __init__")
     message = received(source, source.function_at(crash.line))
     if message is not None and message.name and message.type in SINGLE_NUMBERS:
-        return Clue(f"nothing sets self.{name}: the number that came is {message.name}.data")
+        return Clue(f"nothing sets self.{name}: the received number is {message.name}.data")
     class_ = next(c for c in source.all(ast.ClassDef) if c.name == owner)
     if any(isinstance(n, ast.Name) and n.id == name for s in class_.body for n in _targets(s)):
         return None
@@ -344,7 +344,7 @@ def _kept_nowhere(crash: Crash, owner: str, name: str) -> Clue | None:
     listens = not made(source, "publisher") and not called_only(source, found[0][0]) if len(found) == 1 else False
     if listens and not keeping:
         function, message = found[0]
-        hint = f"nothing sets self.{name}: set it to None in __init__, and in {function.name} to what came, "
+        hint = f"nothing sets self.{name}: set it to None in __init__, and in {function.name} to the received value, "
         return Clue(f"{hint}self.{name} = {message.name}", source.place(function))
     return Clue(f"nothing in the file sets self.{name}: set it in __init__, self.{name} = ...")
 
@@ -373,10 +373,10 @@ def _outside_of_class(source: Source, owner: str, name: str) -> Clue | None:
         return None
     function, around = functions[0], source.function_of(functions[0])
     if around is not None:
-        hint = f"{name} is indented into {around.name}: move its def to the left, as far as def {around.name}"
+        hint = f"{name} is indented into {around.name}: dedent its def to the level of def {around.name}"
         return Clue(hint, source.place(function)) if source.is_method(around) else None
     if parameters(function)[:1] == ["self"]:
-        hint = f"{name} stands outside of the class {owner}: indent it as far as the other methods, inside the class"
+        hint = f"{name} is outside the class {owner}: indent it like the other methods"
         return Clue(hint, source.place(function))
     return Clue(f"{name} is a function of the file, not a method of {owner}: write {name}(...) without self")
 

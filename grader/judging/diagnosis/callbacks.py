@@ -69,7 +69,7 @@ def _timed_with_message(crash: Crash, source: Source) -> Clue | None:
     if found[2] == "self":
         given = next(m.callback for m in made(source, "timer") if last_name(m.callback) == found[1])
         code = source.code(given) if given is not None else found[1]
-        return Clue(f"{code} belongs to no object: pass self.{found[1]}", source.place(given or functions[0]))
+        return Clue(f"{code} is not bound to an object: pass self.{found[1]}", source.place(given or functions[0]))
     rest = ", ".join(p for p in parameters(functions[0]) if p != found[2])
     hint = f"a timer calls {found[1]} without arguments: def {found[1]}({rest}):"
     return Clue(hint, source.place(functions[0]))
@@ -92,14 +92,14 @@ def _too_few_parameters(source: Source, function: Function, callback: ast.expr |
     bound = source.is_method(function) and isinstance(callback, ast.Attribute)
     timed = any(last_name(m.callback) == function.name for m in made(source, "timer"))
     if timed and names == ["self"]:
-        hint = f"{function.name} is the callback of the timer: a subscription needs one of its own, with self and msg"
+        hint = f"{function.name} is the callback of the timer: a subscription needs its own, with self and msg"
         return Clue(hint, source.place(callback) if callback is not None else source.place(function))
     if bound and len(names) == 1 and names != ["self"]:
         return Clue(f"self is missing: def {function.name}(self, {names[0]}):", source.place(function))
     if names not in ([], ["self"]):
         return None
     own = "self, " if bound else ""
-    hint = f"the subscription hands over the message: def {function.name}({own}msg):"
+    hint = f"a subscription passes the message: def {function.name}({own}msg):"
     return Clue(hint, source.place(function))
 
 
@@ -112,7 +112,7 @@ def _service_signature(crash: Crash) -> Clue | None:
             continue
         function = functions[0]
         if crash.said(rf"\b{re.escape(function.name)}\(\) (takes|missing)"):
-            hint = f"a service hands over request and response: def {function.name}(self, request, response):"
+            hint = f"a service passes request and response: def {function.name}(self, request, response):"
             return Clue(hint, source.place(function))
         empty = all(r.value is None for r in source.all(ast.Return) if source.function_of(r) is function)
         if empty and crash.said(r"^TypeError$|^TypeError: *$|[Rr]esponse"):
@@ -142,10 +142,10 @@ def _no_data_yet(crash: Crash) -> Clue | None:
             hint = f"'if {source.code(turned.test, 40)}' is the wrong way round: write if {name} is None"
             return Clue(hint, source.place(turned))
         if crash.said("NoneType") and any(_starts_with_none(source, n) for n in stores):
-            return Clue(f"{name} is None until the first message comes: {begin}")
+            return Clue(f"{name} is None until the first message arrives: {begin}")
         unset = crash.said(rf"object has no attribute '{re.escape(node.attr)}'")
         if unset and "__init__" not in stored_by:
-            return Clue(f"{name} is not there before the first message: set {name} = None in __init__, and {begin}")
+            return Clue(f"{name} does not exist before the first message: set {name} = None in __init__, and {begin}")
     return None
 
 
@@ -179,11 +179,11 @@ def _shut_down_early(crash: Crash) -> Clue | None:
     for call in source.calls("shutdown", "try_shutdown", "destroy_node", "destroy_publisher"):
         function = source.function_of(call)
         if function is not None and source.is_method(function) and function.name not in ("__del__", "destroy_node"):
-            hint = f"{source.code(call)} in {function.name} ends the node while it runs: take it out"
+            hint = f"{source.code(call)} in {function.name} ends the node while it runs: remove it"
             return Clue(hint, source.place(call))
         before = function is source.function_at(line) and first_line(call) < line
         if before and last_name(call.func) != "destroy_node" and "shutdown" not in source.line(line):
-            hint = f"{source.code(call)} comes too early: ROS has ended before line {line}"
+            hint = f"{source.code(call)} comes too early: ROS is shut down before line {line}"
             return Clue(hint, source.place(call))
     return None
 
@@ -195,7 +195,7 @@ def _missing_qos(crash: Crash) -> Clue | None:
         return None
     written, last = crash.source.code(call), call.args[-1]
     if found[1] == "subscription" and isinstance(last, ast.Constant) and isinstance(last.value, int):
-        return Clue(f"{written} names no callback: the third argument is the method to call, the depth comes after it")
+        return Clue(f"{written} has no callback: the third argument is the method to call, the fourth the queue depth")
     if "callback" in found[2] or "topic" in found[2] or not written.endswith(")"):
         return None
     return Clue(f"the queue depth is missing: {written[:-1]}, 10)")
@@ -210,7 +210,7 @@ def _call_at_fault(crash: Crash, *names: str) -> ast.Call | None:
 def _read_only_property(crash: Crash) -> Clue | None:
     for node in crash.source.on_line(crash.line, ast.Attribute):
         if isinstance(node.ctx, ast.Store) and chain(node) == f"self.{node.attr}" and node.attr in NODE_PROPERTIES:
-            return Clue(f"Node itself uses the name {node.attr}; rename yours, for example self.my_{node.attr}")
+            return Clue(f"Node already uses the name {node.attr}: rename yours, for example self.my_{node.attr}")
     return None
 
 
@@ -221,7 +221,7 @@ def _super_init(crash: Crash) -> Clue | None:
         return Clue("super needs parentheses: super().__init__('node_name')")
     misspelt = crash.said(r"'super' object has no attribute '(\w+)'")
     if misspelt and closest(misspelt[1], ("__init__",)):
-        return Clue(f"{misspelt[1]} is a slip: write super().__init__('node_name')")
+        return Clue(f"{misspelt[1]} is a typo: write super().__init__('node_name')")
     if crash.said(r"Node\.__init__\(\) missing 1 required positional argument: 'node_name'"):
         return _no_name(crash.fault, crash.source)
     return _no_base(crash) or _super_of_other(crash) or _used_before_super(crash)
@@ -255,8 +255,8 @@ def _no_name(fault: Fault, source: Source) -> Clue | None:
         owner = source.parents.get(function)
         slip = function.name != "__init__" and function.name.strip("_").lower() in ("init", "int", "inti", "ini")
         if slip and isinstance(owner, ast.ClassDef) and owner.name in made_here:
-            hint = f"{function.name} is never called: the constructor's name is __init__"
-            return Clue(f"{hint}, two underscores on each side", source.place(function))
+            hint = f"{function.name} is never called: the constructor is __init__"
+            return Clue(f"{hint}, with two underscores on each side", source.place(function))
     return None
 
 
@@ -276,7 +276,7 @@ def _used_before_super(crash: Crash) -> Clue | None:
         hint = "the first line of __init__ must be super().__init__('node_name')"
         return Clue(hint, source.place(constructor))
     if first_line(calls[0]) > crash.line:
-        hint = f"{source.code(calls[0])} must come first: before it, the node cannot be used in line {crash.line}"
+        hint = f"{source.code(calls[0])} must come first: line {crash.line} uses the node before it"
         return Clue(hint, source.place(calls[0]))
     return None
 
@@ -288,16 +288,16 @@ def _init_order(crash: Crash) -> Clue | None:
     if crash.said(r"init\(\) must only be called once"):
         others = [c for c in inits if first_line(c) != line]
         again = f" and in {lines_of(*others)}" if others else ""
-        return Clue(f"rclpy.init() may be called once only; it is called here{again}: remove one of them")
+        return Clue(f"rclpy.init() may be called only once; it is called here{again}: remove one of them")
     if not crash.said(r"NotInitializedException|rclpy\.init\(\) has not been called"):
         return None
     used = next((number for number, name in reversed(crash.frames()) if name != "__init__"), line)
     named = next((n for n in bare_statements(source) if chain(n) == "rclpy.init"), None)
     if not inits and named is not None:
-        return Clue("rclpy.init is named, not called: write rclpy.init()", source.place(named))
+        return Clue("rclpy.init is not called: write rclpy.init()", source.place(named))
     if not inits:
         at = next((c for c in source.on_line(used, ast.Call) if first_line(c) == used), None)
-        hint = f"call rclpy.init() before line {used}: nothing of ROS works without it"
+        hint = f"call rclpy.init() before line {used}: nothing in ROS works without it"
         return Clue(hint, source.place(at) if at is not None else None)
     return _init_elsewhere(source, inits, used)
 
@@ -307,11 +307,11 @@ def _init_elsewhere(source: Source, inits: list[ast.Call], used: int) -> Clue | 
     here = source.function_at(used)
     late = [c for c in inits if first_line(c) > used and source.function_of(c) is here]
     if late and len(late) == len(inits):
-        hint = f"{source.code(late[0])} comes too late: the node is made before it, in line {used}"
+        hint = f"{source.code(late[0])} comes too late: the node is created before it, in line {used}"
         return Clue(hint, source.place(late[0]))
     stops = [c for c in source.calls("shutdown", "try_shutdown") if first_line(c) < used]
     if stops and source.function_of(stops[-1]) is here:
-        return Clue(f"{source.code(stops[-1])} has ended ROS before line {used}", source.place(stops[-1]))
+        return Clue(f"{source.code(stops[-1])} has shut ROS down before line {used}", source.place(stops[-1]))
     return None
 
 
@@ -374,7 +374,7 @@ def _made_for_type(crash: Crash) -> Clue | None:
         first = item.call.args[0] if item.call.args else None
         if isinstance(first, ast.Call):
             code = crash.source.code(first.func, 40)
-            hint = f"{crash.source.code(first, 40)} makes a message: pass the class, {code}, without the parentheses"
+            hint = f"{crash.source.code(first, 40)} creates a message: pass the class, {code}, without the parentheses"
             return Clue(hint, crash.source.place(item.call))
     return None
 
@@ -383,15 +383,15 @@ def _topic_arguments(crash: Crash, item: Made) -> Clue | None:  # noqa: PLR0911 
     source, first = crash.source, item.call.args[0]
     second = item.call.args[1] if len(item.call.args) > 1 else None
     if crash.said(r"rclpy_resolve_name\(\): incompatible") and second is not None and last_name(second)[:1].isupper():
-        return Clue(f"{source.code(second, 40)} is no topic: write its name as a text, '/name'")
+        return Clue(f"{source.code(second, 40)} is not a topic name: write a string such as '/name'")
     text_first = isinstance(first, ast.Constant) and isinstance(first.value, str)
     if text_first and len(item.call.args) > 1 and crash.said(r"rclpy_resolve_name\(\): incompatible"):
         other = source.code(item.call.args[1])
         return Clue(f"the message type comes first, then the topic: ({other}, {source.code(first)}, ...)")
     if text_first and crash.said(r"has no attribute '_TYPE_SUPPORT'"):
-        return Clue(f"the message type is a class, without quotation marks: {source.code(first).strip(_QUOTES)}")
+        return Clue(f"the message type is a class, without quotes: {source.code(first).strip(_QUOTES)}")
     if crash.said(r"type object 'module' has no attribute '_TYPE_SUPPORT'"):
-        return Clue(f"{source.code(first)} is a module; name the message class in it")
+        return Clue(f"{source.code(first)} is a module: pass a message class from it")
     if crash.said(r"Expected QoSProfile or int") and item.qos is not None:
         third = item.callback
         if third is not None and isinstance(third, ast.Constant) and isinstance(third.value, int):
@@ -414,8 +414,8 @@ def _parameter_arguments(crash: Crash) -> Clue | None:
 @crash_rule(r"Invalid(Node|Topic)NameException", in_file=False, priority=4120)
 def _bad_name(crash: Crash) -> Clue | None:
     if crash.found[1] == "Node":
-        return Clue("a node name holds letters, digits and underscores only")
-    return Clue("a topic name holds letters, digits, underscores and slashes only, and no part starts with a digit")
+        return Clue("a node name may contain only letters, digits and underscores")
+    return Clue("a topic name may contain only letters, digits, _ and /, and no part may start with a digit")
 
 
 @crash_rule("^TypeError|^AttributeError", priority=4130)
@@ -426,4 +426,4 @@ def _spun_class(crash: Crash) -> Clue | None:
     name = last_name(call.args[0])
     if not any(c.name == name for c in crash.source.all(ast.ClassDef)):
         return None
-    return Clue(f"spin takes a node, {name} is the class: {name}()")
+    return Clue(f"spin takes a node, but {name} is the class: write {name}()")

@@ -34,19 +34,19 @@ def _wrong_field_type(crash: Crash) -> Clue | None:
     value, target = _given(crash, field)
     if message:
         inner = ", ".join(MESSAGE_FIELDS.get(message, ())) or "fields"
-        return Clue(f"{target.removesuffix(' = ') or field} is a {message}: set its own {inner} one by one")
+        return Clue(f"{target.removesuffix(' = ') or field} is a {message}: set its fields {inner} one by one")
     if type_ != "float":
-        other = {"int": "a whole number", "str": "text", "bool": "True or False"}.get(type_)
+        other = {"int": "an integer", "str": "text", "bool": "True or False"}.get(type_)
         written = crash.source.code(value, 40) if value is not None else "..."
         asked = (crash.case.check, *crash.case.siblings)
         if type_ == "str" and field == "data" and any(isinstance(check, RandomInRange) for check in asked):
             item = next((m for m in made(crash.source, "publisher") if m.type == "String"), None)
             if item is not None:
-                hint = "String carries text, and numbers are asked for: use a numeric type such as Float32"
+                hint = "String holds text, but the task asks for numbers: use a numeric type such as Float32"
                 return Clue(hint, crash.source.place(item.call))
         literal = text_of(value) or ""
         if type_ == "bool" and literal.capitalize() in ("True", "False"):
-            return Clue(f"{written} is a text: write {target}{literal.capitalize()}, without quotation marks")
+            return Clue(f"{written} is a string: write {target}{literal.capitalize()}, without quotes")
         return Clue(f"the field {field} takes {other}: write {target}{type_}({written})") if other else None
     if value is None:
         return Clue(f"the field {field} takes a float: write 0.5 or 0.0, or float(...) around a variable")
@@ -60,15 +60,15 @@ def _not_a_float(source: Source, value: ast.expr, target: str) -> Clue:
     written = source.code(value, 40)
     if isinstance(value, ast.Tuple) and len(value.elts) == 2 and all(map(_is_whole, value.elts)):
         number = ".".join(source.code(e) for e in value.elts)
-        return Clue(f"the decimal sign is a point, and a comma makes two numbers: write {target}{number}", key="comma")
+        return Clue(f"a decimal comma makes two numbers: write {target}{number}", key="comma")
     number = (text_of(value) or "").strip().replace(",", ".")
     if number.lstrip("+-").replace(".", "", 1).isdigit():
         number = number if "." in number else f"{number}.0"
-        return Clue(f"{written} is a text, the field takes a number: write {target}{number}", key="quoted_number")
+        return Clue(f"{written} is a string, but the field takes a number: write {target}{number}", key="quoted_number")
     if text_of(value) is not None:
-        return Clue(f"{written} is a text, the field takes a number: write {target}0.0, with the number that is meant")
+        return Clue(f"{written} is a string, but the field takes a number: write {target}0.0, with your number")
     if isinstance(value, ast.Call) and chain(value.func) == "str" and len(value.args) == 1:
-        return Clue(f"str(...) makes a text, the field takes a float: write {target}{source.code(value.args[0], 50)}")
+        return Clue(f"str() makes a string, the field takes a float: write {target}{source.code(value.args[0], 50)}")
     return _no_number_yet(source, value, target, written)
 
 
@@ -80,21 +80,21 @@ def _no_number_yet(  # noqa: PLR0911  one for each kind of value
     if message is not None and chain(value) == message.name and message.type in SINGLE_NUMBERS:
         return Clue(f"{written} is the whole message: write {target}{written}.data")
     if isinstance(value, ast.Constant) and (value.value is None or isinstance(value.value, bool)):
-        return Clue(f"{value.value} is no number: write {target}0.0, or the number that is meant")
+        return Clue(f"{value.value} is not a number: write {target}0.0, or your number")
     if isinstance(value, ast.Call) and returns_nothing(source, value):
-        return Clue(f"{written} returns nothing: let it return the number, or write {target}0.0")
+        return Clue(f"{written} returns None: make it return the number, or write {target}0.0")
     if isinstance(value, ast.Call) and last_name(value.func) in ("now", "get_clock"):
-        return Clue(f"{written} is a time of ROS, not a number: its nanoseconds are {written}.nanoseconds")
+        return Clue(f"{written} is a ROS time, not a number: its nanoseconds are {written}.nanoseconds")
     undeclared = _declared_without_value(source, value)
     if undeclared is not None:
         return undeclared
     if isinstance(value, ast.Call) and last_name(value.func) == "get_parameter":
-        return Clue(f"{written} is the parameter, its value is one step further: write {target}{written}.value")
+        return Clue(f"{written} is the parameter, not its value: write {target}{written}.value")
     if isinstance(value, (ast.Attribute, ast.Name)) and source.resolved(value) in _DRAWS:
         return Clue(f"{written} is the function itself: call it, {written}()")
     if _is_whole(value):
-        return Clue(f"{written} is a whole number, the field takes a float: write {target}{written}.0")
-    return Clue(f"the field takes a float only: write {target}float({written})")
+        return Clue(f"{written} is an integer, but the field takes a float: write {target}{written}.0")
+    return Clue(f"the field takes only a float: write {target}float({written})")
 
 
 def _declared_without_value(source: Source, value: ast.expr) -> Clue | None:
@@ -141,12 +141,12 @@ def _published_wrongly(crash: Crash) -> Clue | None:
     expected, got = wrong[1], wrong[2].rpartition(".")[2]
     if got == f"Metaclass_{expected}":
         return Clue(f"{expected} is the class; publish an object of it: {expected}()")
-    return Clue(f"this publisher sends {expected} objects, not {got}: make one, set its fields and publish it")
+    return Clue(f"this publisher sends {expected} objects, not {got}: create one, set its fields and publish it")
 
 
 @crash_rule(r"Parameter\(s\) already declared: \['([\w./]+)'", in_file=False, priority=5030)
 def _declared_twice(crash: Crash) -> Clue | None:
-    return Clue(f"the parameter {crash.found[1][:60]} is declared twice: take one declare_parameter out")
+    return Clue(f"the parameter {crash.found[1][:60]} is declared twice: remove one declare_parameter")
 
 
 @crash_rule(r"undeclared parameter\(s\): ([\w./]+)", in_file=False, priority=5040)
@@ -175,8 +175,8 @@ def _with_init(crash: Crash) -> Clue | None:
 def _logger_arguments(crash: Crash) -> Clue | None:
     name = crash.found[1]
     if name is None:
-        return Clue("the logger takes text: put the value into an f-string, info(f'{value}')")
-    return Clue(f"{name} takes one text: put the values into it, {name}(f'... {{value}}')")
+        return Clue("the logger takes a string: put the value into an f-string, info(f'{value}')")
+    return Clue(f"{name} takes one string: put the values into it, {name}(f'... {{value}}')")
 
 
 @crash_rule(r"^EOFError|^termios\.error|^_?curses\.error|^IndexError", in_file=False, priority=5070)
@@ -184,7 +184,7 @@ def _unattended(crash: Crash) -> Clue | None:
     """The program waits for keyboard input, or for command line arguments."""
     if crash.found[0] != "IndexError":
         what = "input()" if crash.found[0] == "EOFError" else "the keyboard"
-        return Clue(f"nobody sits at the keyboard while the node runs: write the values down, without {what}")
+        return Clue(f"there is no keyboard while the node runs: set the values in the program, without {what}")
     if "argv" not in crash.source.line(crash.line):
         return None
     return Clue("the file is run without arguments: give the value a default in the program")
@@ -196,7 +196,7 @@ def _endless_recursion(crash: Crash) -> Clue | None:
     if function is None or f" in {function.name}" not in "".join(crash.fault.frames[-3:]):
         return None
     named = any(last_name(n) == function.name for n in subtree(function) if isinstance(n, (ast.Name, ast.Attribute)))
-    hint = f"{function.name} uses itself again and again: give what it stands for another name"
+    hint = f"{function.name} calls itself forever: rename one of the two things called {function.name}"
     return Clue(hint, crash.source.place(function)) if named else None
 
 
@@ -207,7 +207,7 @@ def _own_raise(crash: Crash) -> Clue | None:
     raised = next(source.on_line(crash.line, ast.Raise), None)
     if raised is None or source.function_at(crash.line) is None:
         return None
-    return Clue(f"{source.code(raised)} ends the node: log a warning instead, and go on")
+    return Clue(f"{source.code(raised)} ends the node: log a warning instead, and continue")
 
 
 @hint_rule(fault=None, priority=5100)
@@ -231,7 +231,7 @@ def _endless_loop(crash: Crash) -> Clue | None:
     loop, name = inside[-1]
     head = f"'{head_of(source, loop)}'"
     if name == "__init__":
-        hint = f"the loop {head} keeps the constructor from returning, so nothing else can happen"
+        hint = f"the loop {head} keeps the constructor from returning, so nothing else runs"
     elif name in {last_name(m.callback) for m in made(source, "timer", "subscription")}:
         hint = f"the loop {head} keeps {name} from returning: a callback must return at once"
     else:
@@ -249,7 +249,7 @@ def _named_only(crash: Crash) -> Clue | None:
             made_here = node_made(source)
             given = variable_of(source, made_here) if made_here is not None and name in SPINS else ""
             code = source.code(node, 40)
-            hint = f"{code} is named, not called: write {code}({given})"
+            hint = f"{code} is not called: write {code}({given})"
             return Clue(hint, source.place(node), key=f"named:{first_line(node)}")
     return None
 
@@ -263,7 +263,7 @@ def _never_awaited(crash: Crash) -> Clue | None:
         call = statement.value
         function = functions.get(chain(call.func)) if isinstance(call, ast.Call) else None
         if function is not None and source.function_of(statement) is None:
-            hint = f"{function.name} is async, so {source.code(call, 40)} runs nothing of it: write def {function.name}"
+            hint = f"{function.name} is async, so {source.code(call, 40)} does not run it: write def {function.name}"
             return Clue(f"{hint}, without async", source.place(function))
     return None
 
@@ -352,7 +352,7 @@ def _no_spin(crash: Crash) -> Clue | None:
     if loops:
         return _bounded_loop(source, loops)
     name = variable_of(source, node)
-    hint = f"{source.code(node)} makes the node, then the program ends: call rclpy.spin({name}) after it"
+    hint = f"{source.code(node)} creates the node, then the program ends: call rclpy.spin({name}) after it"
     return Clue(hint, source.place(node))
 
 
@@ -360,8 +360,8 @@ def _bounded_loop(source: Source, loops: list[Loop]) -> Clue | None:
     loop = loops[-1]
     if isinstance(loop, ast.While) and not isinstance(loop.test, (ast.Compare, ast.BoolOp)):
         return None
-    hint = f"the loop '{head_of(source, loop)}' comes to an end, and the program with it"
-    return Clue(f"{hint}: go on until the node is stopped", source.place(loop))
+    hint = f"the loop '{head_of(source, loop)}' ends, and the program with it"
+    return Clue(f"{hint}: keep running until the node is stopped", source.place(loop))
 
 
 def _publishes(source: Source, loop: ast.AST) -> bool:
@@ -376,7 +376,7 @@ def _spins_once(crash: Crash) -> Clue | None:
     once = list(source.calls("spin_once"))
     loops = [n for c in once for n in source.around(c, ast.AST) if isinstance(n, (ast.While, ast.For))]
     if len(once) == 1 and not loops:
-        hint = f"{source.code(once[0])} handles one event and returns: use spin to go on until the node is stopped"
+        hint = f"{source.code(once[0])} handles one event and returns: call spin, which runs until the node is stopped"
         return Clue(hint, source.place(once[0]))
     if len(loops) == 1:
         return _bounded_loop(source, loops)

@@ -18,7 +18,7 @@ _PRINT = re.compile(r"^\s*print\s+(?P<what>[^(].*)$")
 _OPERATORS = ((r"\belse\s+if\b", "elif"), (r"&&", "and"), (r"\|\|", "or"), (r"\+\+\s*$", "+= 1"))
 #: Message of Python -> what to do; the first match wins.
 _SAYINGS: Sequence[tuple[str, str]] = (
-    (r"^TabError", "indent every line with spaces only, four a level: this one mixes tabs and spaces with others"),
+    (r"^TabError", "indent every line with four spaces a level: this one mixes tabs and spaces"),
     (r"expected ':'", "a colon is missing at the end of: {code}"),
     (r"unindent does not match", "the line begins with {indent}: indent it exactly as the other lines of its block"),
     (r"unexpected indent", "the line begins with {indent}, more than its block: indent it as the line above"),
@@ -28,67 +28,67 @@ _SAYINGS: Sequence[tuple[str, str]] = (
     (r"does not match opening parenthesis", "the brackets do not match: {code}"),
     (
         r"invalid character '.' \(U\+(2018|2019|201C|201D|00B4|201E)\)",
-        "these are typographic quotation marks; type them again as ' or \"",
+        "these are typographic quotes; type them again as ' or \"",
     ),
     (r"invalid non-printable character", "an invisible character was copied along: type the line again"),
-    (r"unterminated (triple-quoted )?string literal", "the quotation mark at the end of the text is missing: {code}"),
-    (r"cannot assign to (?:function call|literal|expression)", "on the left of = stands a name: {code}"),
-    (r"expected '\('", "a name has no space and no hyphen, and brackets follow it: {code}"),
+    (r"unterminated (triple-quoted )?string literal", "the closing quote of the string is missing: {code}"),
+    (r"cannot assign to (?:function call|literal|expression)", "only a name can be on the left of =: {code}"),
+    (r"expected '\('", "a function name has no space or hyphen, and parentheses follow it: {code}"),
     (r"Maybe you meant '==' or ':=' instead|Maybe you meant '==' instead", "to compare, write == instead of ="),
     (r"Perhaps you forgot a comma", "a comma is probably missing in: {code}"),
-    (r"'return' outside function", "return stands outside a function: indent it as the function's other lines"),
-    (r"'(?:yield|await)' outside", "await and yield stand in functions only, and await only in those with async def"),
+    (r"'return' outside function", "return is outside a function: indent it like the function's other lines"),
+    (r"'(?:yield|await)' outside", "yield works only in functions, await only in those with async def"),
     (
         r"'(break|continue)' (?:outside|not properly in) loop",
-        "break and continue stand in loops only: to leave a function, write return",
+        "break and continue work only in loops: to leave a function, write return",
     ),
     (
         r"name '(\w+)' is (?:used|assigned to) (?:prior to|before) global",
         "global comes first: make it the first line of the function",
     ),
-    (r"positional argument follows keyword", "arguments with a name, as x=1, come last: {code}"),
-    (r"keyword argument repeated", "one name is given twice in: {code}"),
+    (r"positional argument follows keyword", "keyword arguments such as x=1 come last: {code}"),
+    (r"keyword argument repeated", "one keyword is given twice in: {code}"),
     (
         r"(?:non-default argument|parameter without a default) follows",
-        "parameters with a value, as x=1, come last: {code}",
+        "parameters with a default such as x=1 come last: {code}",
     ),
-    (r"duplicate argument", "two parameters have one name in: {code}"),
+    (r"duplicate argument", "two parameters have the same name in: {code}"),
     (
         r"cannot assign to (?:function call|literal|expression|True|False|None)",
-        "on the left of = stands a name: {code}",
+        "only a name can be on the left of =: {code}",
     ),
-    (r"illegal target for annotation|only single target", "a value is given with =, not with a colon: {code}"),
+    (r"illegal target for annotation|only single target", "a value is assigned with =, not with a colon: {code}"),
     (r"invalid decimal literal", "a name cannot begin with a digit, nor a number end with letters: {code}"),
-    (r"leading zeros", "a whole number cannot begin with 0: {code}"),
-    (r"unexpected character after line continuation", "a backslash may stand at the end of a line only: {code}"),
-    (r"expected 'except' or 'finally' block", "try needs an except or finally after it, indented as the try"),
+    (r"leading zeros", "an integer cannot begin with 0: {code}"),
+    (r"unexpected character after line continuation", "a backslash must be the last character of its line: {code}"),
+    (r"expected 'except' or 'finally' block", "try needs an except or finally after it, indented like the try"),
     (
         r"f-string: (?:expecting '}'|single '}'|empty expression|valid expression)",
-        "the braces of the f-string do not fit: {code}",
+        "the braces of the f-string do not match: {code}",
     ),
-    (r"unicodeescape", "a backslash in a text begins a special character: write r'...' before it, or / in paths"),
+    (r"unicodeescape", "a backslash in a string starts an escape sequence: write r'...', or / in paths"),
     (r"'elif' block follows|invalid syntax.*'else'", "elif comes before else"),
     (
         r"unexpected EOF|was never closed|EOF while scanning",
-        "something that is opened is not closed before the end of the file",
+        "a bracket or a string is not closed before the end of the file",
     ),
     (r"no binding for nonlocal|nonlocal declaration", "write global instead of nonlocal, or keep the value in self"),
-    (r"invalid character '(.)'", "the character {found} does not belong into a program: type it again"),
+    (r"invalid character '(.)'", "the character {found} is not valid in a program: type it again"),
 )
 #: What only the row shows, where Python says no more than "invalid syntax"; the first pattern that fits wins.
 _ROWS: Sequence[tuple[str, str]] = (
-    (r"[(,]\s*/\w", "a topic is a text: put it into quotation marks, '/name'"),
+    (r"[(,]\s*/\w", "a topic is a string: put it in quotes, '/name'"),
     (
         r"^\s*(?:function|func|void|int|double|float)\s+\w+\s*\(",
         "a function begins with def, and ends its first line with a colon",
     ),
     (r"^\s*(?:elseif|elsif|else if)\b", "in Python this is written elif"),
-    (r"^\s*def\s+\w+\s*:", "brackets are missing behind the name of the function: def name(self):"),
-    (r"^\s*(?:class|def)\s+\w+[- ]\w", "a name has no space and no hyphen: write _ instead"),
+    (r"^\s*def\s+\w+\s*:", "parentheses are missing after the function name: def name(self):"),
+    (r"^\s*(?:class|def)\s+\w+[- ]\w", "a name has no space or hyphen: write _ instead"),
     (r"^\s+\w+\s*\(self.*\):\s*$", "def is missing before the name of the method"),
-    (r"\w\s+['\"]|['\"]\s+\w|['\"]\s*['\"]/", "a comma is missing, before or after the text"),
+    (r"\w\s+['\"]|['\"]\s+\w|['\"]\s*['\"]/", "a comma is missing, before or after the string"),
     (r"^\s*import\s+\w+\s+from\b", "the module comes first: from module import name"),
-    (r"=\s*$", "a value is missing behind the ="),
+    (r"=\s*$", "a value is missing after the ="),
     (r"^\s*\w+\s*=\s*\+\+|\+\+\w", "in Python this is written += 1"),
 )
 #: A key that every notebook has, and how many lines of a file are searched for it.
@@ -107,9 +107,9 @@ def _notebook(crash: Crash) -> Clue | None:
     """The text of a Jupyter notebook, or a command that only a notebook understands."""
     source, row = crash.case.source, crash.case.source.line(crash.line)
     if source.line(1)[:1] == "{" and _NOTEBOOK.search("\n".join(source.lines[:_NOTEBOOK_LINES])):
-        return Clue(f"this is a notebook, whatever its name: {EXPORT_NOTEBOOK}", Location(source.file, 1))
+        return Clue(f"this is a notebook in spite of its name: {EXPORT_NOTEBOOK}", Location(source.file, 1))
     if (crash.fault.kind is FaultKind.SYNTAX_ERROR and _MAGIC.match(row[:200])) or crash.said("'get_ipython'"):
-        return Clue(f"{quote(row.strip(), 60)} is a command of a notebook, which Python does not know: take it out")
+        return Clue(f"{quote(row.strip(), 60)} is a notebook command, which Python does not know: remove it")
     return None
 
 
@@ -142,8 +142,8 @@ def _newer_f_string(fault: Fault, row: str) -> Clue | None:
     if nested is None:
         return None
     other = '"' if nested[1] == "'" else "'"
-    hint = f"Python 3.{fault.python[1]}, which reads the file here, wants other quotation marks inside the braces"
-    return Clue(f"{hint} than around them: {other}")
+    hint = f"Python 3.{fault.python[1]}, which reads the file here, needs different quotes inside the braces"
+    return Clue(f"{hint} than around them: use {other}")
 
 
 def _other_language(fault: Fault, row: str) -> Clue | None:
@@ -180,7 +180,7 @@ def _encoding(_: Crash) -> Clue | None:
 
 @crash_rule("null bytes", FaultKind.SYNTAX_ERROR, FaultKind.EXCEPTION, in_file=False, priority=1040)
 def _null_bytes(_: Crash) -> Clue | None:
-    return Clue("the file holds bytes that are no text: save it as UTF-8 in a text editor")
+    return Clue("the file holds bytes that are not text: save it as UTF-8 in a text editor")
 
 
 @crash_rule("^(?:ImportError|ModuleNotFoundError|AttributeError): .*", in_file=False, priority=1050)
@@ -193,7 +193,7 @@ def _hidden_module(crash: Crash) -> Clue | None:
     name = next((name for name in hidden if name.removesuffix(".py") in named), None)
     if name is None:
         return None
-    return Clue(f"{name} has the name of a module and is imported in its place: rename it")
+    return Clue(f"{name} has the name of a module and is imported instead: rename it")
 
 
 @crash_rule("^ImportError: attempted relative import with no known parent package", in_file=False, priority=1060)
@@ -201,12 +201,12 @@ def _no_package(crash: Crash) -> Clue | None:
     source = crash.case.source
     written = next((n for n in source.all(ast.ImportFrom) if n.level and n.lineno == crash.line), None)
     if written is None or written.level > 1:
-        advice = "imports with dots work in a package only, and this file is in none"
+        advice = "relative imports work only in a package, and this file is not in one"
         return Clue(f"{advice}: hand in the whole package, with its setup.py and __init__.py")
     names = ", ".join(a.name + (f" as {a.asname}" if a.asname else "") for a in written.names)
     plain = f"from {written.module} import {names}" if written.module else f"import {names}"
     helper = (written.module or written.names[0].name).partition(".")[0]
-    hint = f"the dot in '{source.code(written)}' works in a package only: write {quote(plain, 60)}"
+    hint = f"the dot in '{source.code(written)}' works only in a package: write {quote(plain, 60)}"
     return Clue(f"{hint}, with {helper}.py in the same folder")
 
 
@@ -236,8 +236,8 @@ def _missing_module(crash: Crash) -> Clue | None:
         return Clue(hint) if wanted.lower() == "rclpy.node" else None
     if wanted.endswith(_MESSAGE_ENDINGS) or _gives_messages(crash.case.source, wanted):
         listed = ", ".join(PACKAGES[:5])
-        hint = f"the package {wanted} is not here: hand in its folder with the definitions, grade with --interfaces"
-        return Clue(f"{hint} FOLDER, or use messages of the standard packages: {listed}, ...")
+        hint = f"the package {wanted} is not installed here: hand in its folder, grade with --interfaces"
+        return Clue(f"{hint} FOLDER, or use messages from the standard packages: {listed}, ...")
     if "." in wanted:
         return None
     return Clue(f"{wanted} is neither in the submission nor installed here: hand it in, or do without it")
@@ -256,8 +256,8 @@ def _gives_messages(source: Source, module: str) -> bool:
 def _cannot_import(crash: Crash) -> Clue | None:
     name, partially, module = crash.found.groups()
     if partially:
-        hint = f"the file that Python takes for {module} is not finished when it is asked: two files import each other"
-        return Clue(f"{hint}, or a file of yours has the name of a module")
+        hint = f"{module} is only partly imported at this point: two files import each other"
+        return Clue(f"{hint}, or one of your files has the name of a module")
     near = closest(name, MODULES.get(module, ()), 0.7)
     begun = [n for n in MODULES.get(module, ()) if n.rstrip("0123456789") == name]
     if begun:
@@ -267,7 +267,7 @@ def _cannot_import(crash: Crash) -> Clue | None:
         return Clue(f"upper and lower case matter: from {module} import {same[0]}")
     right = import_of(name)
     if right and not right.startswith(f"from {module} "):
-        return Clue(f"{name} is elsewhere: {right}")
+        return Clue(f"{name} is in another module: {right}")
     return Clue(f"from {module} import {near}, not {name}") if near else None
 
 
@@ -276,9 +276,9 @@ def _missing_file(crash: Crash) -> Clue | None:
     path, source = crash.found[1], crash.source
     name = quote(path, 60)
     if any(last_name(n.func) in _STARTERS and covers(n, crash.line) for n in source.all(ast.Call)):
-        return Clue(f"the program {name} is not there where submissions run, only Python and ROS are: do without it")
+        return Clue(f"the program {name} is not installed where submissions run: do without it")
     if path.startswith("/"):
-        return Clue(f"{name} is a path of one computer: hand the file in beside the program, and open it by its name")
+        return Clue(f"{name} exists only on your computer: hand the file in with the program, and open it by its name")
     ways = {start.way for start in crash.case.trace.starts if start.process == crash.case.process}
     if ways - {StartWay.SCRIPT}:
         hint = f"`ros2 run` starts a program in any folder: let setup.py install {name} with data_files"
@@ -288,5 +288,5 @@ def _missing_file(crash: Crash) -> Clue | None:
 
 @crash_rule(r"partially initialized module '(\w+)' has no attribute", in_file=False, priority=1110)
 def _shadowed_module(crash: Crash) -> Clue | None:
-    hint = f"a file of yours has the name of the module {crash.found[1]} and is imported in its place: rename the file"
+    hint = f"one of your files has the name of the module {crash.found[1]} and is imported instead: rename it"
     return Clue(hint)

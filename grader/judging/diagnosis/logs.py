@@ -55,7 +55,7 @@ def _into_file(case: Case) -> Clue | None:
     writing = next(filter(_writes, source.all(ast.Call)), None)
     if writing is None or not _unseen(case):
         return None
-    hint = f"{source.code(writing, 60)}: what goes into a file is not seen by the grader; "
+    hint = f"{source.code(writing, 60)}: the grader does not see what goes into a file; "
     return Clue(f"{hint}write it with self.get_logger().info(...)", source.place(writing), key="into_file")
 
 
@@ -123,7 +123,7 @@ def _by_python(case: Case) -> Clue | None:
     own = next(calls, None)
     if own is None:
         return None
-    hint = f"{source.code(own, 60)} is Python's own logging, which ROS does not see: self.get_logger().info(...)"
+    hint = f"{source.code(own, 60)} is Python's own logging, which ROS does not see: use self.get_logger().info(...)"
     return Clue(hint, source.place(own))
 
 
@@ -154,22 +154,20 @@ def _text_as_it_stands(case: Case) -> Clue | None:
     ]
     for call in doubled:
         if any("{" in w and "}" in w for w in written):
-            hint = f"double braces are braces as text: write single ones, in {source.code(call.args[0], 50)}"
+            hint = f"double braces print one brace: write single ones, in {source.code(call.args[0], 50)}"
             return Clue(hint, source.place(call))
     for call, text in plain:
         fields = [m["value"] for m in _FIELD.finditer(text)]
         if fields and text.strip() in written:
-            return Clue(f"the f before the text is missing: f{source.code(call.args[0], 50)}", source.place(call))
+            return Clue(f"the f before the string is missing: f{source.code(call.args[0], 50)}", source.place(call))
         empty = re.findall(r"\{(?::[^{}]*)?\}", text)
         if empty and text.strip() in written:
             values = ", ".join(["..."] * len(empty))
-            return Clue(
-                f"{empty[0]} stays as it is without a value: put .format({values}) behind the text", source.place(call)
-            )
+            return Clue(f"{empty[0]} is printed as it is: put .format({values}) after the string", source.place(call))
         places = _PERCENT.findall(text)
         if places and text.strip() in written:
             values = ", ".join(["..."] * len(places))
-            hint = f"{places[0]} stays as it is without a value: put % ({values}) behind the text"
+            hint = f"{places[0]} is printed as it is: put % ({values}) after the string"
             return Clue(hint, source.place(call))
     return None
 
@@ -180,7 +178,7 @@ def _level_raised(case: Case) -> Clue | None:
     for call in case.source.calls("set_level", "set_logger_level"):
         level = last_name(call.args[-1]) if call.args else ""
         if _nothing_logged(case) and level.upper() in _HIGH_LEVELS:
-            hint = f"{case.source.code(call)} hides what is logged below the level {level.upper()}: take it out"
+            hint = f"{case.source.code(call)} hides logs below the level {level.upper()}: remove it"
             return Clue(hint, case.source.place(call), key="level_raised")
     return None
 
@@ -226,7 +224,7 @@ def _commented_out(case: Case) -> Clue | None:
     row = next((k for k, line in enumerate(case.source.lines, 1) if _COMMENTED_LOG.match(line[:300])), 0)
     if not row:
         return None
-    return Clue("the log is commented out: take the # away", Location(case.source.file, row))
+    return Clue("the log is commented out: remove the #", Location(case.source.file, row))
 
 
 def _must_repeat(case: Case) -> Case | None:
@@ -242,13 +240,13 @@ def _logged_once(case: Case) -> Clue | None:
         return None
     once = argument(call, 99, "once")
     if isinstance(once, ast.Constant) and once.value is True:
-        return Clue("once=True lets this log through a single time: take it out", case.source.place(call), key="once")
+        return Clue("once=True writes this log only once: remove it", case.source.place(call), key="once")
     wrong, pace = case.found(WrongLogFacts), case.found(LogPaceFacts)
     few = (wrong is not None and wrong.cause == "few") or (pace is not None and pace.count == 1)
     test = next(case.source.around(call, ast.If), None)
     if not few or test is None or not _set_inside(test):
         return None
-    hint = f"under 'if {case.source.code(test.test, 40)}' this logs a single time: log again and again"
+    hint = f"under 'if {case.source.code(test.test, 40)}' this logs only once: log repeatedly"
     return Clue(hint, case.source.place(test), key="once")
 
 
@@ -269,7 +267,7 @@ def _log_period(case: Case) -> Clue | None:
     source, wanted_s, average = case.source, pace.wanted_s, pace.average_s
     worth = constant(source, argument(call, 99, "throttle_duration_sec"))
     if worth is not None and 0.8 * worth.value <= average <= 1.3 * worth.value:
-        hint = f"throttle_duration_sec={number(worth.value)} lets a log through every {number(worth.value)} s"
+        hint = f"throttle_duration_sec={number(worth.value)} allows a log every {number(worth.value)} s"
         return Clue(f"{hint}: write {wanted_s}", source.place(worth.origin), key="log_pace")
     timers = [m for m in made(source, "timer") if call in runs(source, m)]
     if timers:
@@ -306,7 +304,7 @@ def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: 
     worth = constant(source, timers[0].period)
     if worth is None or abs(worth.value - average_s) > 0.05 * average_s or worth.value == wanted_s:
         return None
-    hint = f"{timer_code(source, timers[0])} is called every {number(worth.value)} s: write {wanted_s}"
+    hint = f"{timer_code(source, timers[0])} fires every {number(worth.value)} s: write {wanted_s}"
     return Clue(hint, source.place(worth.origin), key="log_pace")
 
 
@@ -327,14 +325,14 @@ def _received_not_logged(case: Case) -> Clue | None:
     if logs or elsewhere or case.verdict.outcome is not Outcome.NOT_MET:
         return None
     name = last_name(item.callback) or "the callback"
-    return Clue(f"{name} receives the values and logs none of them: log msg.data in it", source.place(start[0]))
+    return Clue(f"{name} receives the values but does not log them: log msg.data in it", source.place(start[0]))
 
 
 def _wrong_log(source: Source, log: ast.Call, inside: list[ast.AST]) -> Clue | None:
     """Return a clue if a log shows no value, or only attributes unrelated to the message."""
     names = [n for a in log.args for n in _inner(a) if isinstance(n, (ast.Name, ast.Attribute))]
     if not names:
-        return Clue("this log holds no value: log what was received, msg.data", source.place(log))
+        return Clue("this log contains no value: log what was received, msg.data", source.place(log))
     whole = [n for n in names if not isinstance(source.parents.get(n), ast.Attribute)]
     own = [chain(n) for n in whole if chain(n).startswith("self.")]
     if len(own) < len(whole) or set(own) & _stored(inside):
@@ -367,7 +365,7 @@ def _error_while_waiting(case: Case) -> Clue | None:
     call = next(logs, None)
     if call is None or last_name(call.func) not in ("error", "fatal"):
         return None
-    return Clue(f"this is no failure of the node: use info or warn instead of {last_name(call.func)}")
+    return Clue(f"this is not a failure of the node: use info or warn instead of {last_name(call.func)}")
 
 
 @hint_rule(LogsEvery, priority=11130)
@@ -387,7 +385,7 @@ def _log_every(case: Case) -> Clue | None:
         return None
     rest = number_in_code(source, test.test.comparators[0]) if isinstance(test.test, ast.Compare) else None
     if rest is not None and rest >= worth.value:
-        hint = f"'{source.code(test.test, 40)}' is never true, the rest is below {number(worth.value)}: compare with 0"
+        hint = f"'{source.code(test.test, 40)}' is never true, as it is below {number(worth.value)}: compare with 0"
         return Clue(hint, source.place(test))
     if worth.value == every:
         return None

@@ -173,10 +173,10 @@ def _called_value(source: Source, kind: str, call: ast.Call) -> Clue | None:
         return Clue(f"{code} is a number, not a function: write it without the parentheses")
     if isinstance(call.func, ast.Name) and call.func.id in source.stored:
         store = source.stored[call.func.id][0]
-        hint = f"{call.func.id} gets a value here, which hides the function of this name: choose another name"
+        hint = f"{call.func.id} is assigned here, which hides the function of this name: choose another name"
         return Clue(hint, source.place(store))
     if isinstance(call.func, ast.Constant):
-        return Clue(f"a number before a bracket is a call: write {code} * (...)")
+        return Clue(f"a number before a parenthesis is a call: to multiply, write {code} * (...)")
     return None
 
 
@@ -196,7 +196,7 @@ def _quoted_callback(crash: Crash) -> Clue | None:
     for item in made(source, "timer", "subscription"):
         name = text_of(item.callback)
         if name is not None and item.callback is not None and len(name) < 60:
-            hint = f"the callback is the method itself, without quotation marks: self.{name.strip('.')}"
+            hint = f"pass the method itself, without quotes: self.{name.strip('.')}"
             return Clue(hint, source.place(item.callback))
     return None
 
@@ -217,15 +217,15 @@ def _service_instance(crash: Crash) -> Clue | None:
         around = source.parents.get(call)
         where = last_name(around.func) if isinstance(around, ast.Call) else ""
         if where in ("create_service", "create_client"):
-            return Clue(f"pass the class of the service: {name}, without the parentheses")
+            return Clue(f"pass the service class: {name}, without the parentheses")
         if where in ("call_async", "call"):
             return Clue(f"a call sends a request: write {name}.Request()")
         function = source.function_at(crash.line)
         given = parameters(function)[-1:] if function is not None else []
         serving = {last_name(argument(c, 2, "callback")) for c in source.calls("create_service")}
         if function is not None and function.name in serving and given:
-            return Clue(f"the response is there already, as {given[0]}: fill that in and return it")
-        return Clue(f"{name} is a service: make its request, {name}.Request(), or its response, {name}.Response()")
+            return Clue(f"the callback already receives the response, as {given[0]}: fill it in and return it")
+        return Clue(f"{name} is a service: create its request, {name}.Request(), or its response, {name}.Response()")
     return None
 
 
@@ -238,8 +238,8 @@ def _wrong_request(crash: Crash) -> Clue | None:
             given = call.args[0]
             if isinstance(given, ast.Attribute) and given.attr == "Request":
                 code = source.code(given)
-                return Clue(f"{code} is the class: write {code}(), which makes a request")
-            return Clue("a call takes an object of the service's request, such as Trigger.Request()")
+                return Clue(f"{code} is the class: write {code}() to create a request")
+            return Clue("a call takes a request object such as Trigger.Request()")
     for call in source.calls("create_service"):
         functions = source.functions(last_name(argument(call, 2, "callback")))
         if len(functions) != 1 or len(parameters(functions[0])) < 2:
@@ -264,7 +264,7 @@ def _node_name(crash: Crash) -> Clue | None:
         first = argument(call, 0, "node_name")
         if first is not None and chain(call.func) == "super().__init__" and text_of(first) is None:
             name = crash.fault.process.removesuffix(".py")
-            return Clue(f"the name of the node is a text: super().__init__('{name}')")
+            return Clue(f"the node name is a string: super().__init__('{name}')")
     return None
 
 
@@ -279,7 +279,7 @@ def _wrong_arguments(crash: Crash) -> Clue | None:
         return Clue("rclpy.init has no such argument: write rclpy.init(args=args)")
     special = {
         "publish": "publish takes one message: set its fields, then publish(msg)",
-        "sleep": "sleep takes the seconds: time.sleep(0.5)",
+        "sleep": "sleep takes a number of seconds: time.sleep(0.5)",
         "destroy_node": "destroy_node takes no argument: node.destroy_node()",
     }
     if name in special and not crash.source.functions(name):
@@ -308,8 +308,8 @@ def _of_node(crash: Crash, name: str, missing: str | None, keyword: str | None) 
         if meant not in SIGNATURES[name]:
             meant = {"topic": "srv_name", "msg_type": "srv_type"}.get(meant, "")
         if crash.found[7]:
-            return Clue(f"{keyword} is given twice, by its place and by its name: leave one out")
-        return Clue(f"{name} has no {keyword}: the name is {meant}") if meant in SIGNATURES[name] else None
+            return Clue(f"{keyword} is given twice, by position and by name: remove one")
+        return Clue(f"{name} has no argument {keyword}: write {meant}") if meant in SIGNATURES[name] else None
     call = next(iter(_calls(crash, name)), None)
     if missing is not None and call is not None and name == "create_timer" and len(call.args) == 1:
         first = crash.source.code(call.args[0], 40)
@@ -334,7 +334,7 @@ def _to_super(crash: Crash, name: str) -> Clue | None:
     for call in _calls(crash, "__init__"):
         if chain(call.func) == "super().__init__" and call.args and chain(call.args[0]) == "self":
             rest = ", ".join(crash.source.code(a, 40) for a in call.args[1:])
-            return Clue(f"super() passes self by itself: super().__init__({rest})")
+            return Clue(f"super() already passes self: super().__init__({rest})")
     return None
 
 
@@ -357,7 +357,7 @@ _RANDOM = {
     "uniform": "uniform takes the lowest and the highest number: random.uniform(low, high)",
     "randint": "randint takes the lowest and the highest whole number: random.randint(low, high)",
     "choice": "choice takes one list: random.choice([a, b])",
-    "gauss": "gauss takes the mean and the deviation: random.gauss(mean, deviation)",
+    "gauss": "gauss takes the mean and the standard deviation: random.gauss(mean, deviation)",
 }
 
 
@@ -394,7 +394,7 @@ def _to_own(crash: Crash, name: str) -> Clue | None:
     own = names[1:] if method else names
     needed = own[: len(own) - len(function.args.defaults)] if function.args.defaults else own
     wanted = f"{call_name}({', '.join(needed)})" if needed else f"{call_name}()"
-    return Clue(f"{source.code(calls[0], 50)} does not fit line {first_line(function)}, def {name}: call {wanted}")
+    return Clue(f"{source.code(calls[0], 50)} does not match line {first_line(function)}, def {name}: call {wanted}")
 
 
 def _to_call(crash: Crash, name: str) -> Clue | None:
@@ -424,13 +424,13 @@ def _text_and_number(crash: Crash) -> Clue | None:
         return None
     if all(t is None or t.strip().replace(".", "", 1).isdigit() for t in texts):
         number = next(t for t in texts if t is not None).strip()
-        return Clue(f"'{number}' is a text: write {number} without quotation marks to calculate with it")
+        return Clue(f"'{number}' is a string: write {number} without quotes to calculate with it")
     filled = [t if t is not None else f"{{{source.code(p, 30)}}}" for t, p in zip(texts, parts, strict=True)]
     shown = "".join(filled)
     quote = '"' if "'" in shown else "'"
     if len(shown) > 60 or '"' in shown or "…" in shown:
-        return Clue("a number cannot be added to a text: put it into an f-string, f'... {value}'")
-    return Clue(f"a number cannot be added to a text: write f{quote}{shown}{quote}")
+        return Clue("a number cannot be added to a string: put it into an f-string, f'... {value}'")
+    return Clue(f"a number cannot be added to a string: write f{quote}{shown}{quote}")
 
 
 def _summands(node: ast.expr) -> Iterator[ast.expr]:
@@ -450,7 +450,7 @@ def _summands(node: ast.expr) -> Iterator[ast.expr]:
 def _time_and_number(crash: Crash) -> Clue | None:
     del crash
     return Clue(
-        "a time of ROS and a number cannot be mixed: subtract two times, (now - start).nanoseconds / 1e9 is in seconds"
+        "a ROS time and a number cannot be mixed: subtract two times, (now - start).nanoseconds / 1e9 is in seconds"
     )
 
 
@@ -462,9 +462,7 @@ def _text_or_list_as_number(crash: Crash) -> Clue | None:
         for side in (node.left, node.right):
             written = (text_of(side) or "").strip()
             if written.lstrip("-").replace(".", "", 1).isdigit():
-                return Clue(
-                    f"{source.code(side)} is a text: write {written} without quotation marks to calculate with it"
-                )
+                return Clue(f"{source.code(side)} is a string: write {written} without quotes to calculate with it")
             if isinstance(side, ast.List) and len(side.elts) == 1:
                 inside = source.code(side.elts[0], 30)
                 return Clue(f"{source.code(side, 40)} is a list: write {inside} without the square brackets")
@@ -479,8 +477,8 @@ def _text_compared(crash: Crash) -> Clue | None:
         for side in (test.left, *test.comparators):
             written = text_of(side)
             if written is not None and written.strip().replace(".", "", 1).lstrip("-").isdigit():
-                return Clue(f"{source.code(side)} is a text: compare with the number {written.strip()}")
-    return Clue("one side is a text, the other a number: turn the text into a number with float(...)")
+                return Clue(f"{source.code(side)} is a string: compare with the number {written.strip()}")
+    return Clue("one side is a string, the other a number: convert the string with float(...)")
 
 
 @crash_rule(
@@ -502,7 +500,7 @@ def _starts_as(crash: Crash) -> Clue | None:
                 continue
             fits = crash.said("NoneType") if value.value is None else crash.said(r"str\b|sequence")
             if fits:
-                hint = f"{source.code(statement or store)} is no number to calculate with: begin with 0 or 0.0"
+                hint = f"{source.code(statement or store)} is not a number to calculate with: start with 0 or 0.0"
                 return Clue(hint, source.place(store))
     return None
 
@@ -526,10 +524,10 @@ def _percent(crash: Crash) -> Clue | None:
         behind = around.elts[1:] if isinstance(around, ast.Tuple) and around.elts[0] is node else behind
         if places == len(values) + len(behind) and behind:
             given = ", ".join(source.code(v, 30) for v in (*values, *behind))
-            return Clue(f"the values belong into one pair of brackets: % ({given})")
+            return Clue(f"put the values in one pair of parentheses: % ({given})")
         if places != len(values):
             one = f"{places} placeholder{'s' if places != 1 else ''}"
-            return Clue(f"the text has {one}, and {len(values)} value{'s' if len(values) != 1 else ''} behind the %")
+            return Clue(f"the string has {one}, but {len(values)} value{'s' if len(values) != 1 else ''} after the %")
         return Clue("a placeholder such as %.2f or %d takes a number: use %s for anything else")
     return None
 
@@ -547,11 +545,9 @@ def _format_fields(crash: Crash) -> Clue | None:
         places = len(re.findall(r"(?<!\{)\{(?!\{)", written))
         given = len(call.args) + len(call.keywords)
         if places > given:
-            return Clue(f"the text asks for {places} values, format gets {given}: pass each of them to format(...)")
+            return Clue(f"the string needs {places} values, format gets {given}: pass each of them to format(...)")
         if crash.found[2]:
-            return Clue(
-                f"format gets no {crash.found[2]}: write {crash.found[2]}=... in its brackets, or use an f-string"
-            )
+            return Clue(f"format gets no {crash.found[2]}: write {crash.found[2]}=... to it, or use an f-string")
     return None
 
 
@@ -567,21 +563,21 @@ def _format_code(crash: Crash) -> Clue | None:
     formatted = [n for n in source.on_line(crash.line, ast.FormattedValue) if n.format_spec is not None]
     value = source.code(formatted[0].value, 30) if len(formatted) == 1 else "the value"
     if type_ == "str" and code in tuple("feEgGdn%"):
-        return Clue(f"{value} is a text here: turn it into a number with float(...), or leave the format out")
+        return Clue(f"{value} is a string here: convert it with float(...), or remove the format")
     if type_ == "float":
         specs = [
             (n, text_of(s.values[0])) for n in formatted if isinstance(s := n.format_spec, ast.JoinedStr) and s.values
         ]
         own = next((n for n, spec in specs if spec is not None and spec.endswith(code)), None)
         shown = f"{{{source.code(own.value, 30)}:.2f}}" if own is not None else ":.2f"
-        return Clue(f"the format {code} is for whole numbers: write {shown} for a float")
+        return Clue(f"the format {code} is for integers: write {shown} for a float")
     if other == "NoneType":
-        return Clue(f"{value} is None at this time: test for it before you log it")
+        return Clue(f"{value} is None here: check for it before you log it")
     if other in ("method", "builtin_function_or_method", "function"):
-        return Clue(f"{value} is named, not called: write the parentheses")
+        return Clue(f"{value} is not called: write the parentheses")
     if other is not None:
         return Clue(f"{value} is a {other}, which takes no number format: format one of its numbers")
-    return Clue("the format behind the colon is not one that Python knows: write {value:.2f}")
+    return Clue("Python does not know the format after the colon: write {value:.2f}")
 
 
 # --- numbers, lists and conversions ----------------------------------------------------------------------------------
@@ -596,10 +592,10 @@ def _divided_by_zero(crash: Crash) -> Clue | None:
     divisor, code = divisions[0].right, source.code(divisions[0].right, 40)
     worth = constant(source, divisor)
     if worth is not None and worth.value == 0 and worth.origin is not divisor:
-        return Clue(f"{code} is 0, and nothing can be divided by it: give it another value", source.place(worth.origin))
+        return Clue(f"{code} is 0, and division by 0 fails: give it another value", source.place(worth.origin))
     if worth is not None and worth.value == 0:
-        return Clue("nothing can be divided by 0: write another number")
-    return Clue(f"{code} is 0 here: test for it before you divide")
+        return Clue("division by 0 fails: write another number")
+    return Clue(f"{code} is 0 here: check for it before you divide")
 
 
 @crash_rule(
@@ -612,11 +608,11 @@ def _whole_number(crash: Crash) -> Clue | None:
     for call in _calls(crash):
         if last_name(call.func) in ("randint", "randrange") and any(not _whole(a) for a in call.args):
             given = ", ".join(source.code(a, 20) for a in call.args)
-            return Clue(f"{last_name(call.func)} takes whole numbers: write random.uniform({given})")
+            return Clue(f"{last_name(call.func)} takes integers: write random.uniform({given})")
         if chain(call.func) == "range":
-            return Clue("range takes whole numbers: turn each of them into one with int(...)")
+            return Clue("range takes integers: convert each of them with int(...)")
     if crash.said("indices must be integers"):
-        return Clue("the place in a list is a whole number: use int(...), or another name for what you look for")
+        return Clue("a list index is an integer: use int(...), or a dict to look up by name")
     return None
 
 
@@ -635,10 +631,10 @@ def _too_short(crash: Crash) -> Clue | None:
     taken = next((n for n in source.on_line(crash.line, ast.Subscript) if isinstance(n.ctx, ast.Load)), None)
     if taken is not None:
         owner = source.code(taken.value, 40)
-        return Clue(f"{owner} is too short for {source.code(taken, 40)} at this time: test its length first")
+        return Clue(f"{owner} is too short for {source.code(taken, 40)} here: check its length first")
     call = next((c for c in _calls(crash) if last_name(c.func) in ("pop", "popleft", "choice")), None)
     return (
-        Clue(f"{source.code(call, 40)} takes from an empty list: test its length first") if call is not None else None
+        Clue(f"{source.code(call, 40)} takes from an empty list: check its length first") if call is not None else None
     )
 
 
@@ -650,7 +646,7 @@ def _no_key(crash: Crash) -> Clue | None:
         return None
     owner = source.code(taken[0].value, 40)
     key = source.code(taken[0].slice, 30)
-    return Clue(f"{owner} has no entry {key} at this time: set it first, or read it with {owner}.get({key})")
+    return Clue(f"{owner} has no entry {key} yet: set it first, or read it with {owner}.get({key})")
 
 
 @crash_rule(
@@ -664,10 +660,10 @@ def _no_number(crash: Crash) -> Clue | None:
         if chain(call.func) == asked and call.args:
             code = source.code(call, 40)
             if chain(call.func) == "int" and re.fullmatch(r"-?\d+\.\d*", found):
-                return Clue(f"{code} takes whole numbers only: write float({source.code(call.args[0], 30)})")
+                return Clue(f"{code} takes only integers: write float({source.code(call.args[0], 30)})")
             if re.fullmatch(r"-?\d+,\d+", found):
-                return Clue("the decimal sign is a point: write 0.5 instead of 0,5")
-            return Clue(f"{code} takes a text that is nothing but a number: take the number out of it first")
+                return Clue("Python has no decimal comma: write 0.5 instead of 0,5")
+            return Clue(f"{code} needs a string that holds only a number: extract the number first")
     return None
 
 
@@ -683,7 +679,7 @@ def _unpacked(crash: Crash) -> Clue | None:
             code, count = source.code(statement.value, 40), len(target.elts)
             if crash.found[2]:
                 return Clue(f"{code} is one {crash.found[2]}, and there are {count} names for it")
-            return Clue(f"{code} does not have {count} parts: write as many names as it has")
+            return Clue(f"{code} does not have {count} elements: write as many names as it has")
     return None
 
 
@@ -696,10 +692,10 @@ def _not_indexed(crash: Crash) -> Clue | None:
     taken = list(source.on_line(crash.line, ast.Subscript))
     if kind in ("method", "builtin_function_or_method", "function") and taken:
         code = source.code(taken[-1].value, 40)
-        return Clue(f"{code} is a function: call it with round brackets, {code}(...)")
+        return Clue(f"{code} is a function: call it with parentheses, {code}(...)")
     if kind in ("float", "int") and taken:
         code = source.code(taken[-1].value, 40)
-        return Clue(f"{code} is one number, without parts: use it as it is")
+        return Clue(f"{code} is a single number, not a list: use it as it is")
     return None
 
 
@@ -712,7 +708,7 @@ def _returns_from_init(crash: Crash) -> Clue | None:
     found = [r for r in source.all(ast.Return) if r.value is not None and source.function_name(r) == "__init__"]
     if len(found) != 1:
         return None
-    return Clue(f"__init__ returns nothing: take {source.code(found[0], 40)} out", source.place(found[0]))
+    return Clue(f"__init__ must not return a value: remove {source.code(found[0], 40)}", source.place(found[0]))
 
 
 @crash_rule(
@@ -726,7 +722,7 @@ def _too_many_for_builtin(crash: Crash) -> Clue | None:
     for call in _calls(crash, name):
         if len(call.args) == 2 and name == "float" and all(_whole(a) for a in call.args):
             number = ".".join(crash.source.code(a) for a in call.args)
-            return Clue(f"the decimal sign is a point, and a comma makes two numbers: write {number}")
+            return Clue(f"a decimal comma makes two numbers: write {number}")
         if name in ("str", "int", "float") and len(call.args) > 1:
             right = "f'... {value}'" if name == "str" else f"{name}(value)"
             return Clue(f"{name} takes one value: write {right}")
@@ -740,7 +736,7 @@ def _too_many_for_builtin(crash: Crash) -> Clue | None:
 def _second_to_spin(crash: Crash) -> Clue | None:
     for call in _calls(crash, "spin"):
         if len(call.args) > 1:
-            return Clue(f"spin takes the node alone: rclpy.spin({crash.source.code(call.args[0], 40)})")
+            return Clue(f"spin takes only the node: rclpy.spin({crash.source.code(call.args[0], 40)})")
     return None
 
 
@@ -753,7 +749,7 @@ def _no_event_loop(crash: Crash) -> Clue | None:
     hint = (
         f"{crash.source.code(awaited[0], 40)} works in asyncio's own loop only, and rclpy.spin runs callbacks without"
     )
-    return Clue(f"{hint} it: take it out, a timer sets the pace", crash.source.place(awaited[0]))
+    return Clue(f"{hint} it: remove it, a timer sets the pace", crash.source.place(awaited[0]))
 
 
 @crash_rule(r"^TypeError: object (\w+) can't be used in 'await' expression", priority=7280)
@@ -762,7 +758,7 @@ def _awaited_nothing(crash: Crash) -> Clue | None:
     if not awaits:
         return None
     code = crash.source.code(awaits[0].value, 40)
-    return Clue(f"{code} gives nothing to wait for: write it without await")
+    return Clue(f"{code} cannot be awaited: write it without await")
 
 
 @crash_rule(r"'coroutine' object", priority=7290)

@@ -84,7 +84,7 @@ def _period(paced: _Paced) -> Clue | None:
         return None
     if worth.value == 0:
         code = timer_code(paced.source, timers[0])
-        why = "; // divides to a whole number, / does not" if "//" in code else ""
+        why = "; // rounds down to an integer, / does not" if "//" in code else ""
         hint = f"{code} has a period of 0 s: write {number(paced.period_s)}{why}"
         return Clue(hint, paced.source.place(worth.origin))
     explains = _same(1 / worth.value, paced.found_hz) or (
@@ -95,14 +95,14 @@ def _period(paced: _Paced) -> Clue | None:
 
 def _period_clue(source: Source, timer: Made, worth: Constant, wanted_hz: float) -> Clue:
     wanted_s = number(1 / wanted_hz)
-    is_ = f"{timer_code(source, timer)} is called every {number(worth.value)} s"
+    is_ = f"{timer_code(source, timer)} fires every {number(worth.value)} s"
     if _same(worth.value, wanted_hz):
-        hint = f"{is_}: {number(worth.value)} is the rate; the period is 1/{number(wanted_hz)} = {wanted_s} s"
+        hint = f"{is_}: {number(worth.value)} is the rate, the period is 1/{number(wanted_hz)} = {wanted_s} s"
     elif _same(worth.value, 1000 / wanted_hz):
-        hint = f"{is_}: the period is in seconds, not in milliseconds: {wanted_s}"
+        hint = f"{is_}: the period is in seconds, not milliseconds: write {wanted_s}"
     else:
         rate = number(1 / worth.value)
-        hint = f"{is_}, which is {rate} Hz; {number(wanted_hz)} Hz is a period of {wanted_s} s"
+        hint = f"{is_}, which is {rate} Hz; {number(wanted_hz)} Hz needs a period of {wanted_s} s"
     return Clue(hint, source.place(worth.origin), key=f"period:{timer.call.lineno}")
 
 
@@ -121,7 +121,7 @@ def _callback_held_up(paced: _Paced) -> Clue | None:
         total = sum(s.value for s in sleeps)
         if sleeps and total > paced.period_s and _same(1 / total, paced.found_hz):
             call = sleeps[0].origin
-            hint = f"{paced.source.code(call)} holds up the callback: take it out, the timer sets the pace"
+            hint = f"{paced.source.code(call)} blocks the callback: remove it, because the timer sets the pace"
             return Clue(hint, paced.source.place(call))
     return _held_up_now_and_then(paced)
 
@@ -135,7 +135,7 @@ def _loops_in_callback(paced: _Paced) -> Clue | None:
                 continue
             name = paced.source.function_name(node) or "the callback"
             hint = f"the loop '{head_of(paced.source, node)}' keeps {name} from returning: "
-            return Clue(f"{hint}take the loop away, the timer calls {name} again", paced.source.place(node))
+            return Clue(f"{hint}remove the loop, the timer calls {name} again", paced.source.place(node))
     return None
 
 
@@ -156,8 +156,8 @@ def _held_up_now_and_then(paced: _Paced) -> Clue | None:
                 continue
             test = next(source.around(sleep.origin, ast.If), None)
             under = f" under 'if {source.code(test.test, 40)}'" if test is not None else ""
-            hint = f"{source.code(sleep.origin)}{under} holds up every callback of the node, one after the other"
-            return Clue(f"{hint}: take it out", source.place(sleep.origin))
+            hint = f"{source.code(sleep.origin)}{under} blocks every callback of the node"
+            return Clue(f"{hint}: remove it", source.place(sleep.origin))
     return None
 
 
@@ -193,13 +193,13 @@ def _published_several_times(paced: _Paced) -> Clue | None:
         return Clue(f"{hint}: one is enough", source.place(timers[-1].call))
     inside = [c for c in reached(source, roots(source, timers[0].callback)) if c in paced.calls]
     if len(inside) > 1:
-        hint = f"publish is called {len(inside)} times a round, in {lines_of(inside[0], *inside[1:])}"
+        hint = f"publish is called {len(inside)} times per iteration, in {lines_of(inside[0], *inside[1:])}"
         return Clue(f"{hint}: once is enough", source.place(max(inside, key=first_line)))
     loop = next((n for c in inside for n in source.around(c, ast.For)), None)
     if loop is None:
         return None
     hint = f"the loop '{head_of(source, loop)}' publishes several messages at once"
-    return Clue(f"{hint}: one every {number(paced.period_s)} s is asked for", source.place(loop))
+    return Clue(f"{hint}: publish one every {number(paced.period_s)} s", source.place(loop))
 
 
 @hint_rule(TopicRate, given=_paced, priority=9050)
@@ -210,7 +210,7 @@ def _stopped_itself(paced: _Paced) -> Clue | None:
     source = paced.source
     for timer in paced.timers():
         inside = runs(source, timer)
-        advice = "ends the publishing: it has to go on until the node is stopped"
+        advice = "stops publishing: publish until the node is stopped"
         for node in inside:
             if isinstance(node, ast.Call) and last_name(node.func) in ("destroy_node", "destroy_timer", "cancel"):
                 return Clue(f"{source.code(node)} {advice}", source.place(node))
@@ -261,7 +261,7 @@ def _loop_pace(paced: _Paced) -> Clue | None:
     rates = list(source.calls("create_rate", "Rate"))
     worth = constant(source, argument(rates[0], 0, "frequency")) if len(rates) == 1 else None
     if worth is not None and _same(worth.value, paced.found_hz) and not _same(worth.value, paced.wanted_hz):
-        hint = f"{source.code(rates[0])} is {number(worth.value)} Hz; {number(paced.wanted_hz)} Hz are asked for"
+        hint = f"{source.code(rates[0])} is {number(worth.value)} Hz; {number(paced.wanted_hz)} Hz is required"
         return Clue(hint, source.place(worth.origin))
     loops = [n for n in source.loops() if set(paced.calls) & set(reached(source, [n]))]
     return _pace_of(paced, loops[-1]) if loops else None
@@ -276,16 +276,16 @@ def _pace_of(paced: _Paced, loop: Loop) -> Clue | None:
     call = pauses[0].origin
     if _same(1 / total, paced.found_hz) and not _same(total, paced.period_s):
         codes = " and ".join(dict.fromkeys(source.code(p.origin) for p in pauses))
-        hint = f"{codes} make{'s' if len(pauses) == 1 else ''} {number(1 / total)} Hz"
+        hint = f"{codes} give{'s' if len(pauses) == 1 else ''} {number(1 / total)} Hz"
         in_all = " in all" if len(pauses) > 1 else ""
         longest = max(pauses, key=lambda p: p.value).origin
-        return Clue(f"{hint}; {number(paced.wanted_hz)} Hz is a pause of {wanted} s{in_all}", source.place(longest))
+        return Clue(f"{hint}; {number(paced.wanted_hz)} Hz needs a pause of {wanted} s{in_all}", source.place(longest))
     spun = next((p.origin for p in pauses if last_name(getattr(p.origin, "func", None)) == "spin_once"), None)
     if spun is not None and paced.found_hz > 1.03 / total and (made(source, "timer", "subscription")):
-        hint = f"{source.code(spun)} returns as soon as a message comes, so it is no pause"
+        hint = f"{source.code(spun)} returns as soon as a message arrives, so it is not a pause"
         return Clue(f"{hint}: let a timer publish, create_timer({wanted}, ...), and call spin", source.place(spun))
     if _same(total, paced.period_s) and 0.7 * paced.wanted_hz < paced.found_hz < paced.wanted_hz:
-        hint = f"{source.code(call)} comes on top of the time that the rest of the loop takes: a timer keeps the pace"
+        hint = f"{source.code(call)} adds to the time of the rest of the loop: publish from a timer"
         return Clue(f"{hint}, create_timer({wanted}, ...)", source.place(call))
     return None
 
@@ -314,5 +314,5 @@ def _published_once(paced: _Paced) -> Clue | None:
     timers = list(source.calls("create_timer", "Timer"))
     if loops or timers or any(set(paced.calls) & set(runs(source, s)) for s in made(source, "subscription")):
         return None
-    hint = f"{source.code(paced.calls[0])} runs once only: let a timer call it"
+    hint = f"{source.code(paced.calls[0])} runs only once: let a timer call it"
     return Clue(f"{hint}, create_timer({number(paced.period_s)}, ...)", source.place(paced.calls[0]))

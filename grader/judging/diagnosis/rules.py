@@ -285,7 +285,7 @@ def unfit(clue: object, case: Case) -> str:
     texts = {"hint": clue.hint, "key": clue.key, "same_as": clue.same_as}
     wrong = next((name for name, text in texts.items() if not isinstance(text, str)), "")
     if wrong:
-        return f"expected a clue with a text as {wrong}, found a {type(texts[wrong]).__name__}"
+        return f"expected a clue with a string as {wrong}, found a {type(texts[wrong]).__name__}"
     place = clue.location
     if not isinstance(place, (Location, type(None))):
         return f"expected a clue with a Location, found a {type(place).__name__}"

@@ -53,7 +53,7 @@ def _no_self(crash: Crash, inside: list[Function]) -> Clue | None:
     node = node_made(source)
     if inside and not any(source.is_method(f) for f in inside) and node is not None:
         name = variable_of(source, node)
-        return Clue(f"self is known in the methods of a class only: in {inside[-1].name} the node is called {name}")
+        return Clue(f"self exists only in methods: in {inside[-1].name} the node is called {name}")
     return None
 
 
@@ -62,7 +62,7 @@ def _other_spelling(name: str) -> Clue | None:
         return Clue(f"in Python this is written {OTHER_SPELLINGS[name]}, not {name}")
     if name.strip("_") == "name":
         return Clue(f"{name} should be __name__, with two underscores on each side")
-    return Clue("put it in quotation marks: '__main__'") if name.strip("_") == "main" and name != "main" else None
+    return Clue("put it in quotes: '__main__'") if name.strip("_") == "main" and name != "main" else None
 
 
 def _ros_1(crash: Crash, name: str) -> Clue | None:
@@ -100,7 +100,7 @@ def _of_a_class(source: Source, name: str, inside: list[Function]) -> Clue | Non
         return Clue(f"{name} is a method of the node: write {variable_of(source, node)}.{name}")
     owner = source.class_of(methods[0])
     hint = f"{name} is indented into the class {owner.name if owner is not None else ''}: "
-    return Clue(f"{hint}begin its def, and what belongs to it, at the left edge", source.place(methods[0]))
+    return Clue(f"{hint}move its def and its body to the left margin", source.place(methods[0]))
 
 
 def _text_without_quotes(crash: Crash, name: str) -> Clue | None:
@@ -112,8 +112,8 @@ def _text_without_quotes(crash: Crash, name: str) -> Clue | None:
         place = 1 if last_name(call.func) in _CREATE else 0
         named = last_name(call.func) in _CREATE or chain(call.func) == "super().__init__"
         if named and len(call.args) > place and chain(call.args[place]).partition(".")[0] == name:
-            what = "a name on the ROS graph" if place else "the name of a node"
-            return Clue(f"{what} is a text: write '{'/' * place}{name}'")
+            what = "a ROS name" if place else "a node name"
+            return Clue(f"{what} is a string: write '{'/' * place}{name}'")
     return None
 
 
@@ -129,7 +129,7 @@ def _imported(source: Source, name: str) -> Clue | None:
 
 def _stored(source: Source, name: str, inside: list[Function]) -> Clue | None:
     found = bool(inside) and bool(source.stores(f"self.{name}"))
-    return Clue(f"{name} belongs to the object: write self.{name}") if found else None
+    return Clue(f"{name} is an attribute: write self.{name}") if found else None
 
 
 def _in_another_function(source: Source, name: str, function: Function | None, line: int) -> Clue | None:
@@ -142,10 +142,10 @@ def _in_another_function(source: Source, name: str, function: Function | None, l
         return None
     owner = owners[0]
     if source.is_method(function) and source.is_method(owner) and source.class_of(owner) is source.class_of(function):
-        hint = f"{name} is a variable of {owner.name} only: write self.{name} here and in line {line}"
+        hint = f"{name} is local to {owner.name}: write self.{name} here and in line {line}"
         return Clue(hint, source.place(stores[0]))
     if source.is_method(function) and name == variable_of(source, node_made(source) or owner, ""):
-        return Clue(f"{name} is a variable of {owner.name} only: inside its class the node is called self")
+        return Clue(f"{name} is local to {owner.name}: inside its class the node is called self")
     return None
 
 
@@ -167,7 +167,7 @@ def _message_number(crash: Crash, name: str, function: Function | None) -> Clue 
     used = [n for n in source.on_line(crash.line, ast.Name) if n.id == name]
     whole = not any(isinstance(source.parents.get(n), ast.Attribute) for n in used)
     if message.type in SINGLE_NUMBERS and whole:
-        return Clue(f"{name} is not defined in {function.name}: the number that came is {message.name}.data")
+        return Clue(f"{name} is not defined in {function.name}: the received number is {message.name}.data")
     return None
 
 
@@ -177,8 +177,8 @@ def _never_assigned(source: Source, name: str) -> Clue | None:
     fields = [n for n in source.all(ast.Attribute) if chain(n.value) == name and isinstance(n.ctx, ast.Store)]
     types = {m.type for m in made(source, "publisher")} - {""}
     if fields and len(types) == 1:
-        return Clue(f"{name} is nowhere made: write {name} = {next(iter(types))}() before its fields are set")
-    return Clue(f"nothing in the file gives {name} a value: assign it before this line, or write what is meant")
+        return Clue(f"{name} is never created: write {name} = {next(iter(types))}() before its fields are set")
+    return Clue(f"nothing in the file assigns {name}: assign it before this line, or correct the name")
 
 
 def _defined(source: Source) -> list[str]:
@@ -219,17 +219,17 @@ def _imported_below(source: Source, name: str, imports: list[ast.alias]) -> Clue
 def _attribute_meant(source: Source, name: str, stores: list[ast.AST]) -> Clue | None:
     if not source.stores(f"self.{name}") or not any(isinstance(source.parents.get(n), ast.AugAssign) for n in stores):
         return None
-    return Clue(f"{name} belongs to the object: write self.{name}", source.place(stores[0]))
+    return Clue(f"{name} is an attribute: write self.{name}", source.place(stores[0]))
 
 
 def _global_meant(source: Source, name: str, function: Function, stores: list[ast.AST]) -> Clue | None:
     outside = [n for n in source.stored.get(name, ()) if source.function_of(n) is None and source.class_of(n) is None]
     shadowed = bool(outside) or any(f.name == name for f in source.functions()) or name in source.aliases
     if outside:
-        hint = f"{function.name} assigns {name}, so Python takes it for a variable of {function.name} alone: "
+        hint = f"{function.name} assigns {name}, so Python treats it as local: "
         return Clue(f"{hint}begin {function.name} with: global {name}", source.place(stores[0]))
     if shadowed and first_line(stores[0]) > 0:
-        hint = f"{function.name} gives {name} another meaning here: choose another name for what is assigned"
+        hint = f"{function.name} assigns {name} here, which hides what it meant: choose another name"
         return Clue(hint, source.place(stores[0]))
     return None
 
@@ -244,12 +244,12 @@ def _assigned_in_branches(source: Source, name: str, stores: list[ast.AST], line
         while outer is not None and isinstance(parent, ast.If) and outer in parent.orelse:
             outer, parent = parent, source.parents.get(parent)
         if outer is not None:
-            hint = f"{name} gets no value if no condition from 'if {source.code(outer.test, 40)}' on is true: "
-            return Clue(f"{hint}end it with else, or set {name} before it", source.place(outer))
-    for kind, words in ((ast.Try, "the try block fails"), (ast.For, "the loop has nothing to go through")):
+            hint = f"{name} has no value if no condition from 'if {source.code(outer.test, 40)}' on is true: "
+            return Clue(f"{hint}add an else, or set {name} before it", source.place(outer))
+    for kind, words in ((ast.Try, "the try block fails"), (ast.For, "the loop never runs")):
         blocks = [next((o for o in source.around(n, kind) if first_line(o) < line), None) for n in before]
         if before and None not in blocks and blocks[0] is not None:
-            return Clue(f"{name} gets no value if {words}: set it before", source.place(blocks[0]))
+            return Clue(f"{name} has no value if {words}: set it before", source.place(blocks[0]))
     return None
 
 
@@ -257,4 +257,4 @@ def _assigned_later(source: Source, name: str, stores: list[ast.AST], line: int)
     later = [n for n in stores if first_line(n) > line]
     if not later or len(later) != len(stores):
         return None
-    return Clue(f"{name} gets its value only here, after line {line} has used it: move this up", source.place(later[0]))
+    return Clue(f"{name} is assigned only here, after line {line} uses it: move this up", source.place(later[0]))

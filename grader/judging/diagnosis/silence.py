@@ -99,7 +99,7 @@ def _other_domain(case: Case) -> Clue | None:
         if setting is not None:
             hint = f"{source.code(setting)} puts the node into another ROS domain, where no other node sees it"
             key = f"domain:{source.file}:{first_line(setting)}"
-            return Clue(f"{hint}: take it out", source.place(setting), key=key)
+            return Clue(f"{hint}: remove it", source.place(setting), key=key)
     return None
 
 
@@ -123,7 +123,7 @@ def _simulated_time(case: Case) -> Clue | None:
         if setting is not None:
             hint = f"{source.code(setting)} makes timers wait for simulated time on /clock, which nothing publishes"
             key = f"use_sim_time:{source.file}:{setting.lineno}"
-            return Clue(f"{hint}: take it out", source.place(setting), key=key)
+            return Clue(f"{hint}: remove it", source.place(setting), key=key)
     return None
 
 
@@ -148,8 +148,8 @@ def _wrong_topic(case: Case) -> Clue | None:
 
 
 def _elsewhere(source: Source, item: Made, found: str, topic: str) -> Clue:
-    does = "publishes on" if item.kind == "publisher" else "listens to"
-    hint = f"{source.code(item.call)} {does} {quote(found, 60)}: the topic asked for is {topic}"
+    does = "publishes on" if item.kind == "publisher" else "subscribes to"
+    hint = f"{source.code(item.call)} {does} {quote(found, 60)}: the task asks for {topic}"
     hint += elsewhere_because(item.topic, topic)
     return Clue(hint, source.place(item.call), key=f"topic:{source.file}:{item.call.lineno}")
 
@@ -165,7 +165,7 @@ def _wrong_type(case: Case) -> Clue | None:
     if item is None:
         return None
     module, _, name = check.type.rpartition("/")
-    hint = f"{case.source.code(item.call)} uses {short(wrong[0].type)}: the type asked for is {name}, "
+    hint = f"{case.source.code(item.call)} uses {short(wrong[0].type)}: the task asks for {name}, "
     return Clue(f"{hint}from {module.replace('/', '.')} import {name}", case.source.place(item.call))
 
 
@@ -182,7 +182,7 @@ def _latched_subscription(case: Case) -> Clue | None:
     if item is None:
         return None
     policy = next((n for n in source.all(ast.Attribute) if n.attr == "TRANSIENT_LOCAL"), None)
-    hint = "the durability TRANSIENT_LOCAL hears only publishers that offer it too: leave the durability out"
+    hint = "a TRANSIENT_LOCAL subscription receives only from publishers that offer this too: remove the durability"
     return Clue(hint, source.place(policy if policy is not None else item.call), key=f"apart:{topic}")
 
 
@@ -203,9 +203,9 @@ def _kept_apart(case: Case) -> Clue | None:
         key = f"apart:{topic}"
         if here[0].type != there[0].type:
             hint = f"this takes {short(there[0].type)}, but {other} sends {short(here[0].type)}"
-            return Clue(f"{hint}: use one type for {topic} in both files", place, key)
+            return Clue(f"{hint}: use the same type for {topic} in both files", place, key)
         if (here[0].reliability, there[0].reliability) == ("best_effort", "reliable"):
-            return Clue(f"this asks for reliable messages, but {other} sends best effort: use one QoS", place, key)
+            return Clue(f"this asks for reliable messages, but {other} sends best effort: use the same QoS", place, key)
         if (here[0].durability, there[0].durability) == ("volatile", "transient_local"):
             return Clue(f"this asks for transient_local durability, which {other} does not offer", place, key)
     return None
@@ -258,7 +258,7 @@ def _never_publishes(case: Case) -> Clue | None:
     item = made_for(source, "publisher", topic) if topic else None
     if item is None or any(last_name(n) == "publish" for n in source.names()) or unheard_topic(case):
         return None
-    hint = f"{source.code(item.call)} makes a publisher, but nothing in the file calls its publish()"
+    hint = f"{source.code(item.call)} creates a publisher, but nothing in the file calls its publish()"
     return Clue(hint, source.place(item.call))
 
 
@@ -271,7 +271,7 @@ def _destroyed_first(unseen: _Unseen) -> Clue | None:
         later = [n for n in spun if first_line(n) > first_line(call)]
         if later and len(later) == len(spun) and not any(source.around(call, ast.If)):
             hint = (
-                f"{source.code(call)} comes before {last_name(later[0])} in line {first_line(later[0])}: put it after"
+                f"{source.code(call)} comes before {last_name(later[0])} in line {first_line(later[0])}: move it down"
             )
             return Clue(hint, source.place(call))
     return None
@@ -286,7 +286,7 @@ def _never_reached(unseen: _Unseen) -> Clue | None:
         rest = _after(source, stop)
         if unseen.calls and rest and all(any(covers(s, first_line(c)) for s in rest) for c in unseen.calls):
             hint = f"{source.code(stop, 40)} ends {source.function_name(stop)} here, so that "
-            return Clue(f"{hint}line {first_line(unseen.calls[0])} never runs: take it out", source.place(stop))
+            return Clue(f"{hint}line {first_line(unseen.calls[0])} never runs: remove it", source.place(stop))
     return None
 
 
@@ -324,7 +324,7 @@ def _never_true(unseen: _Unseen) -> Clue | None:
             turned = isinstance(asked, ast.UnaryOp) and isinstance(asked.op, ast.Not) and chain(asked.operand) in owned
             if none or turned:
                 code = source.code(asked, 40)
-                return Clue(f"'if {code}' is never true, for there is one: take the condition out", source.place(test))
+                return Clue(f"'if {code}' is never true, because it is set: remove the condition", source.place(test))
     return None
 
 
@@ -361,15 +361,15 @@ def _kept_elsewhere(source: Source, waited: str) -> Clue | None:
         declared = any(waited in g.names for g in source.all(ast.Global) if g in inside)
         if not mine or declared or not any(source.function_of(n) is None for n in stores):
             return None
-        hint = f"{name} assigns {waited}, so Python takes it for a variable of {name} alone"
+        hint = f"{name} assigns {waited}, so Python treats it as local"
         return Clue(f"{hint}: begin {name} with: global {waited}", source.place(mine[0]))
     if not stores or not all(early):
         return None
     chosen = [n for n in locals_ if n.id == bare] or locals_
     if chosen:
         kept = min(chosen, key=first_line)
-        return Clue(f"{kept.id} is a variable of {name} only: assign to {waited}", source.place(kept))
-    return Clue(f"nothing sets {waited}: assign what came to it in {name}", source.place(function))
+        return Clue(f"{kept.id} is local to {name}: assign to {waited}", source.place(kept))
+    return Clue(f"nothing sets {waited}: assign the message to it in {name}", source.place(function))
 
 
 @hint_rule(given=_unseen, priority=8150)
@@ -379,7 +379,7 @@ def _not_spun(unseen: _Unseen) -> Clue | None:
     waits = made(source, "timer") or made(source, "subscription")
     if node is None or spins(source) or not waits or "asyncio" in "".join(source.lines[:60]):
         return None
-    hint = f"nothing spins the node: without rclpy.spin({variable_of(source, node)}) no timer and no subscription"
+    hint = f"nothing spins the node: without rclpy.spin({variable_of(source, node)}) no timer or subscription callback"
     return Clue(f"{hint} is ever called", source.place(node))
 
 
@@ -405,10 +405,10 @@ def _nested_spin(unseen: _Unseen) -> Clue | None:
             continue
         code = source.code(call)
         if function.name == "__init__":
-            hint = f"{code} in the constructor does not return: what stands after it is never reached"
+            hint = f"{code} in the constructor does not return: nothing after it runs"
             return Clue(hint, source.place(call), key="nested_spin")
         if any(call in runs(source, m) for m in made(source, "timer", "subscription")):
-            hint = f"{code} inside a callback waits for something that can only come after the callback has returned"
+            hint = f"{code} inside a callback waits for something that can only arrive after the callback returns"
             return Clue(hint, source.place(call), key="nested_spin")
     return None
 
@@ -425,12 +425,12 @@ def _stopped_listening(case: Case) -> Clue | None:
         given = [n for n in ast.walk(profile) if isinstance(n, ast.keyword)] if profile is not None else []
         near = [k for k in given if k.arg in ("deadline", "liveliness_lease_duration")]
         if len(near) == 1:
-            hint = f"with {source.code(near[0], 50)} it hears only publishers that promise the same: leave it out"
+            hint = f"with {source.code(near[0], 50)} it receives only from publishers that offer the same: remove it"
             return Clue(hint, source.place(near[0]))
     ends = next(source.calls("destroy_subscription"), None)
     if ends is None:
         return None
-    return Clue(f"after {source.code(ends)} no message can come any more: keep listening", source.place(ends))
+    return Clue(f"after {source.code(ends)} no message can arrive any more: keep the subscription", source.place(ends))
 
 
 @hint_rule(given=_unseen, priority=8190)
@@ -449,7 +449,7 @@ def _unwoken_rate(unseen: _Unseen) -> Clue | None:
     sleeps = [c for c in source.calls("sleep") if not c.args and not c.keywords]
     if rate is None or not sleeps or names & _THREADS:
         return None
-    hint = f"{source.code(sleeps[0])} waits for ever: a rate is woken only by another thread that spins the node"
+    hint = f"{source.code(sleeps[0])} waits forever, as only another thread that spins the node wakes a rate"
     return Clue(f"{hint}: use create_timer instead", source.place(sleeps[0]), key="unwoken_rate")
 
 
@@ -475,7 +475,7 @@ def _held_up(unseen: _Unseen) -> Clue | None:
         worth = constant(source, argument(call, 0, "secs"))
         early = source.function_name(call) in ("", "__init__", "main")
         if early and worth is not None and worth.value >= _LONG_SLEEP_S:
-            return Clue(f"{source.code(call)} holds everything up: the node does nothing meanwhile", source.place(call))
+            return Clue(f"{source.code(call)} blocks everything: the node does nothing meanwhile", source.place(call))
     return _waits_in_constructor(source)
 
 
@@ -489,7 +489,7 @@ def _waits_in_constructor(source: Source) -> Clue | None:
         asked = {chain(n) for n in ast.walk(loop.test) if isinstance(n, ast.Attribute)}
         if source.function_name(loop) == "__init__" and idle and asked & brought:
             hint = f"the loop '{head_of(source, loop)}' waits in the constructor for a callback"
-            return Clue(f"{hint} that can only come once the node spins", source.place(loop))
+            return Clue(f"{hint} that can only run once the node spins", source.place(loop))
     return None
 
 
@@ -542,7 +542,7 @@ def _only_when_told(unseen: _Unseen) -> Clue | None:
             continue
         timed = [n for t in made(source, "timer") for n in runs(source, t)]
         if not _heard(unseen.case, item.topic) and not any(c in timed for c in calls):
-            hint = f"this runs only when a message comes on {quote(item.topic, 60)}, and none does: use a timer"
+            hint = f"this runs only when a message arrives on {quote(item.topic, 60)}, and none does: use a timer"
             return Clue(hint, source.place(item.call), key=f"told:{item.call.lineno}")
     return None
 
@@ -557,7 +557,7 @@ def _waits_to_hear(case: Case) -> Clue | None:
         unheard = item.topic is not None and not _heard(case, item.topic)
         tests = [_held_back(source, call, item) for call in calls] if unheard else []
         if tests and tests[0] is not None and all(tests):
-            hint = f"'if {source.code(tests[0].test, 40)}' holds everything back until a message comes on "
+            hint = f"'if {source.code(tests[0].test, 40)}' blocks publishing until a message arrives on "
             hint += f"{quote(item.topic or '', 60)}, and none does: publish without it"
             return Clue(hint, source.place(tests[0]), key=f"told:{item.call.lineno}")
     return None

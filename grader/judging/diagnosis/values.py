@@ -136,7 +136,7 @@ def _overwritten(source: Source, given: ast.Assign, places: Sequence[_Given], pa
     same = [g for g in later if isinstance(g.node, ast.Assign) and _targets(g.node) == _targets(given)]
     if len(same) != 1 or same[0].worth is None or not _is(same[0].worth.value, value):
         return None
-    hint = f"{source.code(same[0].node)} overwrites {source.code(given)} in line {first_line(given)}: take it out"
+    hint = f"{source.code(same[0].node)} overwrites {source.code(given)} in line {first_line(given)}: remove it"
     return Clue(hint, source.place(same[0].node), key=f"overwritten:{path}")
 
 
@@ -153,7 +153,7 @@ def _replaced(source: Source, given: ast.Assign, owner: str, sent: str, send: as
         return None
     code, line = source.code(here[0]), first_line(given)
     if owner == sent and source.function_of(given) is function and line < first_line(here[0]):
-        hint = f"{code} throws away what was set before it, in line {line}: take it out, or set the fields after it"
+        hint = f"{code} discards what was set before it, in line {line}: remove it, or set the fields after it"
         return Clue(hint, source.place(here[0]), key=f"replaced:{first_line(here[0])}")
     if owner != sent and not _used(source, owner, here[0], send):
         hint = f"{source.code(send)} sends the new, empty {sent}; the fields are set in {owner}: publish {owner}"
@@ -184,7 +184,7 @@ def _misplaced_field(wrong: _Wrong) -> Clue | None:
         if len(chosen) != 1:
             continue
         if chosen is mine and numbers.get(there[0]) is not None and _exchanged(wrong.case, path, there[0], value):
-            hint = f"{path} and {there[0]} are exchanged: {wrong.source.code(chosen[0].node)} must get {number(want)}"
+            hint = f"{path} and {there[0]} are swapped: {wrong.source.code(chosen[0].node)} must get {number(want)}"
             return Clue(hint, wrong.source.place(chosen[0].node), key="exchanged")
         if chosen is not places:
             return None
@@ -310,7 +310,7 @@ def _number_clue(source: Source, got: _Given, path: str, value: float, want: flo
     if place is not got.node and isinstance(around, (ast.Assign, ast.AnnAssign)):
         code = source.code(around)
     if _is(value, -want):
-        hint = f"{code} has the wrong sign: {path} is {number(want)}"
+        hint = f"{code} has the wrong sign: {path} must be {number(want)}"
     elif math.isclose(value * math.pi, want, rel_tol=1e-3):
         hint = f"{code} lacks pi: from degrees to radians is math.radians(...), or * math.pi / 180"
     elif "degrees" in source.code(got.value, 200):
@@ -355,7 +355,7 @@ def _in_degrees(case: Case) -> Clue | None:
     if len(turned) != 1 or "deg" in str(case.check.formula) or len(turned[0].args) != 1:
         return None
     argument = source.code(turned[0].args[0], 40)
-    hint = f"{source.code(turned[0])} turns radians into degrees: write {argument}"
+    hint = f"{source.code(turned[0])} converts radians to degrees: write {argument}"
     return Clue(hint, source.place(turned[0]))
 
 
@@ -373,7 +373,7 @@ def _other_function(case: Case) -> Clue | None:
     whole = [n for n in inside if isinstance(n, ast.BinOp) and isinstance(n.op, ast.FloorDiv)]
     if len(whole) == 1:
         code = source.code(whole[0], 40)
-        return Clue(f"{code} rounds down to a whole number: write / instead of //", source.place(whole[0]))
+        return Clue(f"{code} rounds down to an integer: write / instead of //", source.place(whole[0]))
     return None
 
 
@@ -388,7 +388,7 @@ def _counter_reset(case: Case) -> Clue | None:
             value = getattr(statement, "value", None)
             plain = isinstance(statement, ast.Assign) and isinstance(value, ast.Constant)
             if statement is not None and plain and store in timed and not any(source.around(statement, ast.If)):
-                hint = f"{source.code(statement)} begins anew with each message: set it in __init__ only"
+                hint = f"{source.code(statement)} resets it with each message: set it only in __init__"
                 return Clue(hint, source.place(statement))
     return None
 
@@ -411,7 +411,7 @@ def _counts_sometimes(case: Case) -> Clue | None:
             grows = isinstance(statement, ast.AugAssign) and isinstance(statement.op, ast.Add)
             if grows and test is not None and _publishes_beside(source, test):
                 hint = f"{source.code(statement)} runs only under 'if {source.code(test.test, 40)}': "
-                return Clue(f"{hint}move it to the left, so that it counts each message", source.place(statement))
+                return Clue(f"{hint}dedent it, so that it counts each message", source.place(statement))
     return None
 
 
@@ -430,7 +430,7 @@ def _needless_pi(case: Case) -> Clue | None:
         value = getattr(place, "value", None)
         named = [n for n in ast.walk(value) if last_name(n) in ("pi", "tau")] if isinstance(value, ast.expr) else []
         if named and "pi" not in formula:
-            hint = f"{case.source.code(place)} uses {last_name(named[0])}, which {formula} does not: take it out"
+            hint = f"{case.source.code(place)} uses {last_name(named[0])}, which {formula} does not: remove it"
             return Clue(hint, case.source.place(place))
     return None
 
@@ -514,14 +514,14 @@ def _draw_limits(case: Case) -> Clue | None:
     call, low, high = calls[0], number(check.low), number(check.high)
     right = f"random.uniform({float(check.low)}, {float(check.high)})"
     if last_name(call.func) in ("gauss", "normalvariate", "normal") and not list(source.calls("min", "max", "clip")):
-        hint = f"{source.code(call)} has no limits, some values lie far out: {right}"
+        hint = f"{source.code(call)} has no limits, so some values lie far outside: use {right}"
         return Clue(hint, source.place(call), key="draw")
     limits = [number_in_code(source, a) for a in call.args]
     if last_name(call.func) in ("uniform", "randint") and len(limits) == 2 and None not in limits:
         if limits == [check.low, check.high]:
             return None
         right = right if last_name(call.func) == "uniform" else f"{chain(call.func)}({low}, {high})"
-        return Clue(f"{source.code(call)} draws outside {low} to {high}: {right}", source.place(call), key="draw")
+        return Clue(f"{source.code(call)} draws outside {low} to {high}: use {right}", source.place(call), key="draw")
     return _scaled_draw(source, check, call)
 
 
@@ -568,7 +568,7 @@ def _drawn_and_lost(case: Case) -> Clue | None:
     sent = chain(sends[0].args[0]) if len(sends) == 1 and len(sends[0].args) == 1 else ""
     if not name or "." in name or not sent or name == sent:
         return None
-    hint = f"{name} never gets into the message: write {sent}.data = {source.code(calls[0], 50)}"
+    hint = f"{name} is never put into the message: write {sent}.data = {source.code(calls[0], 50)}"
     return Clue(hint, source.place(calls[0]))
 
 
@@ -601,7 +601,7 @@ def _drawn_once(case: Case) -> Clue | None:
         inside = runs(source, timer)
         seeds = [n for n in inside if isinstance(n, ast.Call) and last_name(n.func) == "seed"]
         if seeds:
-            hint = f"{source.code(seeds[0])} in the callback starts the same draw each time: take it out"
+            hint = f"{source.code(seeds[0])} in the callback restarts the same sequence each time: remove it"
             return Clue(hint, source.place(seeds[0]), key="draw")
         drawn = [c for c in draws(source) if c in inside]
         outside = (c for c in draws(source) if c not in inside)
@@ -628,5 +628,5 @@ def _not_drawn(case: Case) -> Clue | None:
     if len(places) != 1:
         return None
     code = source.code(places[0])
-    hint = f"{code} draws nothing: random.uniform({float(check.low)}, {float(check.high)}) gives a new value each time"
+    hint = f"{code} is not random: random.uniform({float(check.low)}, {float(check.high)}) gives a new value each time"
     return Clue(hint, source.place(places[0]))

@@ -57,7 +57,7 @@ def test_two_answers_at_one_instant_are_wrong_on_both_sides(at_change_only: bool
     """The last one is not right by luck; the reason names both."""
     for finding in both(low_and_high(at_change_only, last)):
         assert finding.credit == 0
-        assert "0 and 100 are published at one instant" in finding.reason
+        assert "0 and 100 are published at the same time" in finding.reason
         assert finding.hint == "publish one answer to each number on /temperature"
 
 
@@ -193,7 +193,7 @@ def test_answers_that_come_late_are_called_late(lag: float) -> None:
         rec.number(0.5 + 0.2 * k, "/fan_speed", right_speed(value if value is not None else FAN_VALUES[0]))
     for finding in both(rec):
         assert finding.credit == 0
-        assert f"right for what was published {lag} s before" in finding.reason
+        assert f"match what was published {lag} s earlier" in finding.reason
         assert finding.hint == "answer the newest message on /temperature"
 
 

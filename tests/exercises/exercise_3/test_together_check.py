@@ -83,7 +83,7 @@ def test_a_controller_that_stops_is_found(way: Callable[..., Recording], until: 
     """Its last answer stops fitting soon."""
     finding = CHECK.judge(way(until=until).trace())
     assert finding.credit == 0
-    assert "nothing after" in finding.reason
+    assert "no message after" in finding.reason
 
 
 def test_a_controller_that_only_switches_on_is_found() -> None:
@@ -247,7 +247,7 @@ def test_two_answers_at_one_instant_are_contradictory(last: float) -> None:
     rec = together(lambda _v: 100.0 - last).add(*together(lambda _v: last).trace().messages("/fan_speed"))
     finding = CHECK.judge(rec.trace())
     assert finding.credit == 0
-    assert "0 and 100 at one instant" in finding.reason
+    assert "0 and 100 at the same time" in finding.reason
     assert finding.hint == "publish one answer to each number on /temperature"
 
 
