@@ -313,7 +313,9 @@ class GraphEdges:
         if missing is None:
             return not_met("every edge is there, but never all of them at once", evidence)
         return explain_fault(trace, f"no edge {missing}", evidence) or not_met(
-            f"no edge {missing}; {self._instead(trace, missing)}", evidence, problem=ProblemKind.NO_EDGE
+            f"no edge {missing}; {self._instead(trace, missing)}",
+            evidence,
+            problem=Problem(ProblemKind.NO_EDGE, (missing.topic,)),
         )
 
     def _has(self, graph: GraphSnapshot, edge: GraphEdge) -> bool:
