@@ -207,7 +207,7 @@ def test_every_role_names_a_parameter() -> None:
         declared: Roles | None = vars(kind).get("roles")
         if declared is not None:
             held = {field.name for field in fields(kind)}
-            asked = {*declared.hears, *declared.speaks, *declared.serves, *declared.calls}
+            asked = {*declared.hears, *declared.speaks, *declared.logs, *declared.serves, *declared.calls}
             assert asked
             assert asked <= held
     assert named(Plain(), "topic", "nothing") == ("/flow",)
