@@ -313,7 +313,7 @@ def interface() -> str:
 
 def _public(name: str) -> str:
     """Return the entry of one name."""
-    value = getattr(api, name)
+    value = inspect.unwrap(getattr(api, name))  # one that remembers results is a function too
     if not (inspect.isfunction(value) or inspect.isclass(value)) or hasattr(value, "__args__"):
         text = re.sub(r"\b(?:[a-z_]+\.)+(?=[A-Z~])", "", repr(value)).replace("~", "")
         return f"### `{name}`\n\n`{text}`"

@@ -73,9 +73,13 @@ if TYPE_CHECKING:
     from grader.core.trace import ServiceEnd as ServiceEnd
     from grader.core.trace import Trace as Trace
     from grader.core.trace import unmet_policy as unmet_policy
+    from grader.judging.charts import Lanes as Lanes
+    from grader.judging.charts import compared_panels as compared_panels
+    from grader.judging.charts import drawn_case as drawn_case
     from grader.judging.charts import gaps_panel as gaps_panel
     from grader.judging.charts import series as series
     from grader.judging.charts import time_chart as time_chart
+    from grader.judging.checks.services import too_few_responses as too_few_responses
     from grader.judging.diagnosis.rules import NO_SOURCE as NO_SOURCE
     from grader.judging.diagnosis.rules import Case as Case
     from grader.judging.diagnosis.rules import Clue as Clue
@@ -127,9 +131,9 @@ if TYPE_CHECKING:
     from grader.judging.facts import LogFacts as LogFacts
     from grader.judging.facts import LogPaceFacts as LogPaceFacts
     from grader.judging.facts import OtherEnd as OtherEnd
-    from grader.judging.facts import PositionFacts as PositionFacts
     from grader.judging.facts import RateFacts as RateFacts
     from grader.judging.facts import SeriesFacts as SeriesFacts
+    from grader.judging.facts import WrongLogFacts as WrongLogFacts
     from grader.judging.findings import FAULT_KEY as FAULT_KEY
     from grader.judging.findings import explain_fault as explain_fault
     from grader.judging.findings import explain_no_client as explain_no_client
@@ -145,7 +149,10 @@ if TYPE_CHECKING:
     from grader.judging.findings import only_printed as only_printed
     from grader.judging.findings import partly as partly
     from grader.judging.findings import waiting_for as waiting_for
+    from grader.judging.logs.matching import chance as chance
+    from grader.judging.logs.outputs import number_told as number_told
     from grader.judging.logs.outputs import printed_lines as printed_lines
+    from grader.judging.logs.outputs import shape_of as shape_of
     from grader.judging.logs.outputs import student_records as student_records
     from grader.judging.logs.outputs import written as written
     from grader.judging.plots import Drawing as Drawing
@@ -167,6 +174,12 @@ if TYPE_CHECKING:
     from grader.judging.source import subtree as subtree
     from grader.judging.source import text_of as text_of
     from grader.judging.source import words as words
+    from grader.judging.texts import Printed as Printed
+    from grader.judging.texts import clean as clean
+    from grader.judging.texts import printed_numbers as printed_numbers
+    from grader.judging.texts import segments as segments
+    from grader.judging.texts import template_of as template_of
+    from grader.judging.texts import with_decimal_points as with_decimal_points
     from grader.judging.values import EXACT as EXACT
     from grader.judging.values import JITTER_NS as JITTER_NS
     from grader.judging.values import Held as Held
@@ -179,6 +192,7 @@ if TYPE_CHECKING:
     from grader.judging.values import held as held
     from grader.judging.values import last_of_instant as last_of_instant
     from grader.judging.values import number_at as number_at
+    from grader.judging.values import per_trace as per_trace
     from grader.judging.values import published as published
     from grader.judging.values import published_numbers as published_numbers
     from grader.judging.values import student_endpoints as student_endpoints
@@ -219,6 +233,7 @@ CONTENTS: dict[str, dict[str, str]] = {
             "met partly not_met only_printed waiting_for explain_fault faulted first_fault fault_sentence "
             "explain_no_message explain_no_subscription explain_no_server explain_no_client fault_hint FAULT_KEY"
         ),
+        "grader.judging.checks.services": "too_few_responses",
     },
     "Parameters": {
         "grader.core.quantities": (
@@ -232,9 +247,12 @@ CONTENTS: dict[str, dict[str, str]] = {
         ),
         "grader.judging.values": (
             "Reading Held published delivered published_numbers delivered_numbers held value_at number_at "
-            "student_endpoints as_number carries_number heard_from_ns last_of_instant EXACT JITTER_NS"
+            "student_endpoints as_number carries_number heard_from_ns last_of_instant per_trace EXACT "
+            "JITTER_NS"
         ),
-        "grader.judging.logs.outputs": "student_records printed_lines written",
+        "grader.judging.logs.outputs": "student_records printed_lines written shape_of number_told",
+        "grader.judging.texts": "Printed printed_numbers clean with_decimal_points segments template_of",
+        "grader.judging.logs.matching": "chance",
         "grader.judging.series": "lag_ns steps_behind",
         "grader.judging.service_calls": "Call calls_of",
     },
@@ -245,7 +263,7 @@ CONTENTS: dict[str, dict[str, str]] = {
     "Charts": {
         "grader.judging.plots": "Drawing Plot threshold_drawing",
         "grader.core.chart": "Chart Panel Series Point Band Level Look Tone",
-        "grader.judging.charts": "series time_chart gaps_panel",
+        "grader.judging.charts": "series time_chart gaps_panel compared_panels drawn_case Lanes",
     },
     "Hint rules": {
         "grader.judging.diagnosis.rules": (
@@ -253,7 +271,7 @@ CONTENTS: dict[str, dict[str, str]] = {
             "Maker NO_SOURCE"
         ),
         "grader.judging.facts": (
-            "RateFacts SeriesFacts DrawFacts AnswerRow AnswerFacts LogFacts PositionFacts LogPaceFacts OtherEnd"
+            "RateFacts SeriesFacts DrawFacts AnswerRow AnswerFacts LogFacts WrongLogFacts LogPaceFacts OtherEnd"
         ),
     },
     "Source code": {

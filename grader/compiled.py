@@ -27,7 +27,7 @@ def compiled(name: str, key: bytes, read: Callable[[], _Value]) -> _Value:
 
     Args:
         name: Name of the compiled form.
-        key: The state of all files that the value depends on; see `state_of`.
+        key: The state of all files that the value depends on; see `state_of` and `state_in`.
         read: Reads the sources.
     """
     file = COMPILED / f"{name}.{sys.implementation.cache_tag}.pickle"
@@ -53,10 +53,15 @@ def state_of(paths: Iterable[str | Path]) -> bytes:
     return _text((os.fspath(path), os.stat(path)) for path in paths)  # noqa: PTH116 - a third of the time of Path.stat
 
 
+def state_in(folder: str | Path, ending: str = "") -> bytes:
+    """Return the state of all files in a folder and below, or of those whose names end so; byte code is left out."""
+    return _text(_files_in(os.fspath(folder), ending))
+
+
 @cache
 def state_of_package() -> bytes:
     """Return the state that the modules of the grader have when it is first asked for."""
-    return _text(_modules(os.fspath(PACKAGE)))
+    return state_in(PACKAGE, ".py")
 
 
 def _text(found: Iterable[tuple[str, os.stat_result]]) -> bytes:
@@ -64,10 +69,11 @@ def _text(found: Iterable[tuple[str, os.stat_result]]) -> bytes:
     return "".join(lines).encode("utf-8", "surrogateescape")
 
 
-def _modules(folder: str) -> Iterator[tuple[str, os.stat_result]]:
+def _files_in(folder: str, ending: str) -> Iterator[tuple[str, os.stat_result]]:
     with os.scandir(folder) as entries:
         for entry in entries:
-            if entry.name.endswith(".py"):
+            if entry.is_dir(follow_symlinks=False):
+                if entry.name != "__pycache__":
+                    yield from _files_in(entry.path, ending)
+            elif entry.name.endswith(ending) and entry.is_file():  # an editor may leave a link to nothing
                 yield entry.path, entry.stat()
-            elif entry.is_dir(follow_symlinks=False) and entry.name != "__pycache__":
-                yield from _modules(entry.path)

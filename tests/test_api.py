@@ -38,7 +38,7 @@ def signature(value: Any) -> str:
 
 
 def described(name: str) -> str:
-    value = getattr(api, name)
+    value = inspect.unwrap(getattr(api, name))  # one that remembers results is a function too
     plain = inspect.isfunction(value) or (inspect.isclass(value) and not hasattr(value, "__args__"))
     return f"{name}{signature(value)}" if plain else f"{name}: {value!r}"
 

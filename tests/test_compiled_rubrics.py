@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,8 +16,10 @@ from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest
 from grader.compiled import compiled, state_of, state_of_package
 from grader.core.scenario import ODOMETRY
+from grader.core.shipped import shipped
 from grader.execution.bag import read_bag
-from grader.rubrics.builtin import builtin_exercises, builtin_headers, builtin_recording
+from grader.rubrics import builtin
+from grader.rubrics.builtin import builtin_exercises, builtin_headers, builtin_recording, builtin_rubrics
 from grader.rubrics.loader import read_rubric
 
 
@@ -65,6 +68,40 @@ def test_a_changed_source_is_read_again(folder: Path, source: Path) -> None:
     other = source.with_name("other")
     other.write_text("")
     assert compiled("it", state_of([source, other]), lambda: "more") == "more"
+
+
+def test_any_changed_file_of_an_exercise_makes_the_exercises_anew(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rubric, checks, hint rules, recording, whatever an exercise brings; and a file that is new."""
+    copy = tmp_path / "rubrics"
+    shutil.copytree(shipped("rubrics"), copy, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(builtin, "shipped", lambda name: copy)
+    read: list[str] = []
+
+    def again() -> tuple[()]:
+        read.append("again")
+        return ()
+
+    monkeypatch.setattr(builtin, "_read_exercises", again)
+    for number, path in enumerate(sorted(path for path in copy.rglob("*") if path.is_file()), 1):
+        os.utime(path, (number, number))
+        builtin_exercises.__wrapped__()
+        assert len(read) == number, path
+    (copy / "exercise_2" / "more.py").write_text("")
+    (copy / "exercise_2" / ".#rubric.yaml").symlink_to("nowhere")
+    (copy / "exercise_2" / "__pycache__").mkdir()
+    builtin_exercises.__wrapped__()
+    (copy / "exercise_2" / "__pycache__" / "more.pyc").write_text("")
+    builtin_exercises.__wrapped__()
+    assert len(read) == number + 1
+
+
+def test_one_exercise_has_the_recording_that_the_older_stimulus_plays() -> None:
+    """It is the one that its rubric names, too."""
+    (found,) = shipped("rubrics").glob("*/odometry")
+    assert found == builtin_recording()
+    assert found.parent == builtin_rubrics()["odom_subscriber"].parent
 
 
 def test_a_changed_added_or_removed_module_changes_the_state_of_the_package(

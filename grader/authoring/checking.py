@@ -14,7 +14,7 @@ from grader.app.bags import recordings_of
 from grader.app.interface_packages import known_interfaces
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError, RecordingError, RubricError
-from grader.core.exercise import Criterion, Exercise
+from grader.core.exercise import Criterion, Exercise, named, roles_of
 from grader.core.quantities import duration
 from grader.core.scenario import RecordedStream, Scenario, Simulated, is_launch_file, shortest
 from grader.judging.checks import CHECKS
@@ -33,17 +33,10 @@ _STRETCHES = ("window", "silence")
 _GIVEN: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("logs_position", "log_period", "waits_gracefully"), ("topic",)),
     **dict.fromkeys(("logs_received", "logs_values", "logs_texts", "stays_in_range"), ("topic",)),
-    "threshold_response": ("input",),
     "reaches_goal": ("topic", "goals"),
 }
-#: The same, but another program of the scenario may do it instead: topics, services and actions.
-_HEARD: Mapping[str, tuple[str, ...]] = {
-    "subscribes": ("topic",),
-    **dict.fromkeys(("reaction", "latency"), ("input",)),
-    **dict.fromkeys(("service_answers_all", "service_response", "service_function", "service_sequence"), ("service",)),
-    **dict.fromkeys(("logs_response", "reacts_to_responses"), ("service",)),
-    **dict.fromkeys(("action_result", "action_feedback"), ("action",)),
-}
+#: Checks of the graph, where a service is seen that nobody calls.
+_SEEN = ("service_available",)
 #: How alike two names are of which one is taken for a misspelling of the other.
 _ALIKE = 0.8
 
@@ -90,20 +83,27 @@ def _of_inputs(criterion: Criterion, exercise: Exercise, path: TreePath, tree: Y
     name, scenario = criterion.check_name, next(s for s in exercise.scenarios if s.id == criterion.scenario)
     given, others = _given(scenario), len(scenario.processes) > 1 or any(map(is_launch_file, scenario.processes))
     own = {topic for other in exercise.criteria for topic in _published(other)}
-    for parameter in (*_GIVEN.get(name, ()), *(() if others else _HEARD.get(name, ()))):
+    topics = roles_of(type(criterion.check)).hears
+    for parameter in _GIVEN.get(name) or (() if others else _needed(criterion)):
         asked = getattr(criterion.check, parameter)
-        known = own if name in _HEARD else set()
+        known = set() if name in _GIVEN else own
         if asked not in given | known and not any(end[:1] == "~" and asked.endswith(end[1:]) for end in given):
-            what = "publishes on" if parameter not in ("service", "action") else "uses"
+            what = "publishes on" if name in _GIVEN or parameter in topics else "uses"
             text = f"no stimulus of {scenario.id} {what} {shown(asked)}{_did_you_mean(asked, given)}"
             yield tree.at((*path, "check", name, parameter)).mistake(text)
 
 
+def _needed(criterion: Criterion) -> tuple[str, ...]:
+    """Return the parameters whose topics, services and actions another program or the grader has to use."""
+    roles = roles_of(type(criterion.check))
+    asked = () if criterion.check_name in _SEEN else (*roles.hears, *roles.serves, *roles.calls, *roles.actions)
+    return tuple(parameter for parameter in asked if named(criterion.check, parameter))
+
+
 def _published(criterion: Criterion) -> Iterator[str]:
     """Yield the topics that a criterion expects the student's nodes to publish on."""
-    if criterion.check_name not in (*_GIVEN, *_HEARD):
-        yield from filter(None, [getattr(criterion.check, "topic", None)])
-    yield from filter(None, [getattr(criterion.check, "output", None)])
+    other = (*_GIVEN.get(criterion.check_name, ()), *_needed(criterion))
+    yield from named(criterion.check, *(parameter for parameter in ("topic", "output") if parameter not in other))
 
 
 def _given(scenario: Scenario) -> set[str]:

@@ -62,7 +62,7 @@ class Problem:
 
     kind: ProblemKind
     topics: tuple[str, ...] = ()  # the topics concerned, if a check looks at several
-    # What tells problems of this kind apart, e.g. `swapped` for wrong positions; empty if nothing does
+    # What tells problems of this kind apart, e.g. `swapped` for values in the wrong order; empty if nothing does
     detail: str = ""
     # The number that a count starts at; None for problems of other kinds; not shown in reports
     start: int | None = None
@@ -225,7 +225,8 @@ class Finding:
     evidence: Mapping[str, Any] = field(default_factory=dict)
     location: Location | None = None  # place in the student's file, if the trace names one
     hint: str = ""  # one thing to do; empty if no advice is very likely to be right
-    # Id of the criterion that must be met before this one can be judged; credit is then 0
+    # The criterion that must be met before this one can be judged: its id, the name of its check, or a topic of which
+    # it judges the logs (`Roles.logs`); credit is then 0
     blocked_by: str | None = None
     problem: Problem | None = None  # the problem found, if the check tells several problems apart
     # The reason in a few words, without the place of a fault, for terminals; empty if the reason itself is short
@@ -243,8 +244,10 @@ class Finding:
 class Roles:
     """What the parameters of a check are, by their names; a name that the check does not have is ignored.
 
-    A parameter with one of the usual names, which are the defaults here, needs no declaration. `hears` and `speaks`
-    have no usual name: a check that declares them lets the general hint rules explain a silent or unheard topic.
+    A parameter with one of the usual names, which are the defaults here, needs no declaration. The last five have no
+    usual name: a check that declares them lets the general hint rules explain a topic that is silent or that nobody
+    subscribes to, missing logs, and a service that nobody offers or calls. Criteria that need a sign of the data wait
+    for one that declares `logs`.
     """
 
     topics: tuple[str, ...] = ("input", "topic", "output", "forward", "back", "publishes", "subscribes")
@@ -255,6 +258,9 @@ class Roles:
     type: str = "type"  # the type of the topic
     hears: tuple[str, ...] = ()  # topics to which a node of the student's has to subscribe
     speaks: tuple[str, ...] = ()  # topics on which the check itself misses messages of the student's nodes
+    logs: tuple[str, ...] = ()  # topics of which the process has to log what arrives
+    serves: tuple[str, ...] = ()  # services that a node of the student's has to offer
+    calls: tuple[str, ...] = ()  # services that a node of the student's has to call
 
 
 #: The value of `drawing` of a check whose picture is the graph of nodes and topics.

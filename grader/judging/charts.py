@@ -9,12 +9,12 @@ from itertools import pairwise
 
 from grader.core.chart import Band, Case, Chart, Level, Look, Moment, Panel, Point, Series, Tone
 from grader.core.dataclass import dataclass
-from grader.core.quantities import seconds
+from grader.core.quantities import seconds, within
 from grader.core.trace import LogRecord, OutputLine, Request, Response, Trace
 from grader.judging.logs.outputs import printed_lines
 from grader.judging.texts import clean
 from grader.judging.values import Reading
-from grader.judging.wording import quote
+from grader.judging.wording import listed, number, quote
 
 #: Maximum number of points of a series: a screen shows no more, and a flood must not enlarge the report.
 MOST_POINTS = 1200
@@ -67,6 +67,34 @@ def points_of(values: Iterable[Reading]) -> list[Point]:
 def expected_series(values: Sequence[Reading], look: Look = Look.STEP) -> Series:
     """Return the numbers that were expected, each from its time to that of the next unless another look is given."""
     return series("expected", points_of(values), look=look, tone=Tone.FAINT)
+
+
+def compared_panels(
+    title: str, compared: Sequence[tuple[int, float | None, float]], tolerance: float, where: str
+) -> tuple[tuple[Panel, str], ...]:
+    """Return a panel with numbers beside the expected ones, for `Drawing.panels`; none without numbers.
+
+    Args:
+        title: Title of the vertical axis.
+        compared: For each number its time in nanoseconds, the number or None, and the expected one.
+        tolerance: Largest difference of a right one.
+        where: What the numbers are in, for the sentence.
+    """
+    if not compared:
+        return ()
+    rows = [expected_series([Reading(t_ns, wanted) for t_ns, _, wanted in compared])]
+    read = [(t_ns, got, within(got, wanted, tolerance)) for t_ns, got, wanted in compared if got is not None]
+    for name, tone, right in (("right", Tone.GOOD, True), ("wrong", Tone.BAD, False)):
+        some = [(seconds(t_ns), got) for t_ns, got, fits in read if fits is right]
+        rows += [series(name, some, look=Look.DOTS, tone=tone)] if some else []
+    wrong = len(compared) - sum(fits for *_, fits in read)
+    said = f"Numbers in {where}: {listed([number(got) for _, got, _ in read], 6)}; {wrong} of {len(compared)} wrong."
+    return ((Panel(title, "", tuple(rows)), said),)
+
+
+def drawn_case(start_ns: int, stop_ns: int, label: str, tone: Tone = Tone.FAINT) -> Case:
+    """Return one of the cases that a check distinguishes, for `Drawing.cases`: a marked stretch of time."""
+    return Case(seconds(start_ns), seconds(stop_ns), label, tone)
 
 
 @dataclass(slots=True)

@@ -60,11 +60,12 @@ class LogFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class PositionFacts:
-    """Why logs do not show a position."""
+class WrongLogFacts:
+    """What logs show in place of the fields that they should show."""
 
-    cause: str  # such as `swapped`; `nothing` if there is no log at all
-    right: int  # logs that show it
+    cause: str  # such as `swapped`; `nothing` if there is no log at all, `few` if they are right and too few
+    right: int  # logs that show the fields
+    fields: tuple[str, ...] = ()  # their paths in the message
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,8 @@ class LogPaceFacts:
     """How often a process logs."""
 
     count: int  # logs
-    average_s: float  # average time from one log to the next; 0 if there is only one
+    average_s: float  # average time from one log to the next; 0 if there are fewer than two
+    wanted_s: float  # the average that is expected
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,8 @@ _SPIN_HINT = "a node lives as long as it spins: call rclpy.spin(node) at the end
 _RUN_ON_HINT = "keep the node running: it must not end before it is stopped"
 #: What helps against a message that is sent before discovery.
 SEND_LATER = "publish from a timer, or wait until get_subscription_count() of the publisher is not 0"
+#: What to do in place of print.
+LOGGER_HINT = "write through the node's logger: self.get_logger().info(...)"
 #: A node that exits within this time never waited for anything.
 AT_ONCE_NS = NS_PER_S
 
@@ -53,7 +55,7 @@ def partly(  # noqa: PLR0913  each is a field of the finding
     return Finding(exact_share(credit), reason, evidence or {}, hint=hint, problem=found, brief=brief, facts=facts)
 
 
-def only_printed(reason: str, evidence: Mapping[str, object] | None, hint: str) -> Finding:
+def only_printed(reason: str, evidence: Mapping[str, object] | None = None, hint: str = LOGGER_HINT) -> Finding:
     """Return half credit for what is right, but printed instead of logged."""
     return partly(reason, evidence, hint=hint, problem=ProblemKind.PRINTED)
 
@@ -76,7 +78,7 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
         evidence: Plain JSON values behind it.
         hint: One thing to do.
         fault: The fault that explains it; it becomes the location and part of the evidence.
-        blocked_by: Criterion id, or name of a check in the same scenario, that must be met first.
+        blocked_by: The criterion that must be met first: its id, its check, or a topic whose logs it judges.
         problem: The problem, where a check tells several apart; a fault needs none.
         brief: The reason in a few words, if it is long; for a fault, its own text unless given.
         facts: A record for hint rules.

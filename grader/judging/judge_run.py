@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
+from grader.core.exercise import Criterion, Exercise, Finding, Outcome, named, roles_of, variant_notes
 from grader.core.report import (
     AUTHOR_MISTAKE,
     NOT_JUDGED,
@@ -288,15 +288,15 @@ class VerdictBuilder:
         return None if ahead and back is not None and back.id == criterion.id else target.id
 
     def _named(self, criterion: Criterion, name: str) -> Criterion | None:
-        """Return the criterion with that id, else the first whose check has that name, in the nearest scenarios.
+        """Return the criterion with that id, else the first whose check has that name or judges the logs of that topic.
 
-        These are the criterion's own scenario, then those in which the same processes run.
+        The criterion's own scenario comes first, then those in which the same processes run.
         """
         criteria = self.exercise.criteria
         by_id = next((c for c in criteria if c.id == name), None)
-        named = [c for c in criteria if check_name(c) == name]
-        same = [c for c in named if c.scenario == criterion.scenario]
-        alike = [c for c in named if self._processes(c) == self._processes(criterion)]
+        fitting = [c for c in criteria if name in (check_name(c), *named(c.check, *roles_of(type(c.check)).logs))]
+        same = [c for c in fitting if c.scenario == criterion.scenario]
+        alike = [c for c in fitting if self._processes(c) == self._processes(criterion)]
         return by_id or next(iter([*same, *alike]), None)
 
     def _processes(self, criterion: Criterion) -> tuple[str, ...]:

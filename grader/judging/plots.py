@@ -19,6 +19,7 @@ from grader.judging.charts import (
     MOST_CASES,
     MOST_POINTS,
     Lanes,
+    drawn_case,
     expected_series,
     kept_indices,
     points_of,
@@ -561,7 +562,7 @@ def _goal_cases(trace: Trace, goals: Sequence[Call], results: Sequence[Call]) ->
         accepted = goal.response is not None and goal.response.value.get("accepted") is True
         how = status_of(end) if end is not None else "no result" if accepted else "not accepted"
         if accepted:
-            cases.append(Case(seconds(goal.request.t_ns), seconds(stop_ns), f"goal {place}: {how}"))
+            cases.append(drawn_case(goal.request.t_ns, stop_ns, f"goal {place}: {how}"))
     return cases
 
 

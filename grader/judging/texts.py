@@ -1,20 +1,19 @@
-"""Finds numbers in logged texts, and decides which of them are an x and a y."""
+"""Finds numbers in logged texts, with the precision to which they were printed."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
 from collections.abc import Sequence
-from itertools import combinations
 
 from grader.core.dataclass import dataclass
 
-#: Longest text that is read, in characters; a printed odometry message has about 3,000.
+#: Longest text that is read, in characters; the repr of a message with two covariances has about 3,000.
 LONGEST_TEXT = 8_000
 #: Maximum number of numbers read from one text.
 MOST_NUMBERS = 160
-#: Relative difference that single precision explains, but printing does not.
-SLACK_M = 2e-6
+#: Difference that single precision explains for numbers up to some tens, but printing does not.
+_SLACK = 2e-6
 _ANSI = re.compile(r"\x1b\[[0-9;?]*[ -/]*[@-~]")
 _MINUS = dict.fromkeys((0x2212, 0x2010, 0x2011, 0x2012, 0x2013, 0xFE63, 0xFF0D), "-")
 _NUMBER = re.compile(
@@ -50,7 +49,7 @@ class Printed:
         """Return whether `value` prints as this number: rounded, truncated or rounded down to its last digit."""
         excess = value - self.value
         below = self.step if value <= 0 and self.value <= 0 else self.step / 2
-        return -below - SLACK_M <= excess <= self.step + SLACK_M
+        return -below - _SLACK <= excess <= self.step + _SLACK
 
 
 def clean(text: str) -> str:
@@ -70,7 +69,7 @@ def with_decimal_points(text: str) -> str | None:
 
 
 def printed_numbers(text: str) -> tuple[Printed, ...]:
-    """Return the numbers of a cleaned text in order; digits in a name such as `odom1` are not numbers."""
+    """Return the numbers of a cleaned text in order; digits in a name such as `robot1` are not numbers."""
     found: list[Printed] = []
     for match in _NUMBER.finditer(text):
         number = _read(text, match)
@@ -111,114 +110,13 @@ def _belongs_to_name(text: str, match: re.Match[str]) -> bool:
     return not label or re.match(r"\s*[:=]", text[match.end() : match.end() + 4]) is not None
 
 
-#: Maximum number of numbers among which unlabelled pairs are searched.
-_MOST_UNLABELLED = 20
-_MOST_LABELLED_PAIRS = 60
-#: Number of numbers after a list of labels that the list may refer to.
-_MOST_AFTER_LIST = 6
-_WORD = re.compile(r"[A-Z]+(?![a-zà-ɏ])|[A-ZÀ-ɏ]?[a-zà-ɏ]+|[A-Z]")
-_LABELS = {
-    **dict.fromkeys(("x", "px", "posx", "xpos", "coordx", "xcoord", "xx"), "x"),
-    **dict.fromkeys(("y", "py", "posy", "ypos", "coordy", "ycoord", "yy"), "y"),
-    **dict.fromkeys(("z", "pz", "posz", "zpos", "coordz", "zcoord"), "z"),
-    "xy": "xy",
-    "xyz": "xyz",
-}
-#: Words that may appear inside a list of labels such as `pos_x and pos_y (m)`.
-_FILLERS = frozenset({"and", "e", "et", "und", "i", "ed", "pos", "position", "coord", "coordinate", "coords", "p"})
-_FILLERS |= {"odom", "robot", "pose", "m", "meter", "meters", "metre", "metres", "msg", "axis", "eje", "axe"}
-_FILLERS |= {"current", "the"}
-Pair = tuple[int, int]
-Assignment = list[str]
-
-
-def template_of(text: str, numbers: Sequence[Printed]) -> str:
-    """Return the text with every number replaced by `#` and without white space."""
-    parts = _segments(text, numbers)
-    return "#".join("".join(part.split()) for part in parts)
-
-
-def candidate_pairs(text: str, numbers: Sequence[Printed]) -> tuple[Pair, ...]:
-    """Return the index pairs that are (x, y) by their labels; without labels, all in order of appearance."""
-    parts = _segments(text, numbers)
-    nearest = [(_labels_in(part) or [""])[-1] for part in parts[:-1]]
-    ways = [_by_run(parts), nearest, _by_suffix(parts)]
-    complete = [w for w in ways if "x" in w and "y" in w]
-    plain = range(min(len(numbers), _MOST_UNLABELLED))
-    if not complete:
-        return tuple(combinations(plain, 2))
-    pairs = [*(pair for way in complete for pair in _labelled_pairs(way)), *_listed_pairs(parts)]
-    pairs = pairs[:_MOST_LABELLED_PAIRS]
-    bare = [i for i in plain if not any(way[i] for way in complete)]
-    return tuple(dict.fromkeys([*pairs, *combinations(bare, 2)]))
-
-
-def _segments(text: str, numbers: Sequence[Printed]) -> list[str]:
-    """Return the text before, between and after the numbers: one segment more than there are numbers."""
+def segments(text: str, numbers: Sequence[Printed]) -> list[str]:
+    """Return the text before, between and after its numbers: one segment more than there are numbers."""
     starts = [0] + [n.stop for n in numbers]
     stops = [n.start for n in numbers] + [len(text)]
     return [text[a:b] for a, b in zip(starts, stops, strict=True)]
 
 
-def _labels_in(segment: str) -> list[str]:
-    return [label for word in _WORD.findall(segment) for label in _LABELS.get(word.lower(), "")]
-
-
-def _last_run(segment: str) -> list[str]:
-    """Return the last list of labels in a segment: `the x of (x, y) = ` gives x and y."""
-    run: list[str] = []
-    unbroken = False
-    for word in _WORD.findall(segment):
-        labels = list(_LABELS.get(word.lower(), ""))
-        if labels:
-            again = any(label in run[:-1] for label in labels)
-            run = [*run, *labels] if unbroken and not again else labels
-            unbroken = True
-        elif word.lower() not in _FILLERS:
-            unbroken = False
-    return [label for i, label in enumerate(run) if i == 0 or run[i - 1] != label]
-
-
-def _by_run(parts: list[str]) -> Assignment:
-    """Assign each list of labels to the numbers that follow it, in order."""
-    waiting: list[str] = []
-    given: Assignment = []
-    for part in parts[:-1]:
-        waiting = _last_run(part) or waiting
-        given.append(waiting[0] if waiting else "")
-        waiting = waiting[1:]
-    return given
-
-
-def _listed_pairs(parts: list[str]) -> list[Pair]:
-    """Return pairs in the order of a list of labels apart from its numbers: `(x, y) at 12 s: 1, 2`."""
-    pairs: list[Pair] = []
-    for here, part in enumerate(parts[:-1]):
-        run = _last_run(part)
-        if "x" not in run or "y" not in run:
-            continue
-        labelled = (k for k in range(here + 1, len(parts) - 1) if _labels_in(parts[k]))
-        span = range(here, min(next(labelled, len(parts) - 1), here + _MOST_AFTER_LIST))
-        forward = run.index("x") < run.index("y")
-        pairs += [(i, j) if forward else (j, i) for i, j in combinations(span, 2)]
-    return pairs
-
-
-def _by_suffix(parts: list[str]) -> Assignment:
-    """Assign to each number the first label after it, if there is no label before the first number."""
-    if not parts or _labels_in(parts[0]) or not _labels_in(parts[-1]):
-        return [""] * (len(parts) - 1)
-    return [(_labels_in(part) or [""])[0] for part in parts[1:]]
-
-
-def _labelled_pairs(given: Assignment) -> list[Pair]:
-    pairs: list[Pair] = []
-    xs = [i for i, label in enumerate(given) if label == "x"]
-    ys = [i for i, label in enumerate(given) if label == "y"]
-    for here, following in zip(xs, [*xs[1:], len(given)], strict=True):
-        after = next((j for j in ys if here < j < following), None)
-        before = next((j for j in reversed(ys) if j < here), None)
-        partner = after if after is not None else before
-        if partner is not None:
-            pairs.append((here, partner))
-    return pairs
+def template_of(text: str, numbers: Sequence[Printed]) -> str:
+    """Return the text with every number replaced by `#` and without white space."""
+    return "#".join("".join(part.split()) for part in segments(text, numbers))

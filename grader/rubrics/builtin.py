@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path, PurePath
 from typing import Any
 
-from grader.compiled import compiled, state_of, state_of_package
+from grader.compiled import compiled, state_in, state_of_package
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
@@ -19,8 +19,9 @@ from grader.submissions.collected import shown
 
 
 def builtin_recording() -> Path:
-    """Return the recording that the stimulus `odometry` plays, which names none."""
-    return shipped("rubrics") / "exercise_2" / "odometry"
+    """Return the recording that the stimulus `odometry` plays, which names none: the folder of that name has it."""
+    rubrics = shipped("rubrics")
+    return next(rubrics.glob("*/odometry"), rubrics / "odometry")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +37,7 @@ class Header:
 @cache
 def builtin_exercises() -> tuple[Exercise, ...]:
     """Return the built-in exercises, ordered by number; raises RubricError without any."""
-    beside = sorted(shipped("rubrics").rglob("*.py"))  # checks and hint rules that a rubric names
-    return compiled("rubrics", state_of([*_paths(), *_recorded(), *beside]) + state_of_package(), _read_exercises)
+    return compiled("rubrics", state_in(shipped("rubrics")) + state_of_package(), _read_exercises)
 
 
 def _read_exercises() -> tuple[Exercise, ...]:
@@ -53,20 +53,11 @@ def builtin_rubrics() -> Mapping[str, Path]:
 
 def builtin_headers() -> tuple[Header, ...]:
     """Return the headers of the built-in rubrics, ordered by exercise number; raises RubricError without any."""
-    paths = _paths()
+    folder = shipped("rubrics")
+    paths = rubrics_in(folder)
     if not paths:
-        folder = shown(str(shipped("rubrics")), 500)
-        raise RubricError(f"{folder}: expected the built-in rubrics, found none", "install again")
+        raise RubricError(f"{shown(str(folder), 500)}: expected the built-in rubrics, found none", "install again")
     return tuple(sorted(map(_header, paths), key=lambda header: _number_order(header.number)))
-
-
-def _paths() -> list[Path]:
-    return rubrics_in(shipped("rubrics"))
-
-
-def _recorded() -> list[Path]:
-    """Return the files of the recordings beside the rubrics, which the digests of exercises cover."""
-    return sorted(builtin_recording().iterdir())
 
 
 def _header(path: Path) -> Header:

@@ -1,4 +1,8 @@
-"""Runs a student's program on the real clock: no clock is replaced, but first and last messages are not lost."""
+"""Runs a student's program on the real clock: no clock is replaced, but first and last messages are not lost.
+
+A publisher waits for the grader's subscription before its first message. It waits earlier if it can, before a timer is
+created or a node spins: a timer that has begun would come late for the first time and in time for the second.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +17,8 @@ from typing import Any
 from . import originals
 from .link import Link
 
-#: How long, in real time, a new publisher waits for the grader's subscription before its first message, and how the
-#: name of the grader's node begins.
+#: How long, in real time, new publishers wait for the grader's subscriptions, and how the name of the grader's node
+#: begins.
 MATCH_S, OBSERVER = 2.0, "_ros2cli_daemon_"
 #: How long, in real time, to wait until what was sent has arrived before its sender is destroyed.
 ACKNOWLEDGED_S = 0.5
@@ -62,6 +66,7 @@ class WallTime:
     def __init__(self, link: Link) -> None:
         self._link = link
         self._publishing: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._unwatched: weakref.WeakSet[Any] = weakref.WeakSet()
         self._patience: Any = None
         self._exchanged = False
         self._early_reports = 0
@@ -69,39 +74,35 @@ class WallTime:
         self.domain = 0
 
     def install_ros(self) -> None:
-        """Make every publisher wait for the grader's subscription before its first message, so that it is recorded."""
+        """Make every publisher wait for the grader's subscription, so that its first message is recorded."""
         import rclpy.client
         import rclpy.publisher
         import rclpy.service
         from rclpy.duration import Duration
 
         from . import ros
-        from .ledger import BACKGROUND, is_in, is_latched
+        from .ledger import BACKGROUND, is_latched
 
         publish, make = rclpy.publisher.Publisher.publish, rclpy.publisher.Publisher.__init__
-        matched, time = self._publishing, self
+        time = self
         existed_s: weakref.WeakKeyDictionary[Any, _Existed] = weakref.WeakKeyDictionary()
         self._patience = Duration(seconds=ACKNOWLEDGED_S)
 
         @functools.wraps(make)
         def made(self: Any, *args: Any, **kwargs: Any) -> None:
             make(self, *args, **kwargs)
+            if self.topic_name not in BACKGROUND:
+                time._unwatched.add(self)
             if not is_latched(self):
                 existed_s[self] = _Existed(lambda: time.waited_s)
 
         @functools.wraps(publish)
         def publish_when_matched(self: Any, msg: Any) -> Any:
-            if self not in matched and self.topic_name not in BACKGROUND:
+            if self not in time._publishing and self.topic_name not in BACKGROUND:
                 existed = existed_s.pop(self, None)
                 early = existed is not None and existed.is_undiscovered()
-                # In another domain there are no subscriptions: waiting would only delay the program.
-                owner, began_s = _owner_of(self, ros.MADE_NODES), originals.perf_counter()
-                if owner is None:
-                    originals.wait_until(self.handle.get_subscription_count, MATCH_S, pause_s=0.001)
-                elif is_in(time.domain, owner):
-                    originals.wait_until(functools.partial(_is_watched, owner, self), MATCH_S, pause_s=0.002)
-                time.waited_s += originals.perf_counter() - began_s
-                matched.add(self)
+                time._await_watched()
+                time._publishing.add(self)
                 if early:
                     began_ns = originals.time_ns()
                     try:
@@ -137,14 +138,32 @@ class WallTime:
         ros.note_other_domains(lambda: self.domain, lambda note: self._link.send({"kind": "note", **note}))
         ros.install_departures(self._leave, self._leave)
 
+    def _await_watched(self) -> None:
+        """Wait until the grader hears each new publisher; a thread that comes meanwhile waits as well.
+
+        In another domain there are no subscriptions: waiting would only delay the program.
+        """
+        if not self._unwatched:
+            return
+        from . import ros
+        from .ledger import is_in
+
+        new, began_s = list(self._unwatched), originals.perf_counter()
+        owners = [(_owner_of(publisher, ros.MADE_NODES), publisher) for publisher in new]
+        here = [(owner, publisher) for owner, publisher in owners if owner is None or is_in(self.domain, owner)]
+        originals.wait_until(lambda: all(_is_watched(*pair) for pair in here), MATCH_S, pause_s=0.002)
+        self._unwatched.difference_update(new)
+        self.waited_s += originals.perf_counter() - began_s
+
     def _install_waits(self, existed: weakref.WeakKeyDictionary[Any, _Existed]) -> None:
         """Forget the new publishers of a thread that spins, or that has found a subscription or a server."""
         import rclpy.client
         import rclpy.executors
         import rclpy.publisher
+        import rclpy.timer
 
         count, ready = rclpy.publisher.Publisher.get_subscription_count, rclpy.client.Client.service_is_ready
-        look = rclpy.executors.Executor._wait_for_ready_callbacks
+        look, make_timer = rclpy.executors.Executor._wait_for_ready_callbacks, rclpy.timer.Timer.__init__
 
         def waited() -> None:
             thread = originals.get_native_id()
@@ -163,11 +182,18 @@ class WallTime:
 
         @functools.wraps(look)
         def looking(executor: Any, timeout_sec: Any = None, *args: Any, **kwargs: Any) -> Any:
+            self._await_watched()
             timeout_s = getattr(timeout_sec, "timeout", timeout_sec)  # rclpy also passes an object that counts down
             if timeout_s is None or timeout_s > 0:
                 waited()
             return look(executor, timeout_sec, *args, **kwargs)
 
+        @functools.wraps(make_timer)
+        def timing(timer: Any, *args: Any, **kwargs: Any) -> None:
+            self._await_watched()
+            make_timer(timer, *args, **kwargs)
+
+        rclpy.timer.Timer.__init__ = timing
         rclpy.publisher.Publisher.get_subscription_count = finding(count)
         rclpy.client.Client.service_is_ready = finding(ready)
         rclpy.executors.Executor._wait_for_ready_callbacks = looking
@@ -218,14 +244,21 @@ class WallTime:
 
 
 def _is_watched(node: Any, publisher: Any) -> bool:
-    """Return whether a publisher of a node is matched, and the grader's subscription is in the graph."""
+    """Return whether a publisher of a node is matched, and the grader's subscription is in the graph.
+
+    Without a node to ask, or for a publisher that has been destroyed, return whether it is matched, or cannot be.
+    """
+    from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
     from rclpy.node import Node
 
-    with publisher.handle:
-        if not publisher.handle.get_subscription_count():  # unlike the program's own question, this is no wait
-            return False
-    known = Node.get_subscriptions_info_by_topic(node, publisher.topic_name)
-    return any(one.node_name.startswith(OBSERVER) for one in known)
+    try:
+        with publisher.handle:
+            if not publisher.handle.get_subscription_count():  # unlike the program's own question, this is no wait
+                return False
+        known = Node.get_subscriptions_info_by_topic(node, publisher.topic_name) if node is not None else []
+    except (_rclpy.InvalidHandle, _rclpy.RCLError):
+        return True
+    return node is None or any(one.node_name.startswith(OBSERVER) for one in known)
 
 
 def _owner_of(publisher: Any, made: list[weakref.ref[Any]]) -> Any:

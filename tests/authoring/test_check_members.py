@@ -140,6 +140,58 @@ def test_roles_open_the_general_hint_rules(tmp_path: Path, *, declared: bool) ->
     assert ("publishes on /flux: the task asks for /flow" in hint) == declared
 
 
+SERVICES = '''\
+from dataclasses import dataclass
+from typing import ClassVar
+
+from grader.api import Finding, Roles, Trace, explain_no_client, explain_no_server
+
+
+@dataclass(frozen=True)
+class Asks:
+    """A client calls."""
+
+    ROLES
+    asked: str
+
+    def judge(self, trace: Trace) -> Finding:
+        return explain_no_END(trace, self.asked)
+
+
+CHECKS = {"asks": Asks}
+'''
+
+
+@pytest.mark.parametrize("declared", [True, False])
+@pytest.mark.parametrize(
+    ("role", "kind", "line", "said"),
+    [
+        ("calls", "client", 'self.create_client(Trigger, "/fil")', "asks /fil: the service asked for is /fill"),
+        (
+            "serves",
+            "service",
+            'self.create_service(Trigger, "/fil", self.fill)',
+            "offers /fil: the service asked for is /fill",
+        ),
+    ],
+)
+def test_roles_open_the_hint_rules_about_services(
+    tmp_path: Path, role: str, kind: str, line: str, said: str, *, declared: bool
+) -> None:
+    """A check of one's own gets what is known about clients and servers that go astray."""
+    roles = f'roles: ClassVar[Roles] = Roles(services=("asked",), {role}=("asked",))' if declared else "pass"
+    own = SERVICES.replace("ROLES", roles).replace("END", "client" if kind == "client" else "server")
+    (tmp_path / "pump_checks.py").write_text(own, encoding="utf-8")
+    rubric = RUBRIC.replace("check: {flows: {outlet: /flow}}", "check: {asks: {asked: /fill}}")
+    (tmp_path / "pump.yaml").write_text(rubric, encoding="utf-8")
+    builder = TraceBuilder("pump.py", stop_s=2.0)
+    trace = (builder.client if kind == "client" else builder.server)("/fil", "std_srvs/srv/Trigger").trace()
+    submission = Submission("s", "s", Path("s"), "sha256:1", {"pump.py": StudentFile("pump.py", "pump.py")})
+    source = f"class Pump(Node):\n    def __init__(self):\n        self.end = {line}\n"
+    report = judge_exercise(read_rubric(tmp_path / "pump.yaml"), {"alone": trace}, submission, {"pump.py": source})
+    assert (said in report.verdicts[0].hint) == declared
+
+
 def test_a_declared_topic_has_to_be_written_as_one(tmp_path: Path) -> None:
     """Its form is checked, as that of a parameter with one of the usual names."""
     roles = 'roles: ClassVar[Roles] = Roles(speaks=("outlet",))'
@@ -155,7 +207,8 @@ def test_every_role_names_a_parameter() -> None:
         declared: Roles | None = vars(kind).get("roles")
         if declared is not None:
             held = {field.name for field in fields(kind)}
-            assert set(declared.hears) | set(declared.speaks) <= held
-            assert {*declared.hears, *declared.speaks}
+            asked = {*declared.hears, *declared.speaks, *declared.serves, *declared.calls}
+            assert asked
+            assert asked <= held
     assert named(Plain(), "topic", "nothing") == ("/flow",)
     assert not_met("no").facts is None

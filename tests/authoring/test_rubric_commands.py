@@ -108,6 +108,11 @@ WAITS = {
     "stays_in_range: {topic: /odom, field: pose.pose.position.x, low: -1}": "/odom",
     "waits_gracefully: {process: pump.py, topic: /goal, silence: 1 s}": "/goal",
     "logs_response: {service: /fill, process: pump.py, field: message}": "/fill",
+    "service_calls: {service: /fill, calls: 2}": "/fill",
+    "reaction: {input: /goal, output: /flow, cases: [{when: {x: 0}, then: {data: 0}}], within: 1 s}": "/goal",
+    "threshold_response: {input: /odom, input_field: twist.twist.linear.x, output: /flow, threshold: 1, above: 1,"
+    " otherwise: 0, side: above}": "/odom",
+    "reacts_to_responses: {service: /fill, process: pump.py, threshold: 2}": "/fill",
 }
 
 

@@ -136,7 +136,7 @@ class ScriptedStudent:
         self.ended = False
         self.renewed = False
         self.unmatched: frozenset[str] = frozenset()
-        self.sees_graph = False
+        self.sees_graph = self.leaving = False
         self.workload: ScriptedWorkload | None = None
         self.unsettled = self.grader_failed = ""
         self.notes: list[str] = []

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from grader.core.trace import Trace
+from grader.core.trace import OutputLine, Trace
 from grader.execution.recording_session import RecordingSession
 
 pytest.importorskip("rclpy")
@@ -179,3 +179,20 @@ def test_all_of_a_burst_is_early(run: Callable[..., Trace], clock: str) -> None:
     assert unheard(trace)[0].startswith(
         "/count: all messages were" if all(early(trace)) else "/count: the first message"
     )
+
+
+@pytest.mark.parametrize("paces", ["node.create_timer(9, send)", "node.create_rate(10)", "rclpy.spin_once(node)"])
+def test_a_timer_begins_after_the_publishers_are_heard(run: Callable[..., Trace], paces: str) -> None:
+    """On the wall clock a timer that began before would send late once and in time the next time."""
+    program = """
+    publisher, other = (node.create_publisher(Int32, topic, 10) for topic in ("/count", "/other"))
+    node.create_guard_condition(lambda: None).trigger()
+    PACES
+    for one in (publisher, other):
+        print(one.topic_name, one.get_subscription_count(), flush=True)
+    send()
+    rclpy.spin(node)
+    """
+    trace = run(program.replace("PACES", paces), clock="wall")
+    lines = [seen for seen in trace.observations if isinstance(seen, OutputLine)]
+    assert [line.text for line in lines if line.stream == "stdout"] == ["/count 1", "/other 1"]

@@ -21,8 +21,9 @@ from grader.judging.checks.fields import FieldEqual, FieldFunction, RandomInRang
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.programs import CleanShutdown
 from grader.judging.checks.rate import TopicRate
-from grader.judging.checks.services import ServiceResponse, ServiceSequence
+from grader.judging.checks.services import ServiceResponse
 from grader.judging.values import FieldRule
+from grader.rubrics.exercise_checks import known_checks
 from grader.testing import TraceBuilder
 
 S = 1_000_000_000
@@ -83,7 +84,7 @@ def serving(text: str = "Battery: {}% remaining", *, step: float = -0.5, answers
 
 CHANCE = [random.Random(n).random() for n in range(1000)]
 SINE = FieldFunction("/joint", "sin(0.1 * n)", tolerance=1e-5)
-SEQUENCE = ServiceSequence(SERVICE, 84.5, -0.5)
+SEQUENCE = known_checks()["service_sequence"](SERVICE, 84.5, -0.5)
 TEXT = ServiceResponse(SERVICE, {"message": FieldRule(pattern=r"Battery: .*% remaining"), "success": True})
 RATE = TopicRate("/joint", 10.0, 0.5)
 

@@ -2,31 +2,13 @@
 
 from __future__ import annotations
 
-import pytest
-from tracing import FAN_VALUES, Recording, position_logs, scripted
+from tracing import FAN_VALUES, Recording, scripted
 
 from grader.core.trace import FaultKind
 from grader.judging.checks.logs import UsesLogger
-from grader.judging.checks.odometry import LogsPosition
 from grader.rubrics.exercise_checks import known_checks
 
-POSITION = LogsPosition("odom_subscriber.py", "/odom")
 ON = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above")
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("x={y:.3f} y={x:.3f}", "x and y are swapped"),
-        ("x={x:.3f} y=0.000", "the second value is z of the position, not y"),
-    ],
-)
-def test_wrong_positions_are_shown_beside_the_right_ones(text: str, said: str) -> None:
-    """The first log that is settled, with its time, and where the robot was."""
-    times = [6.0 + k for k in range(14)]
-    finding = POSITION.judge(position_logs(lambda x, y: text.format(x=x, y=y), times).trace())
-    assert finding.reason.startswith(f"odom_subscriber.py: {said}: at t = 6.000 s the log says 'x=")
-    assert finding.reason.endswith(") m")
 
 
 def test_the_further_lines_of_an_exceptions_text_are_not_printing() -> None:

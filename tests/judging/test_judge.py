@@ -405,8 +405,8 @@ def test_a_fault_that_ends_a_running_node_costs_one_line() -> None:
 
 EXERCISE_2 = exercise(
     criterion("subscribes_odom", CHECKS["subscribes"]("/odom", ODOMETRY)),
-    criterion("logs_position", CHECKS["logs_position"](ODOM, "/odom"), "subscribes_odom", points="10"),
-    criterion("log_period", CHECKS["log_period"](ODOM, "/odom", SECOND), "subscribes_odom"),
+    criterion("logs_position", known_checks()["logs_position"](ODOM, "/odom"), "subscribes_odom", points="10"),
+    criterion("log_period", known_checks()["log_period"](ODOM, "/odom", SECOND), "subscribes_odom"),
     criterion("waits_gracefully", CHECKS["waits_gracefully"](ODOM, "/odom", 5 * SECOND), "subscribes_odom", points="8"),
     files=(ODOM,),
 )

@@ -7,10 +7,10 @@ from tracing import ODOM_TIMES, Recording, position_logs
 from wordings import RIGHT, WRONG, Writer
 from work import calls_in
 
-from grader.judging.checks.odometry import LogPeriod, LogsPosition
+from grader.rubrics.exercise_checks import known_checks
 
-PERIOD = LogPeriod("odom_subscriber.py", "/odom", 1_000_000_000)
-POSITION = LogsPosition("odom_subscriber.py", "/odom")
+PERIOD = known_checks()["log_period"]("odom_subscriber.py", "/odom", 1_000_000_000)
+POSITION = known_checks()["logs_position"]("odom_subscriber.py", "/odom")
 LONG: dict[str, Writer] = {
     "right": RIGHT["chapter hint"],
     "three records": RIGHT["three records"],

@@ -141,6 +141,13 @@ class SleepRate:
     """In the main thread while another one spins: sleep on the rate of the loop."""
 
 
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """In a coroutine of asyncio: sleep, and let the other coroutine go on."""
+
+    ms: int
+
+
 class Ending(Enum):
     """How a program ends itself; after a shutdown, the callback returns."""
 
@@ -180,6 +187,7 @@ Statement = (
     | SetParameter
     | CallAndWait
     | SleepRate
+    | Rest
     | End
     | Every
 )
@@ -256,11 +264,12 @@ class Spinning(Enum):
     THREAD = "an executor in a thread, and a loop in the main thread"
     UNTIL = "spin_until_future_complete for one call after the other"
     MULTI = "a MultiThreadedExecutor"
+    ASYNCIO = "spin_once and a pause in a coroutine of asyncio, and a loop in another one"
 
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """What the main thread does for so many turns, in the first node, beside a thread that spins."""
+    """What the main thread or a coroutine does for so many turns, in the first node, beside what spins."""
 
     name: str
     turns: int
@@ -275,9 +284,9 @@ class Process:
     Attributes:
         nodes: Its nodes, in the order of their creation.
         spinning: How it runs their callbacks.
-        timeout_ms: For `ONCE`, the time-out of each call.
+        timeout_ms: For `ONCE`, the time-out of each call; for `ASYNCIO`, the pause after each call, which never blocks.
         turns: For `ONCE`, how often it is called before the program returns, 0 for ever; for `UNTIL`, how many calls.
-        loop: For `THREAD`, what the main thread does.
+        loop: For `THREAD`, what the main thread does; for `ASYNCIO`, what the second coroutine does.
         threads: For `MULTI`, how many threads the executor has.
     """
 

@@ -40,6 +40,7 @@ from program_description import (
     Program,
     Publish,
     Reset,
+    Rest,
     Runs,
     Say,
     Server,
@@ -216,6 +217,8 @@ class ProcessModel:
 
     def end_of(self, pause_ns: int) -> int:
         """Return when a pause ends: it is counted from the time that was shown last."""
+        if not pause_ns:
+            return self.world.now
         return max(self.world.now, self.shown) + pause_ns + LATE_NS
 
     def await_news(self, t_ns: int | None) -> simpy.Event:
@@ -245,6 +248,8 @@ class ProcessModel:
                 yield from self.until_answered(Executor(self, nodes[:1]), nodes[0])
             case Spinning.THREAD:
                 yield from self.beside_a_thread(nodes)
+            case Spinning.ASYNCIO:
+                yield from self.in_coroutines(Executor(self, nodes), nodes[0])
             case Spinning.SPIN:
                 yield from Executor(self, nodes[:1]).spin()
             case Spinning.EXECUTOR:
@@ -295,6 +300,45 @@ class ProcessModel:
             node.runs[loop.name] = turn + 1
             yield from node.run(loop.body, scope)
         yield from self.pause(self.end_of(LAST_NAP_MS * NS_PER_MS))
+
+    def in_coroutines(self, executor: Executor, node: NodeModel) -> Steps:
+        """Run the event loop of asyncio: coroutines in turn until all of them sleep, then the one that wakes first."""
+        resting: list[tuple[int, int, Steps]] = []
+        ready = deque([self.spin_and_rest(executor), self.work_and_rest(node)])
+        left = len(ready)
+        while left:
+            if not ready:
+                yield from self.pause(max(self.world.now, resting[0][0] + LATE_NS))
+            while resting and resting[0][0] <= max(self.world.now, self.shown):
+                ready.append(heapq.heappop(resting)[2])
+            for _ in range(len(ready)):
+                steps = ready.popleft()
+                for event in steps:
+                    if isinstance(event, Resting):
+                        heapq.heappush(resting, (event.until_ns, next(self.numbers), steps))
+                        break
+                    yield event
+                else:
+                    left -= 1
+
+    def rest(self, ms: int) -> Steps:
+        """Let the event loop of asyncio go on for some time."""
+        yield Resting(max(self.world.now, self.shown) + ms * NS_PER_MS)  # type: ignore[misc]
+
+    def spin_and_rest(self, executor: Executor) -> Steps:
+        while self.ok:
+            executor.wake()
+            yield from executor.spin_once(0)
+            yield from self.rest(self.process.timeout_ms)
+
+    def work_and_rest(self, node: NodeModel) -> Steps:
+        loop = self.process.loop
+        assert loop is not None
+        yield from self.rest(FIRST_NAP_MS)
+        scope = Scope(loop.name, loop.name)
+        for turn in range(loop.turns):
+            node.runs[loop.name] = turn + 1
+            yield from node.run(loop.body, scope)
 
     def say(self, text: str) -> None:
         if not self.ended:
@@ -362,6 +406,13 @@ def nothing() -> Steps:
     """Do nothing, as a task."""
     return
     yield
+
+
+@dataclass(frozen=True, slots=True)
+class Resting:
+    """What a coroutine of asyncio yields when it sleeps."""
+
+    until_ns: int
 
 
 #: What a coroutine yields when it waits for a future.
@@ -554,6 +605,8 @@ class NodeModel:
                 yield from self.process.pause(self.process.end_of(ms * NS_PER_MS))
             case SleepRate():
                 yield from self.sleep_rate()
+            case Rest(ms):
+                yield from self.process.rest(ms)
             case Every(runs, then):
                 if self.runs[scope.name] % runs == 0:
                     yield from self.run(then, scope)

@@ -35,6 +35,7 @@ from program_description import (
     Program,
     Publish,
     Reset,
+    Rest,
     Runs,
     Say,
     Server,
@@ -52,6 +53,8 @@ TOPICS, SERVICES = "abcd", "pq"
 #: Short ones that coincide, and ones that do not.
 PERIODS = (50, 100, 100, 125, 200, 250, 300, 470)
 NAPS = (7, 30, 50, 100, 120, 260)
+#: What a coroutine that polls sleeps between its turns.
+PAUSES = (1, 5, 10, 20, 50)
 DURATION_MS = 2000
 SLOTS = 2
 NUMBERS, FEW = st.integers(-3, 9), st.integers(2, 9)
@@ -79,6 +82,7 @@ class Room:
         shared: Whether other threads run beside them, so that what is done with an answer may only be logged.
         awaits: Whether they may be coroutines.
         waits: Whether they may wait in the main thread while another one spins.
+        rests: Whether they run in a coroutine of asyncio.
     """
 
     topics: str
@@ -89,6 +93,7 @@ class Room:
     shared: bool = False
     awaits: bool = True
     waits: bool = False
+    rests: bool = False
 
     def value(self, draw: st.DrawFn, *, heard: bool) -> Value:
         """Draw a value; with a number that was heard only where there is one."""
@@ -108,6 +113,7 @@ class Room:
         kinds: list[type] = [Say, Write, Nap, *([Keep] if self.slots else []), *([Publish] * 3 if topics else [])]
         kinds += [Cancel, Reset, Pace] if self.timers else []
         kinds += [*([] if self.shared else [SetParameter]), *([SleepRate] * 2 if rate else [])]
+        kinds += [Rest] * 2 if self.rests else []
         if deep:
             kinds += [*([Ask] * 2 if asked else []), *([Await] * 2 if asked and self.awaits else [])]
             kinds += [*([CallAndWait] * 4 if asked and self.waits else []), Every, *([End] if self.ends else [])]
@@ -136,6 +142,7 @@ class Room:
             Pace: lambda: Pace(of(self.timers), of(PERIODS)),
             SetParameter: lambda: SetParameter(number()),
             SleepRate: SleepRate,
+            Rest: lambda: Rest(of(NAPS)),
             Ask: ask,
             Await: lambda: Await(of(asked), number()),
             CallAndWait: lambda: CallAndWait(of(asked), number()),
@@ -154,7 +161,9 @@ class Room:
         if self.shared:
             alone = replace(self, topics="", slots=(), timers=())
             return alone.statements(draw, "", heard=True, deep=False)
-        return self.statements(draw, channels[channels.index(service) + 1 :], heard=True, deep=False)
+        return replace(self, rests=False).statements(
+            draw, channels[channels.index(service) + 1 :], heard=True, deep=False
+        )
 
 
 def after(channel: str) -> str:
@@ -178,7 +187,12 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
     asked = [s for s in wanted if s not in taken.asked or not taken.several]
     taken.asked |= set(asked)
     clients = [Client(f"c{number}{n}", s, draw(st.integers(0, len(groups)))) for n, s in enumerate(asked)]
-    ends = {Spinning.THREAD: (), Spinning.MULTI: ENDS_OF_POOL, Spinning.UNTIL: HARD_ENDS}.get(spinning, tuple(Ending))
+    ends = {
+        Spinning.THREAD: (),
+        Spinning.MULTI: ENDS_OF_POOL,
+        Spinning.UNTIL: HARD_ENDS,
+        Spinning.ASYNCIO: HARD_ENDS,
+    }.get(spinning, tuple(Ending))
     rooms = [Room(TOPICS, tuple(range(SLOTS)), tuple(name for name, _ in timers), tuple(clients), ends)]
     beside = Room("", (), (), ())
     kinds = (Group.EXCLUSIVE, *groups)
@@ -208,6 +222,8 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
         )
         rooms = [Room(others[0], (0,), rooms[0].timers, others[1], (), shared=True)]
         beside = Room(own[0], (1,), (), own[1], MAIN_ENDS, shared=True, awaits=False, waits=True)
+    elif spinning is Spinning.ASYNCIO:
+        beside = replace(rooms[0], awaits=False, rests=True)
     room = rooms if several else rooms * (len(groups) + 1)
 
     def callback(group: int, channels: str, *, heard: bool = True, answers: bool = False) -> tuple[Statement, ...]:
@@ -249,6 +265,9 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
         clients=tuple(clients),
         groups=groups,
     )
+    if spinning is Spinning.ASYNCIO:
+        body = beside.statements(draw, TOPICS + SERVICES, heard=True)
+        return node, Loop("m", draw(st.sampled_from((3, 12, 100))), (*body, Rest(draw(st.sampled_from(NAPS)))))
     if spinning is not Spinning.THREAD:
         return node, None
     rate = draw(st.sampled_from((0, 50, 100, 250)))
@@ -296,7 +315,9 @@ def programs(draw: st.DrawFn) -> Program:
             Process(
                 tuple(own),
                 spinning,
-                timeout_ms=draw(st.sampled_from(timeouts)) if spinning is Spinning.ONCE else 0,
+                timeout_ms=draw(
+                    st.sampled_from({Spinning.ONCE: timeouts, Spinning.ASYNCIO: PAUSES}.get(spinning, (0,)))
+                ),
                 turns=turns,
                 loop=loop,
                 threads=draw(st.integers(2, 4)) if spinning is Spinning.MULTI else 0,

@@ -26,6 +26,7 @@ from program_description import (
     Process,
     Publish,
     Reset,
+    Rest,
     Runs,
     Say,
     SetParameter,
@@ -38,7 +39,8 @@ from program_description import (
 
 INDENT = "    "
 WITH_VALUE = (Publish, Say, Write, Keep, Ask, Await, SetParameter, CallAndWait)
-HEAD = """import os
+HEAD = """import asyncio
+import os
 import sys
 import threading
 import time
@@ -202,6 +204,7 @@ def statement(one: Statement, name: str, label: str) -> Iterator[str]:
         CallAndWait: lambda s: f"heard = self.{s.client}.call({request}).int64_value",
         SetParameter: lambda s: f'self.set_parameters([Parameter("number", value={value})])',
         SleepRate: lambda s: "self.rate.sleep()",
+        Rest: lambda s: f"await asyncio.sleep({s.ms / 1000})",
         End: lambda s: ENDINGS[s.how],
     }
     yield texts[type(one)](one)
@@ -271,11 +274,36 @@ def beside_a_thread(process: Process) -> Iterator[str]:
     yield f"time.sleep({LAST_NAP_MS / 1000})"
 
 
+def in_coroutines(process: Process) -> Iterator[str]:
+    """Yield the lines of two coroutines, one of which spins."""
+    loop = process.loop
+    assert loop is not None
+    yield "self = nodes[0]"
+    yield "heard = 0"
+    yield ""
+    yield "async def spin():"
+    yield f"{INDENT}while rclpy.ok():"
+    yield f"{INDENT * 2}rclpy.spin_once(self, timeout_sec=0)"
+    yield f"{INDENT * 2}await asyncio.sleep({process.timeout_ms / 1000})"
+    yield ""
+    yield "async def work():"
+    yield f"{INDENT}await asyncio.sleep({FIRST_NAP_MS / 1000})"
+    yield f"{INDENT}for turn in range({loop.turns}):"
+    yield f'{INDENT * 2}self.runs["{loop.name}"] = turn + 1'
+    yield from (INDENT * 2 + line for line in lines_of(loop.body, loop.name))
+    yield ""
+    yield "async def both():"
+    yield f"{INDENT}await asyncio.gather(spin(), work())"
+    yield ""
+    yield "asyncio.run(both())"
+
+
 RUNNING: dict[Spinning, Callable[[Process], Iterator[str]]] = {
     Spinning.SPIN: lambda process: iter(("rclpy.spin(nodes[0])",)),
     Spinning.EXECUTOR: with_executor,
     Spinning.ONCE: in_turns,
     Spinning.UNTIL: until_answered,
     Spinning.THREAD: beside_a_thread,
+    Spinning.ASYNCIO: in_coroutines,
     Spinning.MULTI: lambda process: with_executor(process, f"MultiThreadedExecutor({process.threads})"),
 }

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from archive import recorded_of
+from archive import judged, recorded_of
 from sample_folders import EXERCISES
 
 from grader.core.exercise import Exercise
@@ -20,6 +21,7 @@ from grader.execution.evidence.packed import unpack
 from grader.judging.checks import CHECKS
 from grader.judging.diagnosis.rules import Rule
 from grader.judging.judge_run import judge_exercise
+from grader.reporting.json_report import dumps
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.exercise_checks import hints_of, known_checks
 from grader.rubrics.loader import read_rubric, side_files
@@ -93,6 +95,26 @@ def test_a_rubric_elsewhere_uses_it_by_name(elsewhere: Path) -> None:
     hint = "msg.data >= 25.0 is true at exactly 25: write > instead of >="
     assert verdict(exercise) == (hint, "at_the_threshold", 14)
     assert verdict(read_rubric(FAN)) == verdict(exercise)
+
+
+@pytest.mark.parametrize("name", sorted({kind.parent.name for kind in shipped("rubrics").glob("*/checks.py")}))
+def test_a_rubric_that_names_no_files_judges_every_recording_the_same(tmp_path: Path, name: str) -> None:
+    """As rubrics did before the checks lay beside the exercises: points, reasons, hints and charts are equal."""
+    folder = tmp_path / name
+    shutil.copytree(shipped("rubrics") / name, folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    text = (folder / "rubric.yaml").read_text(encoding="utf-8")
+    (folder / "rubric.yaml").write_text(
+        re.sub(r"^(checks|hints): .*\n", "", text, flags=re.MULTILINE), encoding="utf-8"
+    )
+    exercise, original = read_rubric(folder / "rubric.yaml"), read_rubric(shipped("rubrics") / name / "rubric.yaml")
+    assert exercise.digest != original.digest
+    differ = [
+        sample
+        for sample, recorded in recorded_of(EXERCISES / name).items()
+        if dumps(judged(recorded, {exercise.id: exercise})).replace(exercise.digest, original.digest)
+        != dumps(judged(recorded, {original.id: original}))
+    ]
+    assert differ == []
 
 
 def test_such_a_rubric_brings_no_file(elsewhere: Path) -> None:

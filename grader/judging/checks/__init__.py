@@ -1,13 +1,12 @@
 """The general checks that rubrics can use; CHECKS lists all of them."""
 
 from grader.judging.checks.actions import ActionFeedback, ActionResult, LifecycleStates
-from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
+from grader.judging.checks.clients import CallsOfClient, WaitsForService
 from grader.judging.checks.closed_loop import ReachesGoal, StaysInRange
 from grader.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange, FieldMonotone, RandomInRange
 from grader.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
 from grader.judging.checks.heard import LogsResponse, LogsTexts
 from grader.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
-from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.programs import (
     CleanShutdown,
     NoFault,
@@ -23,10 +22,10 @@ from grader.judging.checks.services import (
     ServiceAvailable,
     ServiceFunction,
     ServiceResponse,
-    ServiceSequence,
 )
 from grader.judging.checks.timing import Latency, Period, Reaction, Silence
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes, Transform
+from grader.judging.checks.waiting import WaitsGracefully
 
 #: Name in a rubric -> check class; the fields of the class are the parameters.
 CHECKS: dict[str, type] = {
@@ -35,8 +34,6 @@ CHECKS: dict[str, type] = {
     "field_values": FieldValues,
     "uses_logger": UsesLogger,
     "subscribes": Subscribes,
-    "logs_position": LogsPosition,
-    "log_period": LogPeriod,
     "waits_gracefully": WaitsGracefully,
     "random_in_range": RandomInRange,
     "logs_received": LogsReceived,
@@ -50,11 +47,8 @@ CHECKS: dict[str, type] = {
     "service_answers_all": ServiceAnswersAll,
     "service_response": ServiceResponse,
     "service_function": ServiceFunction,
-    "service_sequence": ServiceSequence,
     "service_calls": CallsOfClient,
     "waits_for_service": WaitsForService,
-    "reacts_to_responses": ReactsToResponses,
-    "no_go_without_answer": NoGoWithoutAnswer,
     "reaction": Reaction,
     "period": Period,
     "latency": Latency,

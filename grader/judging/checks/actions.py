@@ -8,13 +8,13 @@ from dataclasses import field
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from grader.core.chart import Case, Look, Panel, Tone
+from grader.core.chart import Look, Panel, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import DurationNs, FieldOf, counted, seconds
 from grader.core.trace import Message, Trace
-from grader.judging.charts import Lanes, series
+from grader.judging.charts import Lanes, drawn_case, series
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
 from grader.judging.plots import Drawing
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of, calls_of_node, status_of
@@ -333,7 +333,7 @@ class LifecycleStates:
             lanes.dots(self.topic, ((m.t_ns, "") for m in published(trace, self.topic)), Tone.MAIN)
         said = f"Transitions: {listed([_label(c) for c in changes], 8) or 'none'}; "
         said += f"states: {listed([_state(c) for c in asked], 8) or 'none requested'}."
-        cases = [Case(seconds(a), seconds(b), "active", Tone.GOOD) for a, b in _active(changes, trace.stop_ns)]
+        cases = [drawn_case(a, b, "active", Tone.GOOD) for a, b in _active(changes, trace.stop_ns)]
         panels = ((lanes.panel(self.node or "the node"), said),)
         return Drawing(panels=panels, cases=tuple(cases), title="Transitions and states")
 

@@ -1,46 +1,37 @@
-"""Checks on a student's service client: how often it calls, that it waits, and how it handles responses."""
+"""Checks on a student's service client: how often it calls, and that it waits."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar
 
-from grader.core.chart import Band, Case, Level, Look, Panel, Point, Tone
+from grader.core.chart import Band
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
-from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, Pattern, counted, seconds
-from grader.core.trace import OutputLine, Trace
-from grader.judging.charts import Lanes, gaps_panel, series
-from grader.judging.checks.logs import LOGGER_HINT, complained
+from grader.core.exercise import Finding, ProblemKind, Roles
+from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, counted, seconds
+from grader.core.trace import Trace
+from grader.judging.charts import Lanes, drawn_case, gaps_panel
+from grader.judging.checks.logs import complained
 from grader.judging.findings import (
     explain_fault,
     explain_no_client,
     fault_hint,
     fault_sentence,
-    faulted,
     first_fault,
     met,
     not_met,
     only_printed,
     waiting_for,
 )
-from grader.judging.logs.outputs import Output, printed_lines, shape_of, student_records
+from grader.judging.logs.outputs import printed_lines, student_records
 from grader.judging.plots import Drawing
 from grader.judging.service_calls import (
     LATENESS_NS,
     Call,
-    CallKind,
-    Episode,
-    Going,
-    ResponseReader,
-    Words,
     calls_of,
-    complaints,
-    episodes_of,
-    text_of,
 )
 from grader.judging.values import RuleOrValue, breach, broken_rules, rules_text
 from grader.judging.wording import moment, number, quote, span
@@ -65,6 +56,7 @@ class CallsOfClient:
             example}`.
     """
 
+    roles: ClassVar[Roles] = Roles(calls=("service",))
     service: str
     calls: int
     at_most: int | None = None
@@ -161,6 +153,7 @@ class WaitsForService:
         within: Longest time from the server's appearance to the first request.
     """
 
+    roles: ClassVar[Roles] = Roles(calls=("service",))
     process: str
     service: str
     within: DurationNs = 5 * NS_PER_S
@@ -185,8 +178,8 @@ class WaitsForService:
     def drawing(self, trace: Trace) -> Drawing:
         """Return the calls with what the client wrote, and the time without a server."""
         starts = trace.marks("server_starts", self.service)
-        until_s = seconds(min(starts[0].t_ns if starts else trace.stop_ns, trace.stop_ns))
-        cases = (Case(0.0, until_s, f"{self.service} is not there"),)
+        until_ns = min(starts[0].t_ns if starts else trace.stop_ns, trace.stop_ns)
+        cases = (drawn_case(0, until_ns, f"{self.service} is not there"),)
         panels = []
         if not calls_of(trace, self.service, "student"):
             lanes = Lanes()
@@ -240,320 +233,7 @@ class WaitsForService:
                 f"{waited}; {counted(len(records), 'record')} meanwhile: {quote(records[-1].text, 80)}", evidence
             )
         if lines:
-            return only_printed(f"{waited}; that it waits is printed, not logged", evidence, LOGGER_HINT)
+            return only_printed(f"{waited}; that it waits is printed, not logged", evidence)
         return not_met(
             f"{waited}, but logs nothing while it waits", evidence, hint=_WAIT_HINT, problem=ProblemKind.NOT_LOGGED
         )
-
-
-#: A client that has sent no request for this long is not expected to send another.
-_ASKS_AGAIN_NS = 5 * NS_PER_S
-_SAID = {
-    CallKind.FAILED: "a response without success",
-    CallKind.UNREADABLE: "an answer without a number",
-    CallKind.UNANSWERED: "a request that got no response",
-}
-
-
-@dataclass(frozen=True, slots=True)
-class ReactsToResponses:
-    """A client continues after a response with a number above a threshold, and warns if the number is at or below it.
-
-    A warning is a record of severity WARN or higher between the response and the next request. Continuing means output
-    in that time without such a record, in words that do not follow every number at or below the threshold as well. A
-    warning shows nothing if no words are kept for the numbers above, or if words that follow each of these come after
-    a later low number. The wording is free. Responses without success or without a number are ignored. Printing instead
-    of logging gives half the points.
-
-    Attributes:
-        process: File name of the client.
-        service: Service name as on the wire.
-        threshold: Where the reaction changes; the threshold itself is not above.
-        side: The side that this criterion judges.
-        field: Path of the number, or of the text that holds it.
-        success: Path of the truth value without which a response is ignored; `none` if there is none.
-        pattern: Regular expression whose first group, or whole match, is the number in a text; its first number if left
-            out.
-    """
-
-    process: str
-    service: str
-    threshold: float
-    side: Literal["above", "at_or_below", "both"] = "both"
-    field: Annotated[str, FieldOf("service", "_Response")] = "message"
-    success: Annotated[str, FieldOf("service", "_Response", unless="none")] = "success"
-    pattern: Pattern | None = None
-
-    @property
-    def expected(self) -> str:
-        limit = number(self.threshold)
-        goes, warns = f"goes on above {limit}", f"logs a warning at or below {limit}"
-        text = {"above": goes, "at_or_below": warns, "both": f"{goes} and {warns}"}[self.side]
-        return f"{self.process} {text}; half the points if only printed"
-
-    def judge(self, trace: Trace) -> Finding:
-        episodes = _episodes(self, trace)
-        if not episodes:
-            return _not_asked(trace, self.process, self.service)
-        sides = {CallKind.GOOD: self.side != "at_or_below", CallKind.LOW: self.side != "above"}
-        mine = [e for e in episodes if sides.get(e.kind)]
-        if len({e.kind for e in mine}) < sum(sides.values()):
-            return _not_reached(trace, self.process, self.service, episodes)
-        evidence = self._evidence(episodes)
-        words = Words.of(trace, self.process, self.service, episodes)
-        wrong = [(e, flaw) for e in mine if (flaw := self._wrong(e, episodes, words))]
-        if not wrong:
-            return self._unshown(mine, words, evidence) or self._right(trace, mine, words, evidence)
-        if not student_records(trace, self.process) or all(e.kind is CallKind.LOW for e, _ in wrong):
-            printed = self._by_printing(mine, episodes)
-            if printed:
-                return only_printed(f"{self.process}: {printed}", evidence, LOGGER_HINT)
-        return self._explain(trace, wrong, evidence)
-
-    def drawing(self, trace: Trace) -> Drawing:
-        """Return the numbers that came with the threshold, the kind of each response, and what the client wrote."""
-        return _episodes_drawing(self, trace)
-
-    def _wrong(self, episode: Episode, episodes: Sequence[Episode], words: Words) -> str:
-        """Describe what is wrong with the reaction to a response; empty if nothing is."""
-        if episode.kind is CallKind.LOW:
-            if not complaints(episode.outputs):
-                return "no record of severity WARN"
-            started = words.start_after_abort(episode)
-            return f"{quote(started.text, 80)!r} at {moment(started.t_ns)}" if started is not None else ""
-        before = episodes[episode.place - 2] if episode.place > 1 else None
-        late = before is not None and before.kind is not CallKind.GOOD
-        # a client that reads a response only when it calls again warns then about the previous one
-        early = () if late else episode.awaiting
-        warned = [r for r in complaints((*early, *episode.sure)) if not (late and r.t_ns <= episode.asked_ns)]
-        if warned:
-            return f"{warned[0].severity} at {moment(warned[0].t_ns)}: {quote(warned[0].text, 80)}"
-        if not episode.outputs:
-            return "nothing is written"
-        return "only text that also follows low numbers" if words.telling(episode) == [] else ""
-
-    def _unshown(self, mine: Sequence[Episode], words: Words, evidence: dict[str, object]) -> Finding | None:
-        """Return a finding if warnings do not show that a mission is aborted, because none is ever seen to start."""
-        low = next((e for e in mine if e.kind is CallKind.LOW), None)
-        if low is None or words.only_good is None or words.only_good:
-            return None
-        reason = f"{self.process}: it warns after {number(low.number or 0.0)}, but {_nothing_of_its_own(self, words)}, "
-        reason += "so nothing shows that it aborts"
-        hint = "log that it goes on, in the branch for numbers above the limit only"
-        return not_met(reason, evidence, hint=hint, blocked_by="reacts_to_responses", problem=ProblemKind.WRONG_ANSWER)
-
-    def _right(self, trace: Trace, mine: Sequence[Episode], words: Words, evidence: dict[str, object]) -> Finding:
-        reason = f"{self.process}: right after each of {counted(len(mine), 'response')} "
-        reason += f"({', '.join(number(e.number) for e in mine[:8] if e.number is not None)})"
-        telling = [words.telling(e) for e in mine if e.kind is CallKind.GOOD]
-        printed = any(told and all(isinstance(o, OutputLine) for o in told) for told in telling)
-        if printed or not student_records(trace, self.process):
-            return only_printed(f"{reason}, printed and not logged", evidence, LOGGER_HINT)
-        return met(reason, evidence)
-
-    def _by_printing(self, mine: Sequence[Episode], episodes: Sequence[Episode]) -> str:
-        """Return that warnings are printed: lines that come only after low numbers; empty if they are not."""
-        good = {s for e in episodes if e.kind is CallKind.GOOD for s in e.shapes}
-        low = [e for e in mine if e.kind is CallKind.LOW]
-        told = [_lines(e.outputs, good) for e in low]
-        if not low or not all(told):
-            return ""
-        return f"at or below {number(self.threshold)} it prints {quote(told[0][0].text, 80)!r}, expected a WARN record"
-
-    def _evidence(self, episodes: Sequence[Episode]) -> dict[str, object]:
-        rows = [
-            [seconds(e.start_ns), e.kind.value, e.number, [r.severity for r in complaints(e.sure)]]
-            for e in episodes[:50]
-        ]
-        return {"columns": ["t_s", "response", "number", "warnings"], "rows": rows}
-
-    def _explain(self, trace: Trace, wrong: Sequence[tuple[Episode, str]], evidence: dict[str, object]) -> Finding:
-        episode, flaw = wrong[0]
-        rule = "go on" if episode.kind is CallKind.GOOD else "log a warning"
-        if episode.kind is CallKind.LOW and complaints(episode.outputs):
-            rule = "start nothing"
-        side = "above" if episode.kind is CallKind.GOOD else "at or below"
-        reason = f"{moment(episode.start_ns)}, {self.process}: {flaw} after {number(episode.number or 0.0)}; expected "
-        reason += f"it to {rule}, as after every number {side} {number(self.threshold)}"
-        fault = first_fault(trace, self.process)
-        if fault is not None and episode.start_ns <= fault.t_ns <= episode.stop_ns:
-            return faulted(fault, reason, evidence, last=True)
-        return not_met(reason, evidence, hint=self._hint(wrong), problem=ProblemKind.WRONG_ANSWER)
-
-    def _hint(self, wrong: Sequence[tuple[Episode, str]]) -> str:
-        kinds = {e.kind for e, _ in wrong}
-        if kinds == {CallKind.LOW} and all(e.number == self.threshold for e, _ in wrong):
-            return (
-                f"{number(self.threshold)} itself is not above {number(self.threshold)}: compare with > and not with >="
-            )
-        if kinds == {CallKind.LOW}:
-            return f"at or below {number(self.threshold)}, write self.get_logger().warn(...) and do not go on"
-        return ""
-
-
-@dataclass(frozen=True, slots=True)
-class NoGoWithoutAnswer:
-    """A client does not continue after a response without success or without a number, or without any response.
-
-    What the client writes when it continues is learned from the responses above the threshold: words that follow each
-    of them, or else some of them, and come neither before the first response, nor after a number at or below the
-    threshold, nor after a useless response of another kind. None of these may come between a useless response and the
-    next request. If there are no such words, nothing shows whether the client continues. A crash at a useless response
-    is reported and costs nothing. The server should respond with a delay, to separate output before and after a
-    response, and one of its responses should be of another kind; without these, unclear cases are accepted.
-
-    Attributes:
-        process: File name of the client.
-        service: Service name as on the wire.
-        threshold: The client continues with numbers above it.
-        field: Path of the number, or of the text that holds it.
-        success: Path of the truth value that tells whether the number counts; `none` if there is none.
-        pattern: Regular expression whose first group, or whole match, is the number in a text; its first number if left
-            out.
-    """
-
-    process: str
-    service: str
-    threshold: float
-    field: Annotated[str, FieldOf("service", "_Response")] = "message"
-    success: Annotated[str, FieldOf("service", "_Response", unless="none")] = "success"
-    pattern: Pattern | None = None
-
-    @property
-    def expected(self) -> str:
-        return f"{self.process} does not go on where {self.service} gives no answer, no success or no number"
-
-    def judge(self, trace: Trace) -> Finding:
-        episodes = _episodes(self, trace)
-        if not episodes:
-            return _not_asked(trace, self.process, self.service)
-        useless = [e for e in episodes if e.kind in _SAID]
-        if not useless or not any(e.kind is CallKind.GOOD for e in episodes):
-            return _not_reached(trace, self.process, self.service, episodes)
-        words = Words.of(trace, self.process, self.service, episodes)
-        kinds = [e.kind.value for e in useless]
-        evidence: dict[str, object] = {"useless": kinds}
-        for episode in useless:
-            going = words.going(episode.kind)
-            evidence["goes_on_with"] = sorted(shape for _, shape in going.texts)[:5]
-            if not going.texts and going.clear:
-                return self._unshown(episode, words, evidence)
-            found = [o for o in going.outputs(episode) if not self._due(o, episode, episodes, going)]
-            if found:
-                return self._went_on(episode, found[0], evidence)
-        reason = f"{self.process}: does not go on after {counted(len(useless), 'useless answer')}"
-        reason += f" ({', '.join(dict.fromkeys(_SAID[e.kind] for e in useless))})"
-        fault = first_fault(trace, self.process)
-        if fault is not None and fault.t_ns >= useless[0].asked_ns:
-            reason += f"; it ended there: {fault_sentence(fault)}, which costs nothing here"
-        return met(reason, evidence)
-
-    def drawing(self, trace: Trace) -> Drawing:
-        """Return the numbers that came with the threshold, the kind of each response, and what the client wrote."""
-        return _episodes_drawing(self, trace)
-
-    def _due(self, found: Output, episode: Episode, episodes: Sequence[Episode], going: Going) -> bool:
-        """Return whether output at the instant of a request still belongs to the previous good response."""
-        before = episodes[episode.place - 2] if episode.place > 1 else None
-        if before is None or before.kind is not CallKind.GOOD or found.t_ns > episode.asked_ns:
-            return False
-        return not any(text_of(o) in going.texts for o in before.sure)
-
-    def _unshown(self, episode: Episode, words: Words, evidence: dict[str, object]) -> Finding:
-        reason = f"{self.process}: {_nothing_of_its_own(self, words)}, so nothing shows that it does not go on after "
-        reason += _SAID[episode.kind]
-        hint = "log that it goes on, in the branch for numbers above the limit only"
-        return not_met(reason, evidence, hint=hint, blocked_by="reacts_to_responses", problem=ProblemKind.WRONG_ANSWER)
-
-    def _went_on(self, episode: Episode, found: Output, evidence: dict[str, object]) -> Finding:
-        what = _SAID[episode.kind]
-        reason = f"{moment(found.t_ns)}, {self.process}: {quote(found.text, 80)!r} after {what} "
-        reason += f"(request {episode.place}), the same text as when it goes on; expected it not to go on"
-        hint = "go on only if there is a response, response.success is true and its number could be read"
-        return not_met(reason, evidence | {"first_wrong_s": seconds(found.t_ns)}, hint=hint)
-
-
-def _episodes(check: ReactsToResponses | NoGoWithoutAnswer, trace: Trace) -> tuple[Episode, ...]:
-    success = "" if check.success == "none" else check.success
-    reading = ResponseReader(check.field, success, check.pattern, check.threshold)
-    return episodes_of(trace, check.process, check.service, reading)
-
-
-_CASES = {
-    CallKind.GOOD: ("above", Tone.GOOD),
-    CallKind.LOW: ("not above", Tone.WARNING),
-    CallKind.FAILED: ("no success", Tone.BAD),
-    CallKind.UNREADABLE: ("no number", Tone.BAD),
-    CallKind.UNANSWERED: ("no response", Tone.BAD),
-}
-
-
-def _episodes_drawing(check: ReactsToResponses | NoGoWithoutAnswer, trace: Trace) -> Drawing:
-    """Return each response with its number and kind, and below it what the client wrote until its next request."""
-    episodes = _episodes(check, trace)
-    if not episodes:
-        return Drawing()
-    limit = number(check.threshold)
-    cases, lanes = [], Lanes()
-    points: dict[tuple[str, Tone], list[Point]] = {}
-    lanes.add("request")
-    lanes.dots("request", ((e.asked_ns, f"request {e.place}") for e in episodes), Tone.SECOND)
-    lanes.add("response")
-    told = [e for e in episodes if e.kind is not CallKind.UNANSWERED]
-    lanes.dots("response", ((e.start_ns, e.text or f"response {e.place}") for e in told), Tone.MAIN)
-    for e in episodes:
-        said, tone = _CASES[e.kind]
-        label = f"{said} {limit}" if e.kind in (CallKind.GOOD, CallKind.LOW) else said
-        stop_ns = min([e.stop_ns, *(m.t_ns for m in trace.marks("exited", check.process) if m.t_ns >= e.start_ns)])
-        cases.append(Case(seconds(e.asked_ns), seconds(stop_ns), label, tone))
-        if e.number is not None:
-            points.setdefault((f"number, {label}", tone), []).append((seconds(e.start_ns), e.number))
-    level = Level(check.threshold, limit, name="threshold")
-    dots = tuple(series(name, some, look=Look.DOTS, tone=tone) for (name, tone), some in points.items())
-    numbers_ = Panel(f"number in {check.field}", "", dots, levels=(level,))
-    said = f"{counted(len(episodes), 'request')} on {check.service}, {counted(len(told), 'response')}."
-    title = f"Responses of {check.service} and output of {check.process}"
-    panels = ((numbers_, ""), (lanes.panel(check.service), said))
-    return Drawing(panels=panels, processes=(check.process,), cases=tuple(cases), title=title)
-
-
-def _nothing_of_its_own(check: ReactsToResponses | NoGoWithoutAnswer, words: Words) -> str:
-    """Return a clause: a client writes nothing that only follows numbers above the threshold."""
-    text = f"it writes the same after numbers above {number(check.threshold)} as after others"
-    if words.shared is None:
-        return text
-    output, value = words.shared
-    return f"{text} ({quote(output.text, 80)!r} also follows {number(value)})"
-
-
-def _lines(outputs: Sequence[Output], known: set[str]) -> list[OutputLine]:
-    return [o for o in outputs if isinstance(o, OutputLine) and shape_of(o.text) not in known]
-
-
-def _not_asked(trace: Trace, process: str, service: str) -> Finding:
-    if crashed := explain_fault(trace, f"it had not asked {service} by then", process=process):
-        return crashed
-    return waiting_for("service_calls", explain_no_client(trace, service))
-
-
-def _not_reached(trace: Trace, process: str, service: str, episodes: Sequence[Episode]) -> Finding:
-    """Return no credit if a client ended or stopped calling before a response of the needed kind came.
-
-    Raises:
-        HarnessError: Neither is true, so the server sent no such response.
-    """
-    last = episodes[-1]
-    asked = f"{service}: {process} asked {counted(len(episodes), 'time')}"
-    if crashed := explain_fault(trace, f"{asked} and got no answer of the kind that is judged here", process=process):
-        return crashed
-    ended = trace.marks("exited", process)
-    stopped = trace.stop_ns - last.start_ns > _ASKS_AGAIN_NS
-    if ended or stopped or last.kind is CallKind.UNANSWERED:
-        why = "waits for a response that is never sent" if last.kind is CallKind.UNANSWERED else "then stopped asking"
-        why = f"ended at {moment(ended[0].t_ns)}" if ended else why
-        return not_met(
-            f"{asked} and {why}; it got no answer of the kind that is judged here",
-            blocked_by="service_calls",
-            problem=ProblemKind.ENDED if ended else ProblemKind.STOPPED,
-        )
-    raise HarnessError(f"{service}: no answer of the kind that is judged here was sent")

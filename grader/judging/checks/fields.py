@@ -15,7 +15,7 @@ from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern
 from grader.core.trace import Message, Trace
 from grader.judging.facts import DrawFacts, SeriesFacts
 from grader.judging.findings import explain_fault, explain_no_message, met, not_met
-from grader.judging.logs.outputs import number_in
+from grader.judging.logs.outputs import number_told
 from grader.judging.plots import Drawing, Plot, value_panels
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
 from grader.judging.values import (
@@ -198,8 +198,7 @@ def _numbers(messages: Sequence[Message], path: str, pattern: str | None = None)
 
 
 def _number(message: Message, path: str, pattern: str | None) -> float | None:
-    text = None if pattern is None else text_at(message.value, path)
-    return number_at(message.value, path) if text is None else number_in(text, pattern)
+    return number_at(message.value, path) if pattern is None else number_told(message.value, path, pattern)
 
 
 def too_few_messages(trace: Trace, topic: str, found: int, wanted: int) -> Finding:

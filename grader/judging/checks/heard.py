@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, counted, seconds
 from grader.core.trace import Trace
-from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.findings import (
     explain_fault,
     explain_no_client,
@@ -82,6 +81,7 @@ class LogsResponse:
         within: Longest time from a response to its log record.
     """
 
+    roles: ClassVar[Roles] = Roles(calls=("service",))
     process: str
     service: str
     field: Annotated[str, FieldOf("service", "_Response")]
@@ -136,7 +136,7 @@ def _judged(trace: Trace, process: str, heard: Sequence[_Heard], within_ns: int,
     if not missing:
         return met(f"{process}: {source.all(len(due))} logged, such as {shown(due[0].value)}", evidence)
     if not unlogged(sorted([*records, *printed_lines(trace, process)], key=lambda o: o.t_ns)):
-        return only_printed(f"{process}: {source.all(len(due))} printed, not all of them logged", evidence, LOGGER_HINT)
+        return only_printed(f"{process}: {source.all(len(due))} printed, not all of them logged", evidence)
     first = missing[0]
     found = near(records, first)
     wrote = f"found {quote(' / '.join(o.text for o in found), 80)}" if found else "found no log"

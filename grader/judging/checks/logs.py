@@ -16,6 +16,7 @@ from grader.core.quantities import DurationNs, FieldOf, Pattern, counted, second
 from grader.core.trace import LogRecord, Message, Trace
 from grader.judging.charts import Lanes, gaps_panel, series
 from grader.judging.findings import (
+    LOGGER_HINT,
     explain_fault,
     explain_no_message,
     fault_sentence,
@@ -30,8 +31,6 @@ from grader.judging.logs.outputs import Output, is_no_node, numbers_in, printed_
 from grader.judging.plots import Drawing, Plot
 from grader.judging.values import JITTER_NS, number_at, published
 from grader.judging.wording import listed, moment, number, quote, span
-
-LOGGER_HINT = "write through the node's logger: self.get_logger().info(...)"
 
 
 def no_node(trace: Trace, process: str, evidence: dict[str, object]) -> Finding:
@@ -84,7 +83,7 @@ class UsesLogger:
             return met(f"{reason}: {quote(first.text)}", evidence)
         if lines:
             reason = f"{self.process}: {counted(len(lines), 'line')} printed, none through the logger"
-            return only_printed(reason, evidence | {"first": quote(lines[0].text)}, LOGGER_HINT)
+            return only_printed(reason, evidence | {"first": quote(lines[0].text)})
         return explain_fault(trace, "nothing was logged", evidence, process=self.process) or not_met(
             f"{self.process}: no log record in {span(trace.stop_ns)}",
             evidence,
@@ -148,7 +147,7 @@ class LogsMatching:
             and not self._flaw(sorted([*mine, *lines], key=lambda o: o.t_ns))
         ):
             reason = f"{self.process}: {counted(len(lines), 'line')} printed, {counted(len(mine), 'record')} logged"
-            return only_printed(f"{reason}; expected {self.expected}", evidence, LOGGER_HINT)
+            return only_printed(f"{reason}; expected {self.expected}", evidence)
         reason = f"{self.process}: {flaw}; expected {self.expected}"
         fault = first_fault(trace, self.process)
         if fault is not None and len(mine) < self.at_least:
@@ -269,7 +268,7 @@ class LogsEvery:
         shown = next((r for r in printed if not self._flaw(r, messages)), None)
         if shown is not None and not self._flooded(printed, messages):
             reason = f"{self._said(shown, lines, 'printed')}, not through the logger"
-            return only_printed(reason, self._evidence(shown, messages), LOGGER_HINT)
+            return only_printed(reason, self._evidence(shown, messages))
         return self._wrong(messages, logged or printed)
 
     def drawing(self, trace: Trace) -> Drawing:

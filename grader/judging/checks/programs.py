@@ -8,13 +8,13 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from grader.core.chart import Case, Look, Panel
+from grader.core.chart import Look, Panel
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Location, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, counted, seconds, within
 from grader.core.trace import FaultKind, Message, Trace
-from grader.judging.charts import expected_series, series
+from grader.judging.charts import drawn_case, expected_series, series
 from grader.judging.findings import (
     explain_fault,
     explain_no_message,
@@ -181,7 +181,7 @@ class ParameterTakesEffect:
         stops = [*(s.t_ns for s in tries), trace.stop_ns][1:]
         times = [m.t_ns for m in published(trace, self.topic)]
         cases = tuple(
-            Case(seconds(s.t_ns), seconds(stop_ns), f"{self.name} = {shown(s.value)}{'' if s.taken else ', refused'}")
+            drawn_case(s.t_ns, stop_ns, f"{self.name} = {shown(s.value)}{'' if s.taken else ', refused'}")
             for s, stop_ns in zip(tries, stops, strict=True)
         )
         known = [(s, as_number(s.value)) for s in tries]

@@ -17,7 +17,6 @@ from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import NS_PER_MS, NS_PER_S, FieldOf, counted, seconds
 from grader.core.trace import ClockKind, Endpoint, LogRecord, Message, Trace
 from grader.judging.charts import expected_series, series
-from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.facts import LogFacts
 from grader.judging.findings import (
     explain_fault,
@@ -117,7 +116,7 @@ class LogsValues:
 
     def when_printed(self, received: Sequence[_Received], evidence: dict[str, object]) -> Finding:
         """Return the finding if enough is written, but not through the logger."""
-        return only_printed(f"{self._said(received, ())} printed, not all of them logged", evidence, LOGGER_HINT)
+        return only_printed(f"{self._said(received, ())} printed, not all of them logged", evidence)
 
     def among(
         self,

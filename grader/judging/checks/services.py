@@ -3,34 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import groupby, pairwise
-from typing import Annotated
+from collections.abc import Mapping, Sequence
+from typing import Annotated, ClassVar
 
-from grader.core.chart import Look, Panel, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import (
     NS_PER_S,
     DurationNs,
     FieldFormula,
     FieldOf,
-    Pattern,
     ServiceType,
     counted,
     seconds,
     within,
 )
 from grader.core.trace import Response, Trace
-from grader.judging.charts import expected_series, series
+from grader.judging.charts import compared_panels
 from grader.judging.findings import explain_fault, explain_no_server, first_fault, met, not_met, waiting_for
-from grader.judging.logs.outputs import number_in
 from grader.judging.plots import Drawing
 from grader.judging.series import curve
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of
-from grader.judging.values import FewSuffice, Reading, RuleOrValue, breach, broken_rules, number_at, rules_text, text_at
-from grader.judging.wording import listed, moment, number, numbers, quote, span
+from grader.judging.values import FewSuffice, RuleOrValue, breach, broken_rules, number_at, rules_text
+from grader.judging.wording import moment, number, quote, span
 
 _RETURN_HINT = "a service callback takes (self, request, response) and ends with return response"
 
@@ -44,6 +40,7 @@ class ServiceAvailable:
         type: Service type, e.g. `std_srvs/srv/Trigger`.
     """
 
+    roles: ClassVar[Roles] = Roles(serves=("service",))
     service: str
     type: ServiceType
 
@@ -73,6 +70,7 @@ class ServiceAnswersAll:
         at_least: Number of requests needed for a judgement.
     """
 
+    roles: ClassVar[Roles] = Roles(serves=("service",))
     service: str
     within: DurationNs = NS_PER_S
     at_least: int = 1
@@ -131,6 +129,7 @@ class ServiceResponse(FewSuffice):
         at_least: Number of responses needed for a judgement.
     """
 
+    roles: ClassVar[Roles] = Roles(serves=("service",))
     service: str
     fields: Annotated[Mapping[str, RuleOrValue], FieldOf("service", "_Response")]
     at_least: int = 1
@@ -188,6 +187,19 @@ def never_asked(trace: Trace, service: str) -> Finding:
     raise HarnessError(f"{service}: it was not called, or too late for a response")
 
 
+#: Numbers in the evidence, at most.
+_MOST_IN_EVIDENCE = 250
+
+
+@dataclass(frozen=True, slots=True)
+class _Answer:
+    """A response with the number read from it and the expected one; `got` is None if no number could be read."""
+
+    response: Response
+    got: float | None
+    wanted: float
+
+
 @dataclass(frozen=True, slots=True)
 class ServiceFunction(FewSuffice):
     """A number in every response of a student's server follows a formula of the fields of its request.
@@ -204,6 +216,7 @@ class ServiceFunction(FewSuffice):
         at_least: Number of responses needed for a judgement.
     """
 
+    roles: ClassVar[Roles] = Roles(serves=("service",))
     service: str
     field: Annotated[str, FieldOf("service", "_Response")]
     formula: Annotated[FieldFormula, FieldOf("service", "_Request", formula=True)]
@@ -239,7 +252,10 @@ class ServiceFunction(FewSuffice):
 
     def drawing(self, trace: Trace) -> Drawing:
         """Return the calls, and the number in each response with the expected one."""
-        return _answers_drawing(self, self._answers(calls_of(trace, self.service, "grader")))
+        answers = self._answers(calls_of(trace, self.service, "grader"))
+        compared = [(a.response.t_ns, a.got, a.wanted) for a in answers]
+        panels = compared_panels(f"{self.field} of the response", compared, self.tolerance, "the responses")
+        return Drawing(services=(self.service,), panels=panels)
 
     def _answers(self, calls: Sequence[Call]) -> list[_Answer]:
         wanted = curve(self.formula, of_fields=True)
@@ -251,186 +267,3 @@ class ServiceFunction(FewSuffice):
             if call.response is not None and math.isfinite(value):
                 found.append(_Answer(call.response, number_at(call.response.value, self.field), value))
         return found
-
-
-_MOST_IN_EVIDENCE = 250
-_KEEP_HINT = "keep the number in an attribute of the node, self.name, and change it there at each call"
-
-
-@dataclass(frozen=True, slots=True)
-class _Answer:
-    """A response with the number read from it and the expected one; `got` is None if no number could be read."""
-
-    response: Response
-    got: float | None
-    wanted: float
-
-
-@dataclass(frozen=True, slots=True)
-class ServiceSequence(FewSuffice):
-    """A number in the responses of a student's server changes by one step with each call, whoever calls.
-
-    The number is read from a numeric field, or from a text: its first number, or what `pattern` finds. Calls of one
-    instant may be answered in any order, and so may those to a server that lags behind. The rest of the text is judged
-    by `service_response`.
-
-    Attributes:
-        service: Service name as on the wire.
-        first: Number in the first response.
-        step: Difference from one response to the next; negative for a falling number.
-        field: Path of the field with the number.
-        floor: Smallest number (for a rising number: largest).
-        reset_to: Number that replaces the next one beyond `floor`; if left out, the last number stays.
-        pattern: Regular expression whose first group, or whole match, is the number in a text.
-        tolerance: Largest difference.
-        at_least: Number of responses needed for a judgement.
-    """
-
-    service: str
-    first: float
-    step: float
-    field: Annotated[str, FieldOf("service", "_Response")] = "message"
-    floor: float | None = None
-    reset_to: float | None = None
-    pattern: Pattern | None = None
-    tolerance: float = 1e-6
-    at_least: int = 3
-
-    @property
-    def expected(self) -> str:
-        text = (
-            f"{self.field} of {self.service} is {number(self.first)} first and changes by {number(self.step)} each time"
-        )
-        again = "" if self.reset_to is None else f"; a number beyond it becomes {number(self.reset_to)}"
-        return text + (f", not beyond {number(self.floor)}{again}" if self.floor is not None else "")
-
-    def judge(self, trace: Trace) -> Finding:
-        calls = calls_of(trace, self.service, "grader")
-        answered = sorted((c for c in calls if c.response is not None), key=_answered_ns)
-        if len(answered) < max(1, self.at_least):
-            return too_few_responses(trace, self.service, len(answered), self.at_least)
-        # A server that lags behind may lose requests, or process them in another order.
-        orders = (self._answers(calls, lambda c: c.request.t_ns), self._answers(answered, _answered_ns))
-        answers = min(orders, key=lambda order: len(self._wrong(order)))
-        wrong = self._wrong(answers)
-        got = [a.got for a in answers]
-        evidence: dict[str, object] = {
-            "service": self.service,
-            "responses": len(answers),
-            "numbers": got[:_MOST_IN_EVIDENCE],
-            "wrong": len(wrong),
-        }
-        if wrong:
-            return self._differs(answers, wrong[0], evidence)
-        shown = ", ".join(number(a.wanted) for a in answers[:3])
-        reason = f"{self.service}: {counted(len(answers), 'response')} in the right order: {shown}"
-        return met(f"{reason}, ... {number(answers[-1].wanted)}", evidence)
-
-    def drawing(self, trace: Trace) -> Drawing:
-        """Return the calls, and the number in each response with the expected one."""
-        calls = [c for c in calls_of(trace, self.service, "grader") if c.response is not None]
-        return _answers_drawing(self, self._answers(calls, _answered_ns))
-
-    def _wrong(self, answers: Sequence[_Answer]) -> list[int]:
-        return [k for k, a in enumerate(answers) if a.got is None or not within(a.got, a.wanted, self.tolerance)]
-
-    def _answers(self, calls: Sequence[Call], instant: Callable[[Call], int]) -> list[_Answer]:
-        """Return the responses in the order of their calls; within one instant, in the order of their numbers."""
-        wanted = self._sequence()
-        found: list[_Answer] = []
-        for _, group in groupby(calls, key=instant):
-            together = list(group)
-            values = [next(wanted) for _ in together]
-            responses = [c.response for c in together if c.response is not None]
-            answers = [self._answer(r, values) for r in responses]
-            found += sorted(answers, key=lambda a: -a.wanted if self.step < 0 else a.wanted)
-        return found
-
-    def _answer(self, response: Response, wanted: list[float]) -> _Answer:
-        """Return the answer with its expected number, removed from the expected numbers of its instant."""
-        got = self._read(response)
-        fitting = (k for k, w in enumerate(wanted) if got is not None and within(got, w, self.tolerance))
-        return _Answer(response, got, wanted.pop(next(fitting, 0)))
-
-    def _sequence(self) -> Iterator[float]:
-        """Yield the expected numbers, rounded to prevent accumulating errors."""
-        value = self.first
-        while True:
-            yield value
-            following = round(value + self.step, 9)
-            rest = value if self.reset_to is None else self.reset_to
-            value = rest if self._beyond(following) else following
-
-    def _beyond(self, value: float) -> bool:
-        if self.floor is None:
-            return False
-        return value < self.floor - 1e-9 if self.step < 0 else value > self.floor + 1e-9
-
-    def _read(self, response: Response) -> float | None:
-        direct = number_at(response.value, self.field)
-        if direct is not None:
-            return direct
-        text = text_at(response.value, self.field)
-        return None if text is None else number_in(text, self.pattern)
-
-    def _differs(self, answers: Sequence[_Answer], place: int, evidence: dict[str, object]) -> Finding:
-        first = answers[place]
-        found = self._found(first)
-        before = f" after {number(answers[place - 1].wanted)}" if place else ""
-        reason = f"{moment(first.response.t_ns)}, {self.service}: {found}{before} in response {place + 1}, "
-        reason += f"expected {number(first.wanted)}"
-        cause, hint = self._instead([a.got for a in answers], place)
-        known = evidence | {"first_wrong": place + 1, "first_wrong_s": seconds(first.response.t_ns)}
-        return not_met(f"{reason}; {cause}" if cause else reason, known, hint=hint, problem=ProblemKind.WRONG_VALUE)
-
-    def _found(self, answer: _Answer) -> str:
-        if answer.got is not None:
-            return number(answer.got)
-        text = text_at(answer.response.value, self.field)
-        return f"no field {self.field} with a number" if text is None else f"no number in {quote(text, 60)!r}"
-
-    def _instead(self, got: Sequence[float | None], place: int) -> tuple[str, str]:
-        """Return a clause about what the numbers do instead, and a hint; both empty if unclear."""
-        values = [v for v in got if v is not None]
-        if len(values) < max(3, len(got)):
-            return "", ""
-        if len(set(values)) == 1:
-            return f"it is {number(values[0])} in every response", _KEEP_HINT
-        steps = [b - a for a, b in pairwise(values[: max(place + 1, 4)])]
-        usual = steps[0]
-        if usual == 0 or not all(within(s, usual, self.tolerance) for s in steps):
-            return self._repeats(values)
-        if not within(usual, self.step, self.tolerance):
-            return f"it changes by {number(usual)} with each call, expected {number(self.step)}", ""
-        if within(values[0], self.first - self.step, self.tolerance):
-            return (
-                "the steps are right, but each response has the old number",
-                "change the number first, then answer",
-            )
-        return (f"the steps are right, but the first number is {number(values[0])}", "") if place == 0 else ("", "")
-
-    def _repeats(self, values: Sequence[float]) -> tuple[str, str]:
-        again = [a == b for a, b in pairwise(values)]
-        if sum(again) >= 0.4 * len(again):
-            return f"numbers are repeated ({numbers(values[:4])}, ...)", _KEEP_HINT
-        return "", ""
-
-
-def _answered_ns(call: Call) -> int:
-    return call.request.t_ns if call.response is None else call.response.t_ns
-
-
-def _answers_drawing(check: ServiceFunction | ServiceSequence, answers: Sequence[_Answer]) -> Drawing:
-    """Return the calls, and the number in each response with the expected one."""
-    if not answers:
-        return Drawing(services=(check.service,))
-    rows = [expected_series([Reading(a.response.t_ns, a.wanted) for a in answers])]
-    read = [(a, a.got) for a in answers if a.got is not None]
-    wrong = len(answers) - len(read)
-    for name, tone, right in (("right", Tone.GOOD, True), ("wrong", Tone.BAD, False)):
-        some = [(seconds(a.response.t_ns), got) for a, got in read if within(got, a.wanted, check.tolerance) is right]
-        rows += [series(name, some, look=Look.DOTS, tone=tone)] if some else []
-        wrong += 0 if right else len(some)
-    said = f"Numbers in the responses: {listed([number(got) for _, got in read], 6)}; {wrong} of {len(answers)} wrong."
-    panel = Panel(f"{check.field} of the response", "", tuple(rows))
-    return Drawing(services=(check.service,), panels=((panel, said),))

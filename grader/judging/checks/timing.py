@@ -16,7 +16,7 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, counted, seconds, within
 from grader.core.trace import Delivery, Message, Trace
-from grader.judging.charts import Lanes, gaps_panel
+from grader.judging.charts import Lanes, drawn_case, gaps_panel
 from grader.judging.checks.fields import too_few_messages
 from grader.judging.findings import (
     explain_fault,
@@ -276,7 +276,7 @@ class Silence:
         start_ns, stop_ns = self._window(trace)
         cases: tuple[Case, ...] = ()
         if start_ns is not None and stop_ns is not None and start_ns < stop_ns:
-            cases = (Case(seconds(start_ns), seconds(stop_ns), "no message expected"),)
+            cases = (drawn_case(start_ns, stop_ns, "no message expected"),)
         lanes = Lanes()
         lanes.add(self.topic)
         found = published(trace, self.topic)
@@ -432,9 +432,9 @@ class Reaction:
         expected += [Reading(trace.stop_ns, r.value) for r in expected[-1:]]
         stops = [*(a.given.t_ns for a in asked), trace.stop_ns][1:]
         cases = [
-            Case(
-                seconds(a.given.t_ns),
-                seconds(stop_ns),
+            drawn_case(
+                a.given.t_ns,
+                stop_ns,
                 quote(rules_text(a.case.when), 40) or "otherwise",
                 Tone.BAD if self._wrong(trace, a) else Tone.GOOD,
             )

@@ -21,7 +21,6 @@ from grader.judging.diagnosis import (
     loading,
     logs,
     misuse,
-    positions,
     rates,
     scopes,
     services,
@@ -47,7 +46,6 @@ _MODULES = (
     rates,
     values,
     logs,
-    positions,
 )
 #: All rules of the grader in the order of their priorities; the first that applies wins.
 RULES: tuple[Rule, ...] = in_order(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))

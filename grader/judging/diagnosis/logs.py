@@ -6,10 +6,9 @@ import ast
 import re
 
 from grader.core.exercise import Location, Outcome, ProblemKind
-from grader.core.quantities import seconds
 from grader.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
-from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.received import LogsReceived, LogsValues
+from grader.judging.checks.waiting import WaitsGracefully
 from grader.judging.diagnosis.rules import Case, Clue, hint_rule, log_call
 from grader.judging.diagnosis.wiring import (
     Made,
@@ -26,7 +25,7 @@ from grader.judging.diagnosis.wiring import (
     runs,
     timer_code,
 )
-from grader.judging.facts import LogFacts, LogPaceFacts, PositionFacts
+from grader.judging.facts import LogFacts, LogPaceFacts, WrongLogFacts
 from grader.judging.logs.outputs import printed_lines, student_records
 from grader.judging.source import Source, argument, chain, last_name, text_of
 from grader.judging.wording import number
@@ -44,7 +43,12 @@ def _prints(source: Source) -> list[ast.Call]:
     return [c for c in source.all(ast.Call) if chain(c.func) in ("print", "sys.stdout.write", "pprint")]
 
 
-@hint_rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.NOT_MET, priority=11010)
+def _must_log(case: Case) -> Case | None:
+    """Return a case whose check asks for any record, or for records of what arrived."""
+    return case if case.logs or isinstance(case.check, (UsesLogger, LogsReceived)) else None
+
+
+@hint_rule(outcome=Outcome.NOT_MET, given=_must_log, priority=11010)
 def _into_file(case: Case) -> Clue | None:
     """No expected text is logged or printed, but the program writes to a file."""
     source = case.source
@@ -59,10 +63,9 @@ def _unseen(case: Case) -> bool:
     check = case.check
     if isinstance(check, UsesLogger):
         return not student_records(case.trace, case.process) and not printed_lines(case.trace, case.process)
-    if isinstance(check, LogsPosition):
-        found = case.found(PositionFacts)
-        return found is not None and found.cause in ("nothing", "no_pair") and found.right == 0
-    logged = case.found(LogFacts)
+    wrong, logged = case.found(WrongLogFacts), case.found(LogFacts)
+    if wrong is not None:
+        return wrong.cause in ("nothing", "no_pair") and wrong.right == 0
     return logged is not None and logged.expected == logged.missing
 
 
@@ -78,7 +81,7 @@ def _writes(call: ast.Call) -> bool:
     return bool(mode) and mode is not None and bool(set(mode) & set("wax"))
 
 
-@hint_rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.PARTLY, fault=None, priority=11020)
+@hint_rule(outcome=Outcome.PARTLY, fault=None, given=_must_log, priority=11020)
 def _printed(case: Case) -> Clue | None:
     """Lines are printed instead of logged."""
     check, source = case.check, case.source
@@ -104,7 +107,7 @@ def _most_printed(case: Case, prints: list[ast.Call]) -> list[ast.Call]:
         words = [w for n in ast.walk(call) if (w := text_of(n)) and len(w.strip()) > 2]
         return max((sum(w.strip() in line for line in lines) for w in words), default=0)
 
-    return sorted(prints, key=seen, reverse=True) if isinstance(case.check, LogsPosition) else prints
+    return sorted(prints, key=seen, reverse=True) if case.logs else prints
 
 
 @hint_rule(UsesLogger, priority=11030)
@@ -133,7 +136,12 @@ _FIELD = re.compile(r"\{(?P<value>[A-Za-z_][\w.]*(?:\(\))?(?:\[[^\]{}]*\])*)(?:!
 _PERCENT = re.compile(r"%[-+ 0#]*\d*(?:\.\d+)?[dfgeEsi](?![A-Za-z])")
 
 
-@hint_rule(LogsPosition, LogsReceived, LogsValues, LogsMatching, priority=11040)
+def _must_show(case: Case) -> Case | None:
+    """Return a case whose check asks for certain texts in the logs."""
+    return case if case.logs or isinstance(case.check, (LogsReceived, LogsValues, LogsMatching)) else None
+
+
+@hint_rule(given=_must_show, priority=11040)
 def _text_as_it_stands(case: Case) -> Clue | None:
     """The f of an f-string is missing, or the values behind a `%` or in `format`."""
     source = case.source
@@ -164,7 +172,7 @@ def _text_as_it_stands(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.NOT_MET, priority=11050)
+@hint_rule(outcome=Outcome.NOT_MET, given=_must_log, priority=11050)
 def _level_raised(case: Case) -> Clue | None:
     """The program hides its own records."""
     for call in case.source.calls("set_level", "set_logger_level"):
@@ -187,14 +195,20 @@ def _received_at_debug(case: Case) -> Clue | None:
     return Clue(hint, case.source.place(logs[0]))
 
 
-@hint_rule(UsesLogger, LogsPosition, priority=11070)
+def _shows_nothing(case: Case) -> Case | None:
+    """Return a case whose check asks for any record, or finds no record that shows the fields of a message."""
+    return case if case.logs or isinstance(case.check, UsesLogger) else None
+
+
+@hint_rule(given=_shows_nothing, priority=11070)
 def _debug_only(case: Case) -> Clue | None:
     if any(case.source.calls("set_level", "set_logger_level")):
         return None
     logs = [n for n in case.source.all(ast.Call) if is_log(case.source, n)]
-    position = case.found(PositionFacts)
-    if position is not None and position.right == 0:
-        logs = [n for n in logs if any(name.rpartition(".")[2] in ("x", "y") for name in names_in(n))]
+    wrong = case.found(WrongLogFacts)
+    if wrong is not None and wrong.right == 0:
+        leaves = {field.rpartition(".")[2] for field in wrong.fields}
+        logs = [n for n in logs if any(name.rpartition(".")[2] in leaves for name in names_in(n))]
     elif not _nothing_logged(case):
         return None
     if not logs or any(last_name(c.func) != "debug" for c in logs):
@@ -203,7 +217,7 @@ def _debug_only(case: Case) -> Clue | None:
     return Clue(hint, case.source.place(logs[0]))
 
 
-@hint_rule(UsesLogger, LogsPosition, outcome=Outcome.NOT_MET, priority=11080)
+@hint_rule(outcome=Outcome.NOT_MET, given=_shows_nothing, priority=11080)
 def _commented_out(case: Case) -> Clue | None:
     if not _nothing_logged(case) or any(is_log(case.source, n) for n in case.source.all(ast.Call)):
         return None
@@ -213,7 +227,13 @@ def _commented_out(case: Case) -> Clue | None:
     return Clue("the log is commented out: remove the #", Location(case.source.file, row))
 
 
-@hint_rule(LogPeriod, LogsPosition, LogsReceived, priority=11090)
+def _must_repeat(case: Case) -> Case | None:
+    """Return a case whose check asks for a log of each message, or for logs at a certain pace."""
+    paced = case.found(LogPaceFacts) is not None
+    return case if paced or case.logs or isinstance(case.check, LogsReceived) else None
+
+
+@hint_rule(given=_must_repeat, priority=11090)
 def _logged_once(case: Case) -> Clue | None:
     call = log_call(case)
     if call is None:
@@ -221,8 +241,8 @@ def _logged_once(case: Case) -> Clue | None:
     once = argument(call, 99, "once")
     if isinstance(once, ast.Constant) and once.value is True:
         return Clue("once=True writes this log only once: remove it", case.source.place(call), key="once")
-    position, pace = case.found(PositionFacts), case.found(LogPaceFacts)
-    few = (position is not None and position.cause == "few") or (pace is not None and pace.count == 1)
+    wrong, pace = case.found(WrongLogFacts), case.found(LogPaceFacts)
+    few = (wrong is not None and wrong.cause == "few") or (pace is not None and pace.count == 1)
     test = next(case.source.around(call, ast.If), None)
     if not few or test is None or not _set_inside(test):
         return None
@@ -238,13 +258,13 @@ def _set_inside(test: ast.If) -> bool:
     return any(chain(t) in names_in(test.test) for t in stored)
 
 
-@hint_rule(LogPeriod, priority=11100)
+@hint_rule(priority=11100)
 def _log_period(case: Case) -> Clue | None:
     """The timer, the throttle or the callback sets the wrong pace."""
     pace, call = case.found(LogPaceFacts), log_call(case)
-    if call is None or pace is None:
+    if call is None or pace is None or pace.count == 0:
         return None
-    source, wanted_s, average = case.source, seconds(case.check.period), pace.average_s
+    source, wanted_s, average = case.source, pace.wanted_s, pace.average_s
     worth = constant(source, argument(call, 99, "throttle_duration_sec"))
     if worth is not None and 0.8 * worth.value <= average <= 1.3 * worth.value:
         hint = f"throttle_duration_sec={number(worth.value)} allows a log every {number(worth.value)} s"

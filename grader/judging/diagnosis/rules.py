@@ -116,6 +116,21 @@ class Case:
         return named(self.check, *roles_of(type(self.check)).speaks)
 
     @property
+    def logs(self) -> tuple[str, ...]:
+        """The topics of which the process has to log what arrives, as far as the check declares them."""
+        return named(self.check, *roles_of(type(self.check)).logs)
+
+    @property
+    def serves(self) -> tuple[str, ...]:
+        """The services that a node has to offer, as far as the check declares them."""
+        return named(self.check, *roles_of(type(self.check)).serves)
+
+    @property
+    def calls(self) -> tuple[str, ...]:
+        """The services that a node has to call, as far as the check declares them."""
+        return named(self.check, *roles_of(type(self.check)).calls)
+
+    @property
     def type(self) -> str:
         """The message type that the check asks for; empty if it names none."""
         return "".join(named(self.check, roles_of(type(self.check)).type))

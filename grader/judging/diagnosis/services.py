@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
 
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Outcome, ProblemKind
-from grader.core.trace import LogRecord
-from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
-from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse, ServiceSequence
+from grader.core.exercise import ProblemKind, named, roles_of
 from grader.judging.diagnosis.names import SPINS
 from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
 from grader.judging.diagnosis.wiring import (
     elsewhere_because,
     goes_to,
-    is_log,
     made,
     reached,
     roots,
@@ -25,12 +20,9 @@ from grader.judging.diagnosis.wiring import (
     text_in_code,
 )
 from grader.judging.facts import OtherEnd
-from grader.judging.service_calls import CallKind, ResponseReader, episodes_of
 from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, parameters, text_of
-from grader.judging.wording import number, quote
+from grader.judging.wording import quote
 
-_CLIENTS = (CallsOfClient, ReactsToResponses, WaitsForService, NoGoWithoutAnswer)
-_SERVERS = (ServiceAvailable, ServiceAnswersAll, ServiceResponse, ServiceSequence)
 _THREADS = {"Thread", "start_new_thread", "ThreadPoolExecutor"}
 #: What waits for a future, or asks whether it is done.
 _WAITS = {*SPINS, "wait", "done", "add_done_callback", "wait_for_future"}
@@ -41,42 +33,67 @@ def _ends(source: Source, kind: str) -> list[ast.Call]:
     return list(source.calls(f"create_{kind}"))
 
 
-def _sides(case: Case) -> Iterator[tuple[Source, str]]:
-    """Yield the files of the case with the end of a service that its check is about."""
-    kind = "client" if isinstance(case.check, _CLIENTS) else "service"
-    yield from ((source, kind) for source in case.sources.values())
+@dataclass(frozen=True, slots=True)
+class _End:
+    """The end of a service that a check asks for: `kind` is `client` or `service`."""
+
+    case: Case
+    service: str
+    kind: str
 
 
-@hint_rule(*_CLIENTS, *_SERVERS, priority=3010)
-def _other_service(case: Case) -> Clue | None:
+def _end(case: Case) -> _End | None:
+    """Return the end of a service that the check declares; None if it is about none."""
+    called = case.calls
+    service = next(iter(called or case.serves), "")
+    return _End(case, service, "client" if called else "service") if service else None
+
+
+def _calling(case: Case) -> Case | None:
+    """Return the case if it is about a client."""
+    return case if case.calls else None
+
+
+def _serving(case: Case) -> Case | None:
+    """Return the case if it is about a server."""
+    return case if case.serves else None
+
+
+@hint_rule(problem=ProblemKind.OTHER_NAME, given=_end, priority=3010)
+def _other_service(end: _End) -> Clue | None:
     """A server or client has another name."""
-    other = case.found(OtherEnd)
-    if not case.is_about(ProblemKind.OTHER_NAME) or other is None:
+    other = end.case.found(OtherEnd)
+    if other is None:
         return None
     found = other.name
-    for source, kind in _sides(case):
-        named = [(c, text_in_code(source, argument(c, 1, "srv_name"))) for c in _ends(source, kind)]
-        fitting = [(c, name) for c, name in named if goes_to(name, found)] or (named if len(named) == 1 else [])
+    for source in end.case.sources.values():
+        there = [(c, text_in_code(source, argument(c, 1, "srv_name"))) for c in _ends(source, end.kind)]
+        fitting = [(c, name) for c, name in there if goes_to(name, found)] or (there if len(there) == 1 else [])
         if len(fitting) != 1:
             continue
         call, written = fitting[0]
-        does = "asks" if kind == "client" else "offers"
-        hint = f"{source.code(call)} {does} {quote(found, 60)}: the service asked for is {case.check.service}"
-        return Clue(hint + elsewhere_because(written, case.check.service), source.place(call))
+        does = "asks" if end.kind == "client" else "offers"
+        hint = f"{source.code(call)} {does} {quote(found, 60)}: the service asked for is {end.service}"
+        return Clue(hint + elsewhere_because(written, end.service), source.place(call))
     return None
 
 
-@hint_rule(*_CLIENTS, *_SERVERS, priority=3020)
-def _other_service_type(case: Case) -> Clue | None:
+def _type_of(end: _End) -> str:
+    """Return the type that a criterion of the exercise asks for; empty if none does."""
+    for check in (end.case.check, *end.case.siblings):
+        roles = roles_of(type(check))
+        if end.service in named(check, *roles.services) and (types := named(check, roles.type)):
+            return types[0]
+    return ""
+
+
+@hint_rule(given=_end, priority=3020)
+def _other_service_type(end: _End) -> Clue | None:
     """A server or client has another type."""
-    offered = [c for c in (case.check, *case.siblings) if isinstance(c, ServiceAvailable)]
-    wanted = next((c.type for c in offered if c.service == case.check.service), "")
-    for source, kind in _sides(case):
-        types = {e.type for e in case.trace.service_ends(kind, case.check.service)}
+    wanted, types = _type_of(end), {e.type for e in end.case.trace.service_ends(end.kind, end.service)}
+    for source in end.case.sources.values():
         calls = [
-            c
-            for c in _ends(source, kind)
-            if goes_to(text_in_code(source, argument(c, 1, "srv_name")), case.check.service)
+            c for c in _ends(source, end.kind) if goes_to(text_in_code(source, argument(c, 1, "srv_name")), end.service)
         ]
         if not wanted or not types or wanted in types or len(calls) != 1:
             continue
@@ -93,7 +110,7 @@ def _callbacks(source: Source) -> list[ast.AST]:
     return found + [n for callback in servers for n in reached(source, roots(source, callback))]
 
 
-@hint_rule(*_CLIENTS, priority=3030)
+@hint_rule(given=_calling, priority=3030)
 def _synchronous_call(case: Case) -> Clue | None:
     """`client.call()` waits for an answer that only a spinning node takes."""
     source = case.source
@@ -112,7 +129,7 @@ def _synchronous_call(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule(*_CLIENTS, priority=3040)
+@hint_rule(given=_calling, priority=3040)
 def _spins_in_callback(case: Case) -> Clue | None:
     """A callback spins the node that is spinning already."""
     source = case.source
@@ -124,7 +141,7 @@ def _spins_in_callback(case: Case) -> Clue | None:
     return Clue(f"{hint} given to future.add_done_callback", source.place(call), key="waits_in_callback")
 
 
-@hint_rule(*_CLIENTS, fault=None, priority=3050)
+@hint_rule(fault=None, given=_calling, priority=3050)
 def _future_never_done(case: Case) -> Clue | None:
     """A loop asks whether a future is done, and nothing spins the node meanwhile."""
     source = case.source
@@ -139,7 +156,7 @@ def _future_never_done(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule(CallsOfClient, ReactsToResponses, priority=3060)
+@hint_rule(given=_calling, priority=3060)
 def _shared_callback_group(case: Case) -> Clue | None:
     """A callback awaits the response of a client in the same callback group, whose callbacks run one at a time."""
     source = case.source
@@ -181,7 +198,7 @@ def _too_early(source: Source) -> Clue | None:
     return Clue(hint, source.place(found), key="result_too_early")
 
 
-@hint_rule(*_CLIENTS, priority=3070)
+@hint_rule(given=_calling, priority=3070)
 def _result_too_early(case: Case) -> Clue | None:
     """The result of a future is read at once."""
     return _too_early(case.source)
@@ -266,7 +283,7 @@ def _service_arguments(crash: Crash) -> Clue | None:
     return None
 
 
-@hint_rule(ServiceResponse, ServiceSequence, priority=3130)
+@hint_rule(problem=ProblemKind.WRONG_VALUE, given=_serving, priority=3130)
 def _another_response(case: Case) -> Clue | None:
     """The callback fills in one response and returns another one."""
     source = case.source
@@ -282,58 +299,3 @@ def _another_response(case: Case) -> Clue | None:
                 hint = f"{source.code(new[0])} sends a new, empty response: write return {name}, which is filled in"
                 return Clue(hint, source.place(new[0]))
     return None
-
-
-@hint_rule(ReactsToResponses, outcome=Outcome.NOT_MET, priority=3140)
-def _wrong_level(case: Case) -> Clue | None:
-    """One side logs at the level of the other, or at a level that is not shown."""
-    check: ReactsToResponses = case.check
-    good, low = _after(case, CallKind.GOOD), _after(case, CallKind.LOW)
-    if check.side == "above" and good and low and all(a.warned for a in good + low):
-        lines = set.intersection(*(a.lines("WARN") for a in good)) - set().union(*(a.lines("WARN") for a in low))
-        return _level_clue(case, lines, f"use info above {number(check.threshold)}")
-    if check.side == "at_or_below" and good and low and not any(a.warned for a in good + low):
-        lines = set.intersection(*(a.lines("INFO") for a in low)) - set().union(*(a.lines("INFO") for a in good))
-        return _level_clue(case, lines, "use warning") or _unseen_level(case, "warning")
-    return _unseen_level(case, "info") if check.side == "above" and not any(a.warned for a in good) else None
-
-
-def _level_clue(case: Case, lines: set[int], advice: str) -> Clue | None:
-    calls = [c for line in sorted(lines) for c in case.source.on_line(line, ast.Call) if is_log(case.source, c)]
-    if len(calls) != 1:
-        return None
-    hint = f"{case.source.code(calls[0], 60)} has the wrong level, {last_name(calls[0].func)}: {advice}"
-    return Clue(hint, case.source.place(calls[0]))
-
-
-def _unseen_level(case: Case, level: str) -> Clue | None:
-    """Return the only log of level DEBUG, which nobody sees."""
-    hidden = [c for c in case.source.calls("debug") if is_log(case.source, c)]
-    if len(hidden) != 1 or any(case.source.calls("set_level", "set_logger_level")):
-        return None
-    hint = f"{case.source.code(hidden[0], 60)} is not shown: the level is INFO unless it is changed; use {level}"
-    return Clue(hint, case.source.place(hidden[0]))
-
-
-@dataclass(frozen=True, slots=True)
-class _Reaction:
-    """What a client logged between a response and its next request."""
-
-    records: tuple[LogRecord, ...]
-
-    @property
-    def warned(self) -> bool:
-        return any(r.severity in ("WARN", "ERROR", "FATAL") for r in self.records)
-
-    def lines(self, severity: str) -> set[int]:
-        return {r.line for r in self.records if r.severity == severity}
-
-
-def _after(case: Case, kind: CallKind) -> list[_Reaction]:
-    """Return the reactions to the responses of a kind."""
-    check: ReactsToResponses = case.check
-    success = "" if check.success == "none" else check.success
-    reading = ResponseReader(check.field, success, check.pattern, check.threshold)
-    episodes = episodes_of(case.trace, check.process, check.service, reading)
-    mine = (e for e in episodes if e.kind is kind)
-    return [_Reaction(tuple(o for o in e.sure if isinstance(o, LogRecord))) for e in mine]

@@ -10,7 +10,6 @@ from grader.core.exercise import Location, Outcome, named, roles_of
 from grader.core.quantities import seconds
 from grader.judging.checks.graph import BidirectionalGraph
 from grader.judging.checks.logs import UsesLogger
-from grader.judging.checks.odometry import LogsPosition
 from grader.judging.checks.received import LogsReceived
 from grader.judging.checks.topics import Publishes, Subscribes
 from grader.judging.diagnosis.rules import NO_SOURCE, Case, Clue, file_for, hint_rule, silent_topic, unheard_topic
@@ -40,7 +39,7 @@ from grader.judging.diagnosis.wiring import (
     variable_of,
     waits_for_ever,
 )
-from grader.judging.facts import PositionFacts, RateFacts
+from grader.judging.facts import RateFacts, WrongLogFacts
 from grader.judging.logs.outputs import student_records
 from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, subtree, text_of
 from grader.judging.values import carries_number, student_endpoints
@@ -66,8 +65,8 @@ def _unseen(case: Case) -> _Unseen | None:
     if topic:
         source = file_for(case, "publisher", topic)
         return _Unseen(case, source, publish_calls(source, made_for(source, "publisher", topic)))
-    position = case.found(PositionFacts)
-    if (position is not None and position.right == 0) or (
+    logged = case.found(WrongLogFacts)
+    if (logged is not None and logged.right == 0) or (
         isinstance(case.check, UsesLogger) and not student_records(case.trace, case.process)
     ):
         return _Unseen(case, case.source, _unseen_logs(case))
@@ -414,10 +413,10 @@ def _nested_spin(unseen: _Unseen) -> Clue | None:
     return None
 
 
-@hint_rule(LogsPosition, priority=8180)
+@hint_rule(priority=8180)
 def _stopped_listening(case: Case) -> Clue | None:
     """The subscription requests a deadline that no publisher offers, or is destroyed before the data arrives."""
-    facts = case.found(PositionFacts)
+    facts = case.found(WrongLogFacts)
     if facts is None or facts.right != 0 or facts.cause not in ("nothing", "constant"):
         return None
     source = case.source

@@ -23,13 +23,14 @@ CONVERSION = 1e-4
 AS_SENT, CONVERTED = 2, 3
 
 
-def chance(step: float, scale: float, units: int) -> float:
+def chance(step: float, scale: float, units: int = AS_SENT) -> float:
     """Return how likely a printed number shows a value by chance, between 0 and 1.
 
     Args:
         step: Unit of the number's last digit.
         scale: Size of the range of such values; 0 if there is only one.
-        units: `AS_SENT` or `CONVERTED`.
+        units: How many units of the last digit the range is wide whose values the number shows: two if it was rounded
+            or cut, three if it may have been converted, too.
     """
     return min(1.0, units * step / scale) if scale else 1.0
 

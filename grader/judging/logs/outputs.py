@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 
 from grader.core.trace import LogRecord, OutputLine, Trace
 from grader.judging.findings import AT_ONCE_NS, first_fault
 from grader.judging.texts import Printed, clean, printed_numbers, template_of, with_decimal_points
-from grader.judging.values import per_trace
+from grader.judging.values import number_at, per_trace, text_at
 
 #: Warnings that rclpy writes through the node's own logger when QoS policies are incompatible.
 _RCLPY_TEXT = re.compile(r"New (publisher|subscription) discovered on (topic|service) .*incompatible QoS", re.DOTALL)
@@ -129,3 +129,16 @@ def number_in(text: str, pattern: str | None = None) -> float | None:
         text = match[1] if match.re.groups and match[1] is not None else match[0]
     found = numbers_in(text)
     return found[0].value if found else None
+
+
+def number_told(value: Mapping[str, object], path: str, pattern: str | None = None) -> float | None:
+    """Return the number at a path: a field that is a number, or the number that a text there tells.
+
+    Args:
+        value: The fields of a message, a request or a response.
+        path: Path of the field.
+        pattern: Regular expression whose first group, or whole match, is the number in a text; its first number if
+            None.
+    """
+    text = text_at(value, path)
+    return number_at(value, path) if text is None else number_in(text, pattern)

@@ -1,24 +1,33 @@
-"""Causes of wrong position logs: another attribute, or an assignment that mixes up values."""
+"""Hint rules of exercise 2: why the logged positions are wrong."""
 
 from __future__ import annotations
 
 import ast
 
-from grader.core.exercise import Outcome
-from grader.judging.checks.odometry import LogsPosition
-from grader.judging.diagnosis.rules import Case, Clue, Maker, hint_rule, log_call
-from grader.judging.diagnosis.wiring import (
+from grader.api import (
+    Case,
+    Clue,
+    Maker,
+    Outcome,
+    Source,
+    WrongLogFacts,
+    argument,
+    chain,
+    first_line,
+    hint_rule,
     is_flag,
+    last_name,
+    log_call,
     made,
     message_classes,
     names_in,
     number_in_code,
+    parameters,
     reached,
     roots,
     runs,
+    subtree,
 )
-from grader.judging.facts import PositionFacts
-from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
 
 _POSITION = "msg.pose.pose.position"
 #: Cause found by the check -> parts of the message that may have been read instead of the position.
@@ -37,12 +46,12 @@ def _position_rule(*causes: str, priority: int) -> Maker[Case]:
     def found(case: Case) -> Case | None:
         return case if _cause(case) in causes else None
 
-    return hint_rule(LogsPosition, outcome=Outcome.NOT_MET, given=found, priority=priority)
+    return hint_rule("logs_position", outcome=Outcome.NOT_MET, given=found, priority=priority)
 
 
 def _cause(case: Case) -> str:
     """Return the cause that the check found; empty if it found none."""
-    facts = case.found(PositionFacts)
+    facts = case.found(WrongLogFacts)
     return "" if facts is None else facts.cause
 
 
@@ -217,7 +226,7 @@ def _scaled_position(case: Case) -> Clue | None:
 def _old_messages(case: Case) -> Clue | None:
     """A callback that sleeps lags behind the messages, and so does a loop that handles one at a time and sleeps."""
     source = case.source
-    facts = case.found(PositionFacts)
+    facts = case.found(WrongLogFacts)
     oldest = _oldest_taken(source) if _cause(case) == "stale" else None
     if oldest is not None:
         return oldest

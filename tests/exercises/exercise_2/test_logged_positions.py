@@ -13,10 +13,10 @@ from wordings import RIGHT, WRONG, Writer
 
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, FaultKind
-from grader.judging.checks.odometry import LogPeriod, LogsPosition
+from grader.rubrics.exercise_checks import known_checks
 
-POSITION = LogsPosition("odom_subscriber.py", "/odom")
-PERIOD = LogPeriod("odom_subscriber.py", "/odom", NS_PER_S)
+POSITION = known_checks()["logs_position"]("odom_subscriber.py", "/odom")
+PERIOD = known_checks()["log_period"]("odom_subscriber.py", "/odom", NS_PER_S)
 HALF = Fraction(1, 2)
 
 
@@ -272,3 +272,18 @@ def test_a_growing_list_of_positions_shows_the_newest() -> None:
         return f"x, y so far, the newest first: {path[::-1][:6]}"
 
     assert POSITION.judge(position_logs(write).trace()).credit == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x={y:.3f} y={x:.3f}", "x and y are swapped"),
+        ("x={x:.3f} y=0.000", "the second value is z of the position, not y"),
+    ],
+)
+def test_wrong_positions_are_shown_beside_the_right_ones(text: str, said: str) -> None:
+    """The first log that is settled, with its time, and where the robot was."""
+    times = [6.0 + k for k in range(14)]
+    finding = POSITION.judge(position_logs(lambda x, y: text.format(x=x, y=y), times).trace())
+    assert finding.reason.startswith(f"odom_subscriber.py: {said}: at t = 6.000 s the log says 'x=")
+    assert finding.reason.endswith(") m")
