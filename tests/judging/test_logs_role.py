@@ -97,7 +97,7 @@ def test_what_goes_into_a_file_is_no_log() -> None:
     source = f"{HIDES}open('levels.txt', 'w').write(str(node))\n".replace("debug", "info")
     rec = listening().log(0.5, "started")
     (verdict,) = judged(rec, source, _Declared(absent=True))
-    assert "what goes into a file is not seen by the grader" in verdict.hint
+    assert "the grader does not see what goes into a file" in verdict.hint
     (verdict,) = judged(rec, source, _Declared())
     assert "into a file" not in verdict.hint
 
