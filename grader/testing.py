@@ -71,7 +71,7 @@ def judge(check: Check, trace: Trace, sources: Mapping[str, str] | None = None) 
     if wrong:
         raise ValueError(f"{type(check).__name__} {wrong}")
     if repr(_asked(check, trace, sources)) != repr(finding):  # NaN never equals itself
-        raise ValueError(f"{type(check).__name__} found something else when it was asked again")
+        raise ValueError(f"{type(check).__name__} gave another finding when it judged again")
     if repr(trace) != before:
         raise ValueError(f"{type(check).__name__} changed the trace")
     return finding

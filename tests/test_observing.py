@@ -370,8 +370,8 @@ def test_a_node_in_another_domain_is_told(tmp_path: Path, clock: str, given: str
     summary = seen(tmp_path, clock, node=before + TALKER.format(sent="String()", given=given))
     assert summary.nodes == ()
     assert summary.notes == (
-        "node.py: the node /talker is in the ROS domain 7, where nothing of it is seen; take out what sets domain_id "
-        "or ROS_DOMAIN_ID",
+        "node.py: the node /talker is in the ROS domain 7, where the grader does not see it; remove what sets "
+        "domain_id or ROS_DOMAIN_ID",
     )
 
 

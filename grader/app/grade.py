@@ -303,7 +303,7 @@ def begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[E
     if not begun:
         where = shown(submission.path, 500)
         files = listed(wanted_files(exercises))
-        raise SubmissionError(f"{where}: expected a file of some exercise, found none", f"the files are {files}")
+        raise SubmissionError(f"{where}: expected a file of an exercise, found none", f"the files are {files}")
     return begun, replace(submission, files={name: submission.files[name] for name in wanted_files(begun)})
 
 
@@ -350,10 +350,10 @@ def _notes(request: GradeRequest, session: RecordingSession) -> Iterator[str]:
     if request.seed is None and request.seed_key.public:
         yield PRACTICE_NOTE
     if session.ros.distro not in TRIED:
-        yield f"ROS 2 {session.ros.distro} was never tried with this grader; it was tried on {' and '.join(TRIED)}"
+        yield f"this grader was never tested with ROS 2 {session.ros.distro}, only with {' and '.join(TRIED)}"
     lacking = [str(found) for found in session.containment if not found.holds]
     if session.isolation.name == NO_ISOLATION:
-        yield "the submission ran without a sandbox: as asked"
+        yield "the submission ran without a sandbox, as requested"
     elif lacking:
         yield f"sandbox {session.isolation.name}: {'; '.join(lacking)}"
 

@@ -181,7 +181,9 @@ def _stage_apart(targets: Sequence[Target], into: Path) -> Submission:
     submission = stage_collected(Collected(files), str(targets[0].folder), names, into, meant)
     for name, path in meant.items():
         if submission.files[name].found != path:
-            raise SubmissionError(f"{name}: expected a file that is handed in, found it in a folder that a tool made")
+            raise SubmissionError(
+                f"{name}: expected a file of the submission, found one in a folder that a tool created"
+            )
     return submission
 
 

@@ -146,7 +146,7 @@ def checked(student: str) -> str:
     """Strip whitespace from the id of a student; raises VariantError if the id cannot be used."""
     plain = student.strip()
     if not folded(plain) or len(plain) > MOST_ID or not plain.isprintable():
-        text = f"expected the id of a student, up to {MOST_ID} signs on one line, found `{shown(student)}`"
+        text = f"expected the id of a student, up to {MOST_ID} characters on one line, found `{shown(student)}`"
         raise VariantError(f"--student: {text}")
     return plain
 

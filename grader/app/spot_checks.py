@@ -225,7 +225,7 @@ def _agreed(due: Mapping[Key, _Checked], record: Record) -> set[Key]:
 
 def _unchecked(trace: Trace, *, suspect: bool) -> Trace:
     if suspect:
-        return replace(trace, harness_problem=f"{BUSY}, and this submission reaches for the insides of its process")
+        return replace(trace, harness_problem=f"{BUSY}, and this submission inspects its own process")
     return replace(trace, notes=(*trace.notes, f"{BUSY}: what was recorded in virtual time counts"))
 
 

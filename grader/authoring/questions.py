@@ -292,7 +292,7 @@ def _services(seen: Seen) -> Iterator[DraftCriterion]:
         if calls:
             wanted: dict[str, object] = {"service": service, "calls": calls}
             comment = f"seen: {counted(calls, 'call')}; decide: how many, and how long between two of them?"
-            hint = f"call {service} once it is there"
+            hint = f"call {service} once it is available"
             id_, title = f"calls_{as_id(service)}", f"Calls {service}"
             yield DraftCriterion(id_, title, "service_calls", wanted, hint, "", comment)
 
@@ -305,7 +305,7 @@ def _parameters(seen: Seen) -> Iterator[DraftCriterion]:
             comment = "its value is not a number, text or truth value; decide: does the task ask for it at all?"
         else:
             asked["value"] = value
-        title, hint = f"Has the parameter {name}", f'declare_parameter("{name}", ...) before anybody asks for it'
+        title, hint = f"Has the parameter {name}", f'declare_parameter("{name}", ...) before anything reads it'
         yield DraftCriterion(f"parameter_{as_id(name)}", title, "parameter_declared", asked, hint, "", comment)
 
 

@@ -247,7 +247,7 @@ def _unmet(draft: Draft, trace: Trace) -> str:
         (criterion,) = _read(rubric_text(replace(draft, stimuli=(), simulations=()))).criteria
         finding = criterion.check.judge(trace)
     except RubricError as error:
-        return f"it cannot be asked yet: {quote(error.message.partition('.yaml:')[2] or error.message)}"
+        return f"it cannot be used yet: {quote(error.message.partition('.yaml:')[2] or error.message)}"
     except GraderError as error:
         return f"it cannot be judged: {quote(error.message)}"
     return "" if finding.credit == 1 else f"seen: {quote(finding.reason)}"

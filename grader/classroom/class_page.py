@@ -75,7 +75,7 @@ def _rows(book: Gradebook, run: RunOfClass, reports: Sequence[ReportData]) -> It
 
 def _warnings(run: RunOfClass, reports: Sequence[ReportData]) -> Iterator[str]:
     if run.stopped:
-        yield "This run was stopped before everybody was graded; the same command goes on where it was."
+        yield "This run was stopped before everybody was graded; run the same command again to continue."
     bare = sum(_isolation(report) == NO_SANDBOX for report in reports)
     if bare:
         yield f"No isolation: {bare} of {len(reports)} submissions ran without a sandbox."
@@ -191,7 +191,7 @@ def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator
     yield Listing(
         "rubric-mistakes",
         "Mistakes in the rubric",
-        "They leave criteria undecided. Correct the rubric and give the same command again.",
+        "They leave criteria undecided. Correct the rubric and run the same command again.",
         tuple(
             PageEntry(f"{mistake} (submissions: {len(concerned)})", rows.index(concerned[0]))
             for mistake, concerned in book.author_mistakes.items()
@@ -206,7 +206,7 @@ def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator
     yield Listing(
         "not-graded",
         "Not graded",
-        "There is no report. Students have to fix what was refused; --rerun failed grades again what failed here.",
+        "There is no report. Students have to fix refused submissions; --rerun failed grades the failed ones again.",
         tuple(
             PageEntry(f"{row.standing}{_problem(row, run)}", k)
             for k, row in enumerate(rows)
@@ -216,7 +216,7 @@ def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator
     yield Listing(
         "faults",
         "Crashed or ended early",
-        "Programs that raised, hung, or ended before they were told to.",
+        "Programs that raised an exception, hung, or ended too early.",
         tuple(entry for k, row in enumerate(rows) for entry in _faults(k, row)),
     )
     yield from _roster(book, rows, run)
@@ -258,7 +258,7 @@ def _roster(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator[L
         "Results of earlier runs whose submissions are not in the sources.",
         _texts(book.foreign, run),
     )
-    yield Listing("remarks", "Remarks", "What else was noticed.", _texts(book.remarks, run))
+    yield Listing("remarks", "Remarks", "Other notes on this run.", _texts(book.remarks, run))
 
 
 def _texts(texts: Sequence[str], run: RunOfClass) -> tuple[PageEntry, ...]:

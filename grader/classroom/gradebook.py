@@ -357,11 +357,11 @@ def remarks(row: Row) -> list[str]:
     found += [f"comment on {id_}: {comment}" for id_, comment in commented.items()]
     found += [f"comment: {row.adjusted.comment}"] if row.adjusted.comment else []
     if row.outdated:
-        found.append("the result is of other files or of another rubric than now")
+        found.append("the result belongs to other files or to another rubric")
     if row.twin_of:
         found.append(f"the same person as {', '.join(row.twin_of)}")
     if row.name and row.person is None:
-        found.append("matches nobody on the roster for sure")
+        found.append("matches nobody on the roster with certainty")
     if row.marked_late:
         found.append(f"marked as late by the platform{f' ({row.late})' if row.late else ''}")
     if row.adjusted.ignored:

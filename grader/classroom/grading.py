@@ -38,8 +38,8 @@ CHANGED, FAILED, UNDECIDED, ALL = "changed", "failed", "undecided", "all"
 LEAST_FREE_BYTES = 4 << 20
 #: Seconds that an attempt may take in addition to the limits of its recordings.
 _BEYOND_S = 300.0
-_NOBODY = "whose variant to grade it by is not clear: it matches nobody on the roster for sure"
-_NO_ID = "whose variant to grade it by is not clear: the roster has no number, user name or address of this person"
+_NOBODY = "cannot choose a variant: no student on the roster matches this submission with certainty"
+_NO_ID = "cannot choose a variant: the roster has no number, user name or address for this student"
 
 
 _GRADING = GradeRequest("")
@@ -254,7 +254,7 @@ class ClassRun:
             return
         for place in (self.store, Store(Path(tempfile.gettempdir()))):
             if place.free_bytes < LEAST_FREE_BYTES:
-                hint = "free some space; the same command goes on where it was"
+                hint = "free some space; run the same command again to continue"
                 raise HarnessError(f"{place.folder}: expected room for results, found the disk full", hint)
 
 
@@ -307,7 +307,7 @@ def refuse_without_key(course: ClassRequest, exercises: Sequence[Exercise]) -> N
         raise VariantError(text, "name its file with --variant-key FILE")
     if course.roster is None:
         text = "--roster: expected the people of the class, because a rubric has variants, found no roster"
-        raise ClassError(text, "name it with --roster CSV: it says whose variant a submission is graded by")
+        raise ClassError(text, "name it with --roster CSV: it says which variant each student has")
 
 
 def own_conditions(

@@ -72,8 +72,8 @@ def reveals(book: Gradebook) -> str:
     criteria = "a criterion" if len(hidden) == 1 else f"{len(hidden)} criteria"
     first = ", ".join(hidden[:_MOST])
     return (
-        f"the exported grades count {criteria} that the rubric hides from students ({first}): "
-        "who compares the grade with the page learns the result; import them when it may be seen"
+        f"the exported grades include {criteria} that the rubric hides from students ({first}): "
+        "students can compute the result from the grade; import the grades once they may see it"
     )
 
 

@@ -150,7 +150,7 @@ def _counted(book: Gradebook, left_out: list[str], but: Collection[str] = ()) ->
         if id(row) in chosen or row.adjusted.ignored or not row.name or row.name in but:
             continue
         if row.person is None:
-            why = "matches nobody on the roster for sure"
+            why = "matches nobody on the roster with certainty"
         elif row.adjusted.score is None:
             why = f"no score: {row.status.value}"
         else:

@@ -148,7 +148,7 @@ class Store:
         except OSError as error:
             shutil.rmtree(fresh, ignore_errors=True)
             why = f"{place}: the result cannot be written: {error.strerror}"
-            raise HarnessError(why, "free some space; the same command goes on where it was") from None
+            raise HarnessError(why, "free some space; run the same command again to continue") from None
         return True
 
     def write(self, name: str, data: bytes) -> Path:

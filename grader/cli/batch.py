@@ -48,7 +48,9 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 )
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Submissions at a time; by default one a core.")
 @click.option("--scheduler", metavar="ADDRESS", help="Grade on the Dask cluster of this scheduler, or scheduler file.")
-@click.option("--rerun", type=click.Choice(_RERUNS), default="changed", help="What is graded again besides the new.")
+@click.option(
+    "--rerun", type=click.Choice(_RERUNS), default="changed", help="Which submissions to grade again, besides new ones."
+)
 @click.option(
     "--exercise",
     "exercises",
@@ -57,14 +59,14 @@ _RERUNS = ("changed", "failed", "undecided", "all")
     shell_complete=complete_exercise,
     help="Grade only this exercise; repeatable.",
 )
-@click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which a student has a file.")
+@click.option("--all", "every", is_flag=True, help="Grade every exercise and project for which a student has a file.")
 @click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 @interfaces_option
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw everybody's values from N.")
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key, not by the one kept in RESULTS.")
 @recording_options
-@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for one submission.")
-@click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for one submission.")
+@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As in `grade`.")
+@click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As in `grade`.")
 @time_budget_option
 @click.option(
     "--spot-checks",
@@ -72,9 +74,11 @@ _RERUNS = ("changed", "failed", "undecided", "all")
     default="100%",
     show_default=True,
     callback=parse_share,
-    help="Share of the class that is drawn and checked on the wall clock as well; 5% is quicker.",
+    help="Share of the class to check on the wall clock too, drawn at random; 5% is faster.",
 )
-@click.option("--variant-key", type=PATH, metavar="FILE", help="The course key; whose variant it is, the roster says.")
+@click.option(
+    "--variant-key", type=PATH, metavar="FILE", help="The course key; the roster says which variant each student has."
+)
 @click.option("--standalone", is_flag=True, help="Make each HTML report a single file that can be sent away.")
 @click.option("--canvas", metavar="NUMBER", help="Write canvas.csv for the assignment of this number.")
 @click.option("--canvas-gradebook", type=PATH, metavar="CSV", help="The gradebook that Canvas exported.")
@@ -87,10 +91,10 @@ _RERUNS = ("changed", "failed", "undecided", "all")
     type=PATH,
     metavar="FOLDER",
     multiple=True,
-    help="What students were given, taken out before comparing; repeatable; by default the project's own templates.",
+    help="Files that students were given, ignored when comparing; repeatable; by default the project's own templates.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the class as JSON, and nothing else.")
-@click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
+@click.option("--no-progress", is_flag=True, help="Show no progress while grading.")
 def command(  # noqa: PLR0913  one parameter an option
     *,
     sources: tuple[Path, ...],
@@ -164,13 +168,13 @@ def command(  # noqa: PLR0913  one parameter an option
         with _scheduler_factory(scheduler, jobs) as make, shown_watcher(wanted=not no_progress) as watcher:
             graded = grade_class(course, watcher, complain, make)
     except KeyboardInterrupt:
-        click.echo("interrupted: what was graded is kept, the same command goes on where it was", err=True)
+        click.echo("interrupted: what was graded is kept; run the same command again to continue", err=True)
         return INTERRUPTED
     print_result(lambda: summary_json(graded), lambda _: render_summary(graded), as_json=as_json)
     for mistake, rows in graded.book.author_mistakes.items():
         count = "1 submission" if len(rows) == 1 else f"{len(rows)} submissions"
         complain(f"the rubric has a mistake: {mistake} ({count})", kind="error")
-        complain("correct it, and give the same command again", kind="hint")
+        complain("correct it, and run the same command again", kind="hint")
     return _code(graded)
 
 

@@ -17,7 +17,7 @@ _exercises = click.option(
     metavar="ID",
     multiple=True,
     shell_complete=complete_exercise,
-    help="Grade only this; repeatable.",
+    help="Grade only this exercise; repeatable.",
 )
 _rubrics = click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 _tiers = click.Choice(("auto", *TIERS))

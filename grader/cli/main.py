@@ -124,7 +124,7 @@ class _Default(click.Command):
     shell_complete=complete_exercise,
     help="Grade only this exercise, named by its id, number or file; repeatable.",
 )
-@click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which there is a file.")
+@click.option("--all", "every", is_flag=True, help="Grade every exercise and project for which there is a file.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, as a report names it.")
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key and the files handed in.")
 @recording_options
@@ -152,7 +152,7 @@ class _Default(click.Command):
     "--clock",
     type=click.Choice(["virtual", "wall", "auto"]),
     default="auto",
-    help="The clock of the student's nodes; auto: virtual, and wall where that cannot hold.",
+    help="The clock of the student's nodes; auto: virtual, or wall where virtual time does not work.",
 )
 @isolation_option
 @time_budget_option
@@ -162,15 +162,15 @@ class _Default(click.Command):
     default="0%",
     show_default=True,
     callback=parse_share,
-    help="Share of submissions that are drawn and checked on the wall clock as well.",
+    help="Share of submissions to check on the wall clock too, drawn at random.",
 )
-@click.option("--student", metavar="ID", default="", help="Grade by the variant of this student; see --variant-key.")
+@click.option("--student", metavar="ID", default="", help="Grade with the variant of this student; see --variant-key.")
 @click.option("--variant-key", type=PATH, metavar="FILE", help="The course key that rubrics draw variants from.")
 @audience_options
 @click.option("-v", "--verbose", is_flag=True, help="Print every reason, hint and call, the graph, and versions.")
 @click.option("--watch", is_flag=True, help="Grade again whenever a .py file is saved, until Ctrl-C.")
 @click.option("--open", "opens", is_flag=True, help="Write the HTML page and open it in a browser.")
-@click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
+@click.option("--no-progress", is_flag=True, help="Show no progress while grading.")
 @click.version_option(grader.__version__, prog_name="grade", message="%(prog)s %(version)s")
 def _grade(*, submission: str | None, watch: bool, no_progress: bool, **as_given: Any) -> int:
     """Grade a SUBMISSION (a folder, an archive or a .py file) and explain the score.
@@ -342,7 +342,7 @@ class _Grading:
         for found in () if self.readers.only_students else missing(report.environment.containment):
             complain(f"sandbox {report.environment.isolation}: {found}")
         if report.environment.ros_distro not in TRIED:
-            complain(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
+            complain(f"this grader was never tested with ROS 2 {report.environment.ros_distro}")
 
 
 def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> EvidenceWriter:
@@ -355,8 +355,8 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
 @click.argument("files", metavar="PROGRAM...", nargs=-1, required=True, type=PATH)
 @click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
 @recording_options
-@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
-@click.option("--isolation", type=click.Choice(SANDBOXES), default="auto", envvar=ISOLATION, help="As for grading.")
+@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As in `grade`.")
+@click.option("--isolation", type=click.Choice(SANDBOXES), default="auto", envvar=ISOLATION, help="As in `grade`.")
 @inputs_options
 @interfaces_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
@@ -422,7 +422,7 @@ def _doctor(*, as_json: bool) -> int:
 @click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_criterion)
 @click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Look in this rubric; repeatable.")
 @click.option("--rules", is_flag=True, help="List the hint rules by priority: all, or those for the check NAME.")
-@click.option("--on", "evidence", metavar="EVIDENCE", type=PATH, help="Ask the rules about this kept recording.")
+@click.option("--on", "evidence", metavar="EVIDENCE", type=PATH, help="Try the rules on this kept recording.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 def _explain(*, name: str | None, rubrics: tuple[Path, ...], rules: bool, evidence: Path | None, as_json: bool) -> int:
     """Explain the criterion or the check NAME; without a name, list all of them.
@@ -431,7 +431,7 @@ def _explain(*, name: str | None, rubrics: tuple[Path, ...], rules: bool, eviden
     for it. With --rules, lists the rules that find hints; with --rules --on EVIDENCE, those that apply to a recording.
     """
     if evidence is not None and (not rules or name is not None):
-        raise click.BadParameter("--on needs --rules, and no NAME: all rules are asked about the recording")
+        raise click.BadParameter("--on needs --rules, and no NAME: all rules are tried on the recording")
     if rules:
         return _explain_rules(name or "", rubrics, evidence, as_json=as_json)
     from grader.app.explain import everything, explain

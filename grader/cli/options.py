@@ -56,7 +56,7 @@ time_budget_option = click.option(
     default=TIME_BUDGET_S,
     show_default=True,
     metavar="SECONDS",
-    help="Real time that the recordings of one submission may take together; what is left then is not met.",
+    help="Limit of real time for all recordings of one submission; criteria left by then are not met.",
 )
 
 
@@ -104,7 +104,7 @@ def recording_options(command: Callable[..., int]) -> Callable[..., int]:
         metavar="TOPIC=BAG",
         multiple=True,
         callback=_parse_recordings,
-        help="Play this recording on a topic, or on all topics of a message type, not that of the rubric; repeatable.",
+        help="Play this recording on a topic, or on all topics of a message type, instead of the rubric's; repeatable.",
     )
     odom_bag = click.option("--odom-bag", type=PATH, help=f"The same as --recording {ODOMETRY}=PATH.")
     return recording(odom_bag(called))

@@ -71,7 +71,7 @@ PAGE = "html"
     "--diff", "show_changes", is_flag=True, help="Print what changed since grading: in all, then dropped marks first."
 )
 @click.option("--csv", "table", type=PATH, metavar="FILE", help="Write the changes of --diff as a table, too.")
-@click.option("--verify", is_flag=True, help="Make sure that recordings show what is judged; slower.")
+@click.option("--verify", is_flag=True, help="Verify that the recordings contain what is judged; slower.")
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes for a class; by default one a core.")
 @audience_options
 def command(  # noqa: PLR0913  one parameter an option
@@ -104,7 +104,7 @@ def command(  # noqa: PLR0913  one parameter an option
         raise click.BadParameter("evidence is kept while grading, not while judging again")
     for_whom = readers(audience, as_of)
     if show_changes and for_whom.only_students:
-        raise click.BadParameter("--diff tells reasons as they are: it is for instructors")
+        raise click.BadParameter("--diff shows full reasons: it is for instructors")
     if table is not None and not show_changes:
         raise click.BadParameter("--csv needs --diff")
     how = rejudge.judgement(

@@ -82,8 +82,8 @@ def _schema(*, rubric: Path | None) -> int:
 @click.argument("rubric", metavar="FILE", type=RUBRIC)
 @click.option("--variant-key", "key", type=PATH, metavar="FILE", help="The course key.")
 @click.option("--key-file", "old_key", type=PATH, hidden=True)  # its name in earlier versions
-@click.option("--student", metavar="ID", required=True, help="Whose values; the same id as on the roster.")
-@click.option("--format", "format_", type=click.Choice(["markdown", "json"]), default="markdown", help="How to print.")
+@click.option("--student", metavar="ID", required=True, help="The student, by the id on the roster.")
+@click.option("--format", "format_", type=click.Choice(["markdown", "json"]), default="markdown", help="Output format.")
 def _variant(*, rubric: Path, key: Path | None, old_key: Path | None, student: str, format_: str) -> int:
     """Print the values that a rubric has for one student, for the task sheet."""
     key = key or old_key
@@ -119,11 +119,13 @@ def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
 @command.command(name="new")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", type=PATH, metavar="PATH", help="Write it there; by default it is printed.")
-@click.option("--id", "id_", default="", metavar="ID", help="Id of the exercise; by default made of the first file.")
+@click.option(
+    "--id", "id_", default="", metavar="ID", help="Id of the exercise; by default from the name of the first file."
+)
 @inputs_options
 @click.option("--duration", type=click.FloatRange(4, 600), default=10.0, show_default=True, help="Seconds observed.")
-@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
-@click.option("--isolation", type=click.Choice(("auto", *TIERS)), default="auto", help="As for grading.")
+@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As in `grade`.")
+@click.option("--isolation", type=click.Choice(("auto", *TIERS)), default="auto", help="As in `grade`.")
 def _new(  # noqa: PLR0913  one parameter an option
     *,
     files: tuple[Path, ...],
@@ -147,7 +149,7 @@ def _new(  # noqa: PLR0913  one parameter an option
     from grader.rubrics.schema import FILE, schema_text
 
     if output is not None and output.exists():
-        raise GraderError(f"{output}: expected a new file, found one that is there", "name another, or remove it")
+        raise GraderError(f"{output}: expected a new file, found an existing one", "name another, or remove it")
     with shown_progress(wanted=True) as progress:
         request = ObserveRequest(
             files, round(duration * 1e9), (), clock, isolation, (), read_simulations(simulations), read_sent(sent)
@@ -171,17 +173,25 @@ def _new(  # noqa: PLR0913  one parameter an option
 
 @click.command(name="selftest")
 @click.argument("rubrics", metavar="RUBRIC...", nargs=-1, required=True, type=RUBRIC, callback=_all_rubrics)
-@click.option("--reference", type=PATH, metavar="FOLDER", help="A right solution; by default what the notes name.")
-@click.option("--template", type=PATH, metavar="FOLDER", help="What students start from; by default as above.")
+@click.option(
+    "--reference", type=PATH, metavar="FOLDER", help="A correct solution; by default the one that the notes name."
+)
+@click.option(
+    "--template", type=PATH, metavar="FOLDER", help="The template that students start from; by default as above."
+)
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Scenarios at a time; by default one a core.")
-@click.option("--only", default="", metavar="PATTERN", help="Only mutants and variants of this id; * is anything.")
-@click.option("--sample", type=click.IntRange(min=1), metavar="N", help="Only N mutants a rubric, of many kinds.")
+@click.option(
+    "--only", default="", metavar="PATTERN", help="Only mutants and variants with this id; * matches anything."
+)
+@click.option(
+    "--sample", type=click.IntRange(min=1), metavar="N", help="Only N mutants for each rubric, of many kinds."
+)
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw the sample and all values from N.")
-@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
-@click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for grading.")
+@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As in `grade`.")
+@click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As in `grade`.")
 @click.option("--write-notes", is_flag=True, help="Add what is not explained to the notes, with a reason to fill in.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
-@click.option("--no-progress", is_flag=True, help="Say nothing while testing.")
+@click.option("--no-progress", is_flag=True, help="Show no progress while testing.")
 def selftest_command(  # noqa: PLR0913  one parameter an option
     *,
     rubrics: tuple[Path, ...],
@@ -202,7 +212,7 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
     Notes in NAME.selftest.yaml beside NAME.yaml, or selftest.yaml beside rubric.yaml, explain what may survive.
 
     Exit codes: 0 every mistake was detected or explained, every criterion detected one, and no correct program lost a
-    point, 1 not, 2 the command or something it was given cannot be used.
+    point, 1 not, 2 the command or one of its inputs cannot be used.
     """
     require("grade selftest", "libcst", "authors")
     from grader.mutation.running import SelftestOptions, selftest

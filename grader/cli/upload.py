@@ -35,7 +35,7 @@ def _options(function: _Command) -> _Command:
             ),
             click.option("--send", is_flag=True, help="Send; without it, only show what would be sent."),
             click.option("--scores-only", is_flag=True, help="Send no feedback."),
-            click.option("--skip-unknown", is_flag=True, help="Send although people are not on the platform."),
+            click.option("--skip-unknown", is_flag=True, help="Send even if some people are not on the platform."),
         )
     ):
         function = decorate(function)
@@ -95,7 +95,9 @@ def _upload(  # noqa: PLR0913  one parameter an option
         _show(render_comparison(known, platform, found))
         if known.withheld:
             criteria = ", ".join(known.withheld)
-            complain(f"the scores count what the rubric hides from students: {criteria}; a score reveals the result")
+            complain(
+                f"the scores include criteria that the rubric hides from students: {criteria}; they reveal the results"
+            )
         left_out = bool(found.unknown or known.left_out)
         needed = sum(change.needed for change in found.changes)
         if found.unknown and not skip_unknown and send:
@@ -107,7 +109,7 @@ def _upload(  # noqa: PLR0913  one parameter an option
         try:
             sent = marks.send(found.changes, platform, lambda line: complain(line, kind="sent"))
         except KeyboardInterrupt:
-            complain("interrupted: what was sent is there, the same command sends the rest", kind="note")
+            complain("interrupted: run the same command again to send the rest", kind="note")
             return INTERRUPTED
     _show(render_sent(sent))
     return NOT_ALL_MET if left_out or sent.refused or sent.wrong else ALL_MET

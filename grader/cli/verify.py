@@ -49,7 +49,7 @@ _EPILOG = (
     metavar="ID",
     multiple=True,
     shell_complete=complete_exercise,
-    help="Record only this exercise; repeatable. By default each of which there is a file.",
+    help="Record only this exercise; repeatable. By default each for which there is a file.",
 )
 @click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 @click.option(
@@ -63,7 +63,7 @@ _EPILOG = (
 @click.option("--student", metavar="ID", default="", help="Use the variant of this student; see --variant-key.")
 @click.option("--variant-key", type=PATH, metavar="FILE", help="The course key that rubrics draw variants from.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
-@click.option("--no-progress", is_flag=True, help="Say nothing while recording.")
+@click.option("--no-progress", is_flag=True, help="Show no progress while recording.")
 def command(  # noqa: PLR0913  one parameter an option
     *,
     submissions: tuple[str, ...],
@@ -135,4 +135,4 @@ def _keep(found: Verification, evidence: Path, text: str) -> None:
     from grader.execution.evidence.store import add_verification
 
     add_verification(evidence, text.encode())
-    complain(f"{evidence} says now that the recordings are {found.state.value}", kind="kept")
+    complain(f"{evidence} now says that the recordings are {found.state.value}", kind="kept")

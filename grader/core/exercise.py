@@ -50,7 +50,7 @@ class ProblemKind(Enum):
     NO_NODE = "no_node"  # a program writes, but has no node
     NOT_LOGGED = "not_logged"  # nothing is logged, or not all of it
     PRINTED = "printed"  # it is printed instead of logged
-    AMONG_OTHERS = "among_others"  # the right values are logged among so many others that they show nothing
+    AMONG_OTHERS = "among_others"  # the right values are logged among so many others that they prove nothing
     ERRORS_LOGGED = "errors_logged"  # records say that something failed
     ENDED = "ended"  # a program ends by itself too early
     STILL_RUNNING = "still_running"  # a program does not end when it is stopped

@@ -63,7 +63,7 @@ def byte_code(runtime: PythonRuntime) -> Fact:
             )
             stale = [Path(path) for path in json.loads(done.stdout)]
         except (OSError, subprocess.SubprocessError, ValueError, TypeError):
-            return Fact("byte code", "cannot be looked at: ROS does not start")
+            return Fact("byte code", "cannot be checked: ROS does not start")
     if not stale:
         return Fact("byte code", "up to date")
     value = (

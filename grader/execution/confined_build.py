@@ -155,13 +155,13 @@ def build_confined(  # noqa: PLR0913  where it runs, what it reads, where it wri
         return Build({}, problems=(f"{_NOT_USED}: building them takes more than {limits_}",))
     if done.returncode:
         said = done.stderr.decode("utf-8", "replace").strip().splitlines() or [f"code {done.returncode}"]
-        raise HarnessError(f"interfaces: expected them to be built, found that it ended: {said[-1][-400:]}")
+        raise HarnessError(f"interfaces: expected them to be built, but the build ended: {said[-1][-400:]}")
     try:
         told = told_of(json.loads(done.stdout))
     except (ValueError, RecursionError):
         told = None
     if told is None:
-        raise HarnessError("interfaces: expected to hear what was built, found something else")
+        raise HarnessError("interfaces: expected the result of the build, found something else")
     return told if _is_moderate(into) else Build({}, problems=(f"{_NOT_USED}: they make more than {size(MOST_BYTES)}",))
 
 

@@ -376,7 +376,7 @@ class Discovery:
         untold = [str(end).partition(" ") for end in _listed(answer.get("untold"))]
         if missing or untold:
             self.patience.lose()
-        late = [(end, "matched") for end in missing] + [(end, "told of its counterparts") for end in untold]
+        late = [(end, "matched") for end in missing] + [(end, "informed about its counterparts") for end in untold]
         for (kind, _, name), what in late:
             if (kind == "publisher" or kind in CHANNELS) and is_name(name):
                 self._recorder.note(f"{student.name}: {kind} {name[:NAME_CHARACTERS]} was not {what} in time")

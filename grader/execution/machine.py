@@ -110,7 +110,7 @@ def _python(ros: RosInstallation | None) -> Fact:
     if ros is None or wanted is None or wanted <= sys.version_info[:2]:
         return Fact("Python", value)
     newer = ".".join(map(str, wanted))
-    lack = f"ROS 2 {ros.distro} runs on Python {newer}: what needs a program that is written for it is undecided here"
+    lack = f"ROS 2 {ros.distro} runs on Python {newer}: criteria whose programs need it are undecided here"
     return Fact("Python", f"{value}; {lack}", remedy=f"install the grader with python{newer}")
 
 

@@ -82,7 +82,7 @@ _LEFT_OUT: Mapping[str, tuple[str, re.Pattern[str] | None]] = {
 #: Why something is left out that would be understood otherwise, by its code.
 _WHY = {
     "launch_file": "it is not in Python",
-    "module": "this package is not here",
+    "module": "this package is not installed",
     "nodes": "no more are started",
     "package": "the submission has no such package",
     "parameter_file": "it is not there",
@@ -206,8 +206,8 @@ def _other_domain(file: str, data: Mapping[str, Any], places: Places) -> str:
         or not 0 <= domain <= MOST_DOMAIN
     ):
         return ""
-    problem = f"{file}: the node {node} is in the ROS domain {domain}, where nothing of it is seen"
-    return f"{problem}; take out what sets domain_id or ROS_DOMAIN_ID"
+    problem = f"{file}: the node {node} is in the ROS domain {domain}, where the grader does not see it"
+    return f"{problem}; remove what sets domain_id or ROS_DOMAIN_ID"
 
 
 def _is_name(name: object) -> bool:

@@ -368,7 +368,7 @@ class Observer:
         large = f"larger than {size(self._limits.message_bytes)}"
         broken = "that are not what their type says"
         return [
-            f"{topic[:NAME_CHARACTERS]}: the content of messages {what} was not looked at ({count:,} in all)"
+            f"{topic[:NAME_CHARACTERS]}: the content of messages {what} was ignored ({count:,} in all)"
             for counts, what in ((self._large, large), (self._broken, broken))
             for topic, count in sorted(counts.items())[:MOST_TOPICS]
         ]

@@ -130,7 +130,7 @@ class ResourceMonitor:
     @property
     def problem(self) -> str:
         """Why the end of the time is not the nodes' fault; empty if it is, or if there is time left."""
-        busy = "the machine was too busy: the nodes waited for a processor until their time was over"
+        busy = "the machine was too busy: the nodes waited for a processor until their time ran out"
         return busy if self._starved else ""
 
     @property
@@ -202,9 +202,9 @@ class ResourceMonitor:
             os._exit(FULL_CODE)  # the middleware may go on filling it when the nodes have ended
         filled_bytes = own_bytes - self._own_bytes
         if filled_bytes > UNREAD_BYTES:
-            self._hold_all(f"stopped at {size(UNREAD_BYTES)} of messages that were under way at once")
+            self._hold_all(f"stopped at {size(UNREAD_BYTES)} of messages in transit at once")
         if time.process_time_ns() - self._own_ns > self._own_s * NS_PER_S:
-            self._hold_all(f"stopped at {processor_words(self._own_s)} to take what was sent")
+            self._hold_all(f"stopped at {processor_words(self._own_s)} to receive what was sent")
         return own_bytes
 
     def _look_at_time(self) -> None:

@@ -236,7 +236,7 @@ class ServicePeers:
             return plain_fields(message), size
         if not self._large:
             self._large = True
-            self._recorder.note("a service: the content of a message that is larger than the limit was not looked at")
+            self._recorder.note("a service: the content of a message that is larger than the limit was ignored")
         return {}, size
 
     def _numbered(self, service: str, sender: str) -> int:

@@ -336,7 +336,7 @@ class NodeProcess:
             return False
         most = self.limits.output_bytes
         if self._kept[stream] <= most < self._kept[stream] + len(found):
-            self.notes.append(f"{self.name}: more than {size(most)} on {stream}: the rest was not looked at")
+            self.notes.append(f"{self.name}: more than {size(most)} on {stream}: the rest was ignored")
         self._streams[stream] += found[: max(0, most - self._kept[stream])]
         self._kept[stream] += len(found)
         if stream == "stderr":
@@ -370,7 +370,7 @@ class NodeProcess:
     def _within_limit(self, found: list[LogRecord | OutputLine]) -> list[LogRecord | OutputLine]:
         most = self.limits.lines
         if self._lines_kept <= most < self._lines_kept + len(found):
-            self.notes.append(f"{self.name}: more than {most:,} lines and log records: the rest was not looked at")
+            self.notes.append(f"{self.name}: more than {most:,} lines and log records: the rest was ignored")
         kept = found[: max(0, most - self._lines_kept)]
         self._lines_kept += len(found)
         return kept

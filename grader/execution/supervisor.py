@@ -221,7 +221,7 @@ class Worker(ABC):
                 raise EOFError
             received += found
             if len(received) > most:
-                raise OSError("it answered without end")
+                raise OSError("its answer did not end")
         return bytes(received)
 
     def _look(self) -> None:
@@ -558,7 +558,7 @@ class Recorder:
                     0,
                     name,
                     FaultKind.KILLED,
-                    f"stopped: what the nodes sent took the grader's own process to {limits[-1]}",
+                    f"stopped: receiving what the nodes sent took the grader's process to {limits[-1]}",
                 )
                 for name, _ in job.plan.processes
             )

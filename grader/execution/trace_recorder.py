@@ -127,7 +127,7 @@ class TraceRecorder:
     def stop(self, t_ns: int, why: str) -> None:
         """End the recording at a limit, with a mark; the first limit counts."""
         if not self.full:
-            self.full = f"{why}: the rest was not looked at"
+            self.full = f"{why}: the rest was ignored"
             self.observations.append(Mark(t_ns, "limit", self.full))
 
     def note(self, *texts: str) -> None:

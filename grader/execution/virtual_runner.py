@@ -174,7 +174,7 @@ class VirtualRunner(Runner):
         if self._hops > HOPS:
             self._now_ns = min(self._now_ns + HOP_NS, self._end_ns)
         if self._hops > MOST_HOPS:
-            self._recorder.stop(self._now_ns, f"the nodes answered each other {MOST_HOPS:,} times without a rest")
+            self._recorder.stop(self._now_ns, f"the nodes answered each other {MOST_HOPS:,} times without a pause")
 
     def _quiet_until(self, student: NodeProcess) -> int:
         """Return the next moment at which a stimulus or any other process is due."""

@@ -23,7 +23,7 @@ BUBBLEWRAP, FAST_DDS, LINUX = "bubblewrap", "Fast DDS", "Linux"
 FIXES: Mapping[str, str] = {
     BUBBLEWRAP: "install the updates of your distribution, or bubblewrap {fixed} or newer",
     FAST_DDS: "install a build of ROS with Fast DDS {fixed} or newer (wheels: pip install --upgrade ros-fastrtps)",
-    LINUX: "install the updates of your distribution, or Linux {fixed} or newer, and start the machine anew",
+    LINUX: "install the updates of your distribution, or Linux {fixed} or newer, and restart the machine",
 }
 
 

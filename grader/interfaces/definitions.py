@@ -212,7 +212,7 @@ def _package_name(home: Path) -> str:
             raise DefinitionError(name, "package.xml", error.position[0], "it is not XML", "correct it") from None
     if not _PACKAGE_NAME.fullmatch(name):
         problem = f"{name!r} is not a valid package name"
-        raise DefinitionError(name, "", 0, problem, "use small letters, digits and single underscores")
+        raise DefinitionError(name, "", 0, problem, "use lower-case letters, digits and single underscores")
     if name in sys.stdlib_module_names or keyword.iskeyword(name):
         raise DefinitionError(name, "", 0, "Python has a module or word of this name", "choose another name")
     return name
@@ -266,7 +266,7 @@ def read(packages: Collection[InterfacePackage], installed: Collection[str]) -> 
     for name, interface in own.items():
         other = files.setdefault(name.lower(), name)
         if other != name:
-            problem = f"its name differs from that of {other.rpartition('/')[2]} in capitals only"
+            problem = f"its name differs from that of {other.rpartition('/')[2]} only in upper and lower case"
             raise DefinitionError(interface.package, interface.file, 0, problem, "rename one of them")
     for interface in interfaces:
         for member in interface.members():
@@ -325,7 +325,9 @@ def read_definition(package: str, definition: Definition) -> Interface:
     file = _file(definition)
     if not _TYPE_NAME.fullmatch(definition.name):
         problem = f"{definition.name!r} is not a valid type name"
-        raise DefinitionError(package, file, 0, problem, "begin with a capital, then letters and digits only")
+        raise DefinitionError(
+            package, file, 0, problem, "begin with an upper-case letter, then only letters and digits"
+        )
     sections: list[list[tuple[int, str]]] = [[]]
     for number, line in enumerate(definition.text.replace("\t", " ").splitlines(), start=1):
         if line.rstrip() == "---" and definition.kind != "msg":
@@ -400,7 +402,9 @@ class _Reader:
     def _field(self, type_: FieldType, rest: str) -> Member:
         name, _, default = rest.partition(" ")
         if not _PACKAGE_NAME.fullmatch(name):
-            raise self._error(f"{name!r} is not a valid field name", "use small letters, digits and single underscores")
+            raise self._error(
+                f"{name!r} is not a valid field name", "use lower-case letters, digits and single underscores"
+            )
         if keyword.iskeyword(name):
             raise self._error(f"{name!r} is a word of Python", "choose another name")
         return Member(type_, name, self._default(type_, default.strip()) if default.strip() else None, self._line)
@@ -409,7 +413,9 @@ class _Reader:
         name, _, value = rest.partition("=")
         name = name.rstrip()
         if not _CONSTANT_NAME.fullmatch(name):
-            raise self._error(f"{name!r} is not a valid constant name", "use capitals, digits and single underscores")
+            raise self._error(
+                f"{name!r} is not a valid constant name", "use upper-case letters, digits and single underscores"
+            )
         if not type_.primitive or type_.array or type_.string_bound:
             raise self._error("a constant cannot have this type", "use a number, a bool or a string")
         return Member(type_, name, self._value(type_.base, value.strip(), None), self._line)

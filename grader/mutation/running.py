@@ -293,7 +293,7 @@ def _idle(explained: Explained, mutants: Sequence[Trial], variants: Sequence[Tri
     unused = (note for notes, ids in concerned for note in notes if not any(map(note.fits, ids)))
     turned = {id_ for trial in mutants for id_ in trial.result.turned}
     return (
-        *(f"{note.where}: nothing fits `{shown(note.pattern)}`" for note in unused),
+        *(f"{note.where}: nothing matches `{shown(note.pattern)}`" for note in unused),
         *(
             f"{id_}: the notes say why it detects no mutant, but it detects some"
             for id_ in explained.criteria

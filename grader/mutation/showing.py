@@ -51,7 +51,7 @@ def _result(console: Console, result: SelftestResult) -> None:
         expected = "" if result.baseline is None else f", expected {_points(result.baseline)}"
         console.print(f"  template   {_score(result.template)}{expected}", style="" if result.template_fits else _BAD)
     if not result.reference.full:
-        console.print("  mutants    none tried: first the reference has to score full")
+        console.print("  mutants    none tried: the reference must get full points first")
         _reasons(console, result.reference)
         return
     console.print(f"  mutants    {_count(result)}")

@@ -32,43 +32,43 @@ _WORD = re.compile(r"[^\W_]+")
 _WORDS_FOR_VALUES = ("nan", "inf", "infinity")
 #: What a problem is called where its numbers are withheld, as a whole sentence.
 _SAID: Mapping[ProblemKind, str] = {
-    ProblemKind.ABSENT: "what is asked for is not in the ROS graph",
+    ProblemKind.ABSENT: "what the task asks for is not in the ROS graph",
     ProblemKind.OTHER_NAME: "there is one, but under another name",
-    ProblemKind.OTHER_TYPE: "the type is not the one asked for",
-    ProblemKind.SILENT: "it is there, but nothing is sent",
-    ProblemKind.TOO_FEW: "fewer were seen than are asked for",
-    ProblemKind.TOO_MANY: "more were seen than are asked for",
-    ProblemKind.TOO_EARLY: "it is sent before anybody can have discovered the publisher",
-    ProblemKind.TOO_LATE: "what is asked for comes too late",
-    ProblemKind.WRONG_RATE: "the rate is not the one asked for",
+    ProblemKind.OTHER_TYPE: "the type is wrong",
+    ProblemKind.SILENT: "it exists, but sends nothing",
+    ProblemKind.TOO_FEW: "there are too few",
+    ProblemKind.TOO_MANY: "there are too many",
+    ProblemKind.TOO_EARLY: "it is sent before any subscription can discover the publisher",
+    ProblemKind.TOO_LATE: "it arrives too late",
+    ProblemKind.WRONG_RATE: "the rate is wrong",
     ProblemKind.RATE_CHANGES: "the rate is right on average, but it changes",
-    ProblemKind.BURSTS: "several come at once, then none for a while",
+    ProblemKind.BURSTS: "the messages come in bursts",
     ProblemKind.STOPPED: "it stopped before the end",
-    ProblemKind.NO_MESSAGE: "no message came",
+    ProblemKind.NO_MESSAGE: "no message arrived",
     ProblemKind.NO_FIELD: "the message type has no such field",
     ProblemKind.NO_NUMBER: "the messages hold no number",
-    ProblemKind.WRONG_VALUE: "a value is not the one asked for",
+    ProblemKind.WRONG_VALUE: "a value is wrong",
     ProblemKind.NOT_RANDOM: "the values are not random: they follow a pattern",
-    ProblemKind.CONSTANT: "the values are not random: they are all the same",
+    ProblemKind.CONSTANT: "the values never change",
     ProblemKind.NEVER_CHANGES: "the answer never changes, because the input stays on one side of the threshold",
     ProblemKind.WRONG_ANSWER: "an answer does not fit its input",
     ProblemKind.NO_ANSWER: "something is never answered",
-    ProblemKind.REFUSED: "what is asked for is refused",
+    ProblemKind.REFUSED: "a request is refused",
     ProblemKind.BEHIND: "each answer fits an earlier input",
-    ProblemKind.CONTRADICTION: "two different answers come at the same time",
+    ProblemKind.CONTRADICTION: "two different answers arrive at the same time",
     ProblemKind.KEPT_APART: "types or QoS of publisher and subscription do not match",
     ProblemKind.NO_EDGE: "the two programs are not connected",
-    ProblemKind.COUNT_START: "the count does not start at the number asked for",
+    ProblemKind.COUNT_START: "the count starts at the wrong number",
     ProblemKind.ONE_PER_MESSAGE: "every message is logged",
     ProblemKind.NO_NODE: "the program has no node",
-    ProblemKind.NOT_LOGGED: "not everything that is asked for is logged",
-    ProblemKind.PRINTED: "what is asked for is printed, not logged",
-    ProblemKind.AMONG_OTHERS: "the right values are logged among so many others that they show nothing",
+    ProblemKind.NOT_LOGGED: "not everything that the task asks for is logged",
+    ProblemKind.PRINTED: "the output is printed, not logged",
+    ProblemKind.AMONG_OTHERS: "the right values are logged among so many others that they prove nothing",
     ProblemKind.ERRORS_LOGGED: "errors are logged",
     ProblemKind.ENDED: "a program ends too early",
     ProblemKind.STILL_RUNNING: "a program does not end when it is stopped",
 }
-_NOT_AS_ASKED = "what was found is not what is asked for"
+_NOT_AS_ASKED = "this is not what the task asks for"
 _HAPPENED = {
     "syntax_error": "cannot be compiled",
     "exception": "raised an exception",
@@ -111,7 +111,7 @@ def _wrong_fields(evidence: Mapping[str, Any]) -> str:
     found = evidence.get("found")
     names = list(found) if isinstance(found, Mapping) else [str(evidence.get("field") or "")]
     fields = [plain for name in names if (plain := numberless(name))]
-    return f"{' and '.join(fields)} {'is' if len(fields) == 1 else 'are'} not what is asked for" if fields else ""
+    return f"{' and '.join(fields)} {'is' if len(fields) == 1 else 'are'} not what the task asks for" if fields else ""
 
 
 def _fault_said(fault: Mapping[str, Any]) -> str:

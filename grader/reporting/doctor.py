@@ -76,7 +76,7 @@ def _exchange(page: Page, exchange: Exchange) -> None:
     outcome = Text("works" if exchange.succeeded else "FAILS", style=_GOOD if exchange.succeeded else _BAD)
     where = "without a sandbox" if exchange.tier == NO_SANDBOX else f"in {exchange.tier}"
     found = f"{exchange.arrived} of {exchange.expected} messages of a trial node {where} arrived, "
-    page.put(f"{found}{exchange.took_s:.1f} s with all preparations", prefix=Text("  ").append(outcome).append("  "))
+    page.put(f"{found}{exchange.took_s:.1f} s including set-up", prefix=Text("  ").append(outcome).append("  "))
     if exchange.problem:
         page.put(shown(exchange.problem), prefix="         ")
 

@@ -44,7 +44,7 @@ def render_rules(found: Sequence[RuleExplanation], *, width: int) -> str:
         where = f" ({shown(rule.file)})" if rule.file else ""
         lines += _wrapped(f"{rule.priority:>6}  ", f"{shown(rule.name)}{where}: {_explains(rule)}", width, after=10)
         lines += _wrapped(" " * 10, shown(rule.about), width, after=10) if rule.about else []
-    return "\n".join([*lines, "", "The rule with the lowest number is asked first, and the first that applies wins.\n"])
+    return "\n".join([*lines, "", "The rule with the lowest number is tried first, and the first that applies wins.\n"])
 
 
 def _explains(rule: RuleExplanation) -> str:
@@ -65,7 +65,7 @@ def render_trials(found: Sequence[RuleTrial], *, width: int) -> str:
             where = f"{shown(place)}: " if place else ""
             lines += _wrapped(f"{priority:>6}  {shown(name)}: ", f"{where}{shown(hint, limit=2000)}", width, after=10)
         lines += [""] if trial.rules else ["        no rule applies", ""]
-    return "\n".join(lines) if found else "No criterion lost points, so that no rule is asked.\n"
+    return "\n".join(lines) if found else "No criterion lost points, so no rule is tried.\n"
 
 
 def rules_to_json(found: Sequence[RuleExplanation] | Sequence[RuleTrial]) -> str:
@@ -99,7 +99,7 @@ def _criterion(e: CriterionExplanation, width: int) -> Iterator[str]:
     yield f"{e.id}: {shown(e.title)}"
     yield from _row("exercise", e.exercise, width)
     yield from _row("points", f"{float(e.points):g}", width)
-    yield from _row("chapter", e.chapter or "no part of the chapter asks for it", width)
+    yield from _row("chapter", e.chapter or "none", width)
     if e.needs:
         yield from _row("needs", ", ".join(e.needs), width)
     yield from _row("situation", e.situation, width)

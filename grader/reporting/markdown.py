@@ -22,7 +22,9 @@ _SIGNS = {
     Outcome.UNDECIDED: "❔",
 }
 _EXPLAINED = (Outcome.PARTLY, Outcome.NOT_MET, Outcome.UNDECIDED)
-_LEFT_OUT = "> [!NOTE]\n> Details are left out here, or GitHub would drop all of it; the JSON report has them.\n"
+_LEFT_OUT = (
+    "> [!NOTE]\n> Details are left out, because GitHub drops reports that are too long; the JSON report has them.\n"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +144,5 @@ def _more(count: int, what: str) -> list[str]:
 def _foot(report: Report) -> list[str]:
     rows = [f"- {name}: {markdown_code(value)}" for name, value in wording.reproduction(report)]
     command = " ".join(wording.command(report))
-    again = (
-        ["\nThis gives the report again:\n", markdown_block(command, limit=len(command) + 1) + "\n"] if command else []
-    )
+    again = ["\nTo reproduce this report:\n", markdown_block(command, limit=len(command) + 1) + "\n"] if command else []
     return ["---\n", *rows, *again]

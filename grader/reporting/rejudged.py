@@ -235,7 +235,7 @@ def _of_all(row: CriterionSummary) -> str:
     """Return how a criterion changed in a class, e.g. `rate: 10 -> 5 points; 57 changed, mean 8.2 -> 4.1`."""
     name = f"{shown(row.exercise)}/{shown(row.criterion)}"
     if row.max_after is None:
-        return f"{name}: no longer asked, it had {_points(row.max_before or 0)} points; {row.changed} changed"
+        return f"{name}: removed, it had {_points(row.max_before or 0)} points; {row.changed} changed"
     if row.max_before is None:
         return f"{name}: new, with {_points(row.max_after)} points; {row.changed} changed, mean {row.mean_after:.1f}"
     of = _points(row.max_before)
@@ -315,8 +315,8 @@ def _same_score(changes: Sequence[ReportChange]) -> list[str]:
 
 def _row(row: CriterionChange) -> str:
     if row.after is None:
-        return f"was {_standing(row.before)}, is no longer asked"
-    before = "was not asked" if row.before is None else f"was {_standing(row.before)}"
+        return f"was {_standing(row.before)}; criterion removed"
+    before = "new criterion" if row.before is None else f"was {_standing(row.before)}"
     return f"{before}, is {_standing(row.after)}: {shown(row.after.reason, limit=200)}"
 
 

@@ -45,7 +45,7 @@ _KINDS: Mapping[Kind, str] = {
     Kind.TIME: "time: the same event at another moment",
     Kind.ORDER: "order: the same events, one before the other",
     Kind.CONTENT: "content: another event",
-    Kind.CLOCK: "clock: virtual time suits the programs in one recording only",
+    Kind.CLOCK: "clock: virtual time works for the programs in one recording only",
     Kind.GRADER: "only what the grader saw: the programs did the same",
 }
 _COLUMN = max(map(len, _WORDS.values())) + 2
@@ -202,8 +202,8 @@ def advice(verification: Verification, difference: Difference) -> str:
 
 _CAUSES: Mapping[Cause, str] = {
     Cause.ADDRESS: "use a name or number of your own: id(), hash() and 0x... show where an object lies in memory, "
-    "which is elsewhere in each run; sort what comes from a set of such objects",
-    Cause.PROCESSOR_TIME: "leave out the processor time: it is that of this machine and this run",
+    "which changes in each run; sort what comes from a set of such objects",
+    Cause.PROCESSOR_TIME: "leave out the processor time: it differs in each run",
     Cause.KERNEL: "use time.time() or the clock of the node: file times and what the kernel says show real time",
 }
 

@@ -272,7 +272,7 @@ def _mark(annotation: object, kind: type[T]) -> T | None:
 def _at_least(least: int, unit: Unit | None, value: int) -> int:
     if value < least:
         words = format_quantity(least, unit) if unit else f"{least}"
-        raise wrong(f"at least {words}, which a node that does nothing needs")
+        raise wrong(f"at least {words}, which even an idle node needs")
     return value
 
 

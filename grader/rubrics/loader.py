@@ -306,7 +306,7 @@ def _variant(
     values = [(option.name, draw.value(exercise.id, option)) for option in options]
     unknown = [name for name, value in values if value is None]
     if unknown:
-        text = "expected a variant that was graded, found one of which no value was kept"
+        text = "no value was stored for this variant"
         _refuse(path, [tree.keys[("variants", name)].mistake(text, "grade the submission again") for name in unknown])
     return Variant(draw.student, tuple((name, value) for name, value in values if value is not None))
 
@@ -465,7 +465,7 @@ def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> I
             check: Check = build(parameters)
         except ValueError as error:
             where = tree.keys[("criteria", index, "check", name)]
-            mistakes.append(where.mistake(f"`{name}` cannot be asked like this: {shown(str(error), 200)}"))
+            mistakes.append(where.mistake(f"invalid parameters for the check `{name}`: {shown(str(error), 200)}"))
             continue
         yield Criterion(
             id=shape.id,

@@ -34,7 +34,7 @@ MAX_BYTES = 256 * 1024
 #: Name of the table in such a file.
 TABLE = "CHECKS"
 _ID = re.compile(r"[a-z][a-z0-9_]*")
-_ALONE = "such a file may import the standard library, grader.api and what is installed, but no file beside it"
+_ALONE = "such a file may import the standard library, grader.api and what is installed, but no file next to it"
 
 
 #: Most files of interface packages that a rubric may bring.
@@ -279,7 +279,7 @@ def _problems(
     for name, kind in table.items():
         line = lines.get(f"key {name}", 1)
         if not isinstance(name, str) or _ID.fullmatch(name) is None:
-            wrong = "expected a name of small letters, digits and _, a letter first"
+            wrong = "expected a name of lower-case letters, digits and _, starting with a letter"
             yield f"{where}:{line}: {wrong}, found `{shown(str(name))}`"
         elif name in taken:
             yield f"{where}:{line}: expected a new name, found `{name}`, which is taken"

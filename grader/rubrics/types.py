@@ -154,7 +154,9 @@ def _as_text(value: object) -> object:
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 
 Text = Annotated[str, MatchingText(r"[\s\S]*\S[\s\S]*", "text that is not empty", "Publishes at 20 Hz")]
-Id = Annotated[str, MatchingText("[a-z][a-z0-9_]*", "an id of small letters, digits and _, a letter first", "rate")]
+Id = Annotated[
+    str, MatchingText("[a-z][a-z0-9_]*", "an id of lower-case letters, digits and _, starting with a letter", "rate")
+]
 Topic = Annotated[str, MatchingText(f"(?:/{_NAME})+", "an absolute topic name such as /cmd_vel", "/cmd_vel")]
 MessageType = Annotated[
     str,

@@ -193,7 +193,7 @@ def _misuse(name: str, path: TreePath, known: Mapping[str, Value], tree: YamlTre
         yield where.mistake(f"expected one of `variants` ({names}), found `{shown(name)}`", nearest(name, known))
     elif not _may_vary(path):
         text = f"expected a value of its own here, found the variant `{shown(name)}`"
-        yield where.mistake(text, "variants stand in scenarios, checks, titles and hints")
+        yield where.mistake(text, "variants belong in scenarios, checks, titles and hints")
 
 
 def _may_vary(path: Sequence[str | int]) -> bool:

@@ -323,7 +323,7 @@ def _members(data: bytes) -> list[Member]:
         return foreign_members(data, kind, most=MAX_ENTRIES, file=MAX_FILE_BYTES, total=total, limit=limit)
     if kind not in _READABLE:
         hint = (
-            f"{HAND_IN_ZIP}; who grades can read {kind} with the extra rclpy-grader[archives] and libarchive"
+            f"{HAND_IN_ZIP}; the grader can read {kind} with the extra rclpy-grader[archives] and libarchive"
             if kind in KINDS
             else HAND_IN_ZIP
         )

@@ -64,7 +64,7 @@ _OBJECTIONS: dict[str, Callable[[str], object]] = {
     "a name with a control character": _CONTROLS.search,
     "a name with an empty part": lambda path: not {"", "."}.isdisjoint(path.split("/")),
     "a name with a backslash": lambda path: "\\" in path,
-    "a name with a part that ends in a blank or a dot": lambda path: any(map(_ENDS_ODDLY.search, path.split("/"))),
+    "a name with a part that ends in a space or a dot": lambda path: any(map(_ENDS_ODDLY.search, path.split("/"))),
     "a name that Windows keeps for a device": lambda path: any(map(_RESERVED.fullmatch, path.split("/"))),
     "a name that is too long": lambda path: _bytes(path) > MAX_PATH_BYTES or _longest_part(path) > MAX_NAME_BYTES,
 }

@@ -95,7 +95,7 @@ def read_projects(root: Path) -> tuple[tuple[Project, ...], tuple[str, ...]]:
             problems[problem, posixpath.join(place, file)] = None
     notes = list(_notes(problems))
     if len(folders) > MOST_PACKAGES:
-        notes.append(f"only the first {MOST_PACKAGES} packages were looked at, of {len(folders)}")
+        notes.append(f"only the first {MOST_PACKAGES} packages were read, of {len(folders)}")
     return tuple(found), tuple(notes)
 
 

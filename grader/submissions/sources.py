@@ -226,7 +226,7 @@ def _timing(source: Source) -> Iterator[str]:
     if any(_looks_closely(node, times) for node in source.nodes):
         yield "a part of a clock's reading"
     if any(_collects(node, times) for node in source.nodes):
-        yield "a clock that is read again and again"
+        yield "a clock that is read repeatedly"
     for loop in source.all(ast.While):
         inside = list(ast.walk(loop))
         looks = any(isinstance(n, (ast.Attribute, ast.Name)) and source.resolved(n) in _CLOCKS for n in inside)

@@ -259,7 +259,7 @@ def _notes_on(file: StudentFile) -> Iterator[str]:
     if file.others:
         yield _several(file)
     if file.executable and "/" not in file.wanted:
-        yield f"{file.wanted}: graded is the executable {file.executable}, which is in {shown(file.found or '')}"
+        yield f"{file.wanted}: the graded executable is {file.executable}, in {shown(file.found or '')}"
 
 
 def _look_for(
@@ -303,7 +303,7 @@ def _nearest_the_top(relative: str) -> tuple[int, bytes]:
 
 
 def _several(file: StudentFile) -> str:
-    return f"{shown(file.found or '')} is graded, nearest the top; not graded: {first_of(file.others)}"
+    return f"{shown(file.found or '')} is graded, because it is nearest the top; not graded: {first_of(file.others)}"
 
 
 def _similar(wanted: str, files: Iterable[str], all_wanted: Sequence[str]) -> list[str]:

@@ -110,7 +110,7 @@ def test_a_mistake_in_the_rubric_is_told_with_its_place(tmp_path: Path, old: str
             35,
             "expected a new name, found `publishes`",
         ),
-        ('"starts_early": StartsEarly', '"Starts-Early": StartsEarly', 35, "expected a name of small letters"),
+        ('"starts_early": StartsEarly', '"Starts-Early": StartsEarly', 35, "expected a name of lower-case letters"),
         ('"starts_early": StartsEarly', '"starts_early": 5', 35, "expected a frozen dataclass, found something else"),
         ('CHECKS = {"starts_early": StartsEarly}', "", 1, "expected a table CHECKS"),
         ('CHECKS = {"starts_early": StartsEarly}', "CHECKS = {}", 1, "found an empty one"),

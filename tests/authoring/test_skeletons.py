@@ -177,7 +177,7 @@ def test_nothing_is_written_over(tmp_path: Path) -> None:
     (tmp_path / "r.yaml").write_text("mine")
     done = CliRunner().invoke(main.app, ["rubric", "new", "a.py", "-o", str(tmp_path / "r.yaml")])
     assert done.exit_code == 2
-    assert "expected a new file, found one that is there" in done.stderr
+    assert "expected a new file, found an existing one" in done.stderr
     assert (tmp_path / "r.yaml").read_text() == "mine"
 
 

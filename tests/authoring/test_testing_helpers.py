@@ -147,5 +147,5 @@ def test_a_check_that_changes_its_mind_is_refused() -> None:
             self.asked += 1
             return met(f"asked {self.asked} times")
 
-    with pytest.raises(ValueError, match="found something else when it was asked again"):
+    with pytest.raises(ValueError, match="gave another finding when it judged again"):
         judge(Counts(), pump().trace())

@@ -62,7 +62,7 @@ def test_canvas_from_its_own_gradebook(class_: Callable[..., Any]) -> None:
     ]
     assert graded.left_out["canvas"] == (
         "cleo: no score: undecided",
-        "zoe: matches nobody on the roster for sure",
+        "zoe: matches nobody on the roster with certainty",
     )
 
 

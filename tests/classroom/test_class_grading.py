@@ -142,7 +142,7 @@ def test_results_have_one_writer(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_ends_the_run_and_keeps_what_was_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The others would fail too; the same command goes on when there is room again."""
+    """The others would fail too; the same command continues when there is room again."""
     hand_in(tmp_path / "in", ada=10, bob="failed", cleo=5)
     free = Store.free_bytes
     monkeypatch.setattr(Store, "free_bytes", property(lambda self: 0))

@@ -83,7 +83,7 @@ def test_a_student_reads_what_to_fix_first_and_nothing_of_staff(folder: Path) ->
     grade(folder, adjustments=folder / "adjust.yaml")
     rejudged(folder)
     staff = page(folder / "out/students/bob/report.html")
-    assert "How to get this report again" in staff
+    assert "How to reproduce this report" in staff
     for text in (page(folder / "out/students/bob/feedback.html"), page(folder / "back/bob.html")):
         assert text.index("Fix first") < text.index("<h3>Criteria</h3>")
         assert text.index("What to do:") < text.index("<h3>Criteria</h3>")
@@ -123,7 +123,7 @@ def test_a_withheld_criterion_is_not_revealed_by_the_mark(folder: Path) -> None:
     assert not [word for word in ("25.2", "the lab machine", "28", "late") if word in text]
     assert "Comment: see me" in text
     assert (
-        "note: the exported grades count a criterion that the rubric hides from students (velocity_publisher/rate)"
+        "note: the exported grades include a criterion that the rubric hides from students (velocity_publisher/rate)"
         in (render_summary(graded))
     )
     assert read_marks(folder / "out").withheld == ("velocity_publisher/rate",)

@@ -114,7 +114,7 @@ def test_a_worse_attempt_is_noted_and_a_better_one_forgets_it(tmp_path: Path) ->
 
 
 def test_what_cannot_be_written_leaves_the_result_of_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A full disk is the machine's fault, and says that the same command goes on."""
+    """A full disk is the machine's fault, and asks to run the same command again."""
     with open_store(tmp_path) as store:
         commit(store, status(score=5.0), text="old")
 
@@ -125,7 +125,7 @@ def test_what_cannot_be_written_leaves_the_result_of_before(tmp_path: Path, monk
             patched.setattr(os, "fsync", full)
             with pytest.raises(HarnessError, match="No space left on device") as error:
                 commit(store, status(score=6.0), text="new")
-        assert "the same command goes on" in error.value.hint
+        assert "run the same command again" in error.value.hint
         assert result_of(store).score == 5.0
 
 

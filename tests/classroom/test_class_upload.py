@@ -114,7 +114,7 @@ def test_an_upload_that_stops_says_how_far_it_came_and_goes_on(upload: Upload) -
     stopped = upload("--send")
     assert stopped.exit_code == 2
     assert "2 of 3 marks were sent" in stopped.stderr
-    assert "the same command goes on where it stopped" in stopped.stderr
+    assert "run the same command again to continue" in stopped.stderr
     upload.there.stop_after = None
     assert "marks: 1 to send, 2 already there" in upload("--send").stdout
     assert upload.there.writes == [101, 102, 103]

@@ -64,7 +64,7 @@ def test_whose_variant_is_not_clear_is_not_graded(class_: Callable[..., Any]) ->
     graded, _ = class_()
     eve = next(row for row in graded.book.rows if row.name == "eve")
     assert (eve.status.value, eve.adjusted.score) == ("refused", None)
-    assert "it matches nobody on the roster for sure" in eve.problem
+    assert "no student on the roster matches this submission with certainty" in eve.problem
 
 
 def test_results_stay_until_the_values_change(class_: Callable[..., Any], tmp_path: Path) -> None:

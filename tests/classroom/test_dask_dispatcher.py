@@ -151,7 +151,7 @@ def test_a_scheduler_that_is_lost_ends_the_run(tmp_path: Path) -> None:
     here = ClusterScheduler(cast("Client", client), 1, lambda line: None)
     here.prepare("auto")
     done: list[str] = []
-    with pytest.raises(HarnessError, match="found it gone"):
+    with pytest.raises(HarnessError, match="the scheduler no longer answers"):
         done.extend(a.task.name for a in here.run([task(tmp_path, n) for n in NAMES], lambda name, step: None))
     assert done == ["ada", "bob"]
     assert client.cancelled == []

@@ -71,7 +71,7 @@ def test_whoever_joins_later_is_asked_too() -> None:
 def test_a_cluster_may_be_empty_at_first() -> None:
     """Grading begins when a worker joins."""
     workers, _ = worker_pool(FakeClient(threads={}))
-    assert workers.inspect("auto") == ("cluster: there is no worker yet, grading begins when one joins",)
+    assert workers.inspect("auto") == ("cluster: no worker yet; grading starts when one joins",)
 
 
 @pytest.mark.parametrize("found", ["0.0.9", PackageNotFoundError("rclpy-grader")])
@@ -94,6 +94,6 @@ def test_a_scheduler_that_is_gone_is_problem() -> None:
     """With what to do."""
     client = FakeClient()
     client.status = "connecting"
-    with pytest.raises(HarnessError, match="expected the scheduler to answer, found it gone") as error:
+    with pytest.raises(HarnessError, match="the scheduler no longer answers") as error:
         worker_pool(client)[0].usable()
-    assert "the same command goes on where it was" in error.value.hint
+    assert "run the same command again where it was" in error.value.hint

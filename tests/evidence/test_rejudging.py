@@ -152,7 +152,7 @@ def test_added_and_removed_criteria_are_changes(tmp_path: Path) -> None:
     (tmp_path / "less.yaml").write_text(text[: text.index("  - id: logging")], encoding="utf-8")
     (tmp_path / "other.yaml").write_text(text.replace("id: logging", "id: logs"), encoding="utf-8")
     less = grade("--diff", tmp_path / "e", "--rubric", tmp_path / "less.yaml").output
-    assert "velocity_publisher/logging: was met 4/4, is no longer asked" in less
+    assert "velocity_publisher/logging: was met 4/4; criterion removed" in less
     other = grade("--diff", tmp_path / "e", "--rubric", tmp_path / "other.yaml").output
     assert "velocity_publisher/logs: was not asked, is met 4/4" in other
 

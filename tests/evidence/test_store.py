@@ -72,7 +72,7 @@ def test_what_was_kept_before_is_replaced_and_nothing_else(tmp_path: Path) -> No
 def test_files_of_others_are_refused_before_grading(tmp_path: Path, name: str) -> None:
     """What is not the grader's is never replaced, whatever it is called."""
     (tmp_path / name).write_text("{}")
-    with pytest.raises(EvidenceError, match=f"{name}: expected nothing or evidence kept before"):
+    with pytest.raises(EvidenceError, match=f"{name}: expected nothing or kept evidence"):
         check_place(tmp_path)
     assert (tmp_path / name).read_text() == "{}"
 
@@ -81,7 +81,7 @@ def test_a_recording_of_others_is_refused(tmp_path: Path) -> None:
     """Also where it has the very name of a recording, or is reached through a link."""
     (tmp_path / "a" / RECORDING).parent.mkdir(parents=True)
     (tmp_path / "a" / RECORDING).write_text("mine")
-    with pytest.raises(EvidenceError, match="found a file of somebody else"):
+    with pytest.raises(EvidenceError, match="found another file"):
         kept_run(tmp_path / "a", velocity_run(velocity_trace()))
     assert (tmp_path / "a" / RECORDING).read_text() == "mine"
     (tmp_path / "elsewhere").mkdir()
@@ -133,7 +133,7 @@ def refused(folder: Path, *, verify: bool = False) -> str:
             "found the format grader/evidence/v2",
         ),
         ("evidence.json", lambda data: data.replace(b'"seed": 7', b'"seed": "7"'), "found something else"),
-        ("evidence.json", lambda data: data.replace(b'"complete": true', b'"complete": false'), "was not finished"),
+        ("evidence.json", lambda data: data.replace(b'"complete": true', b'"complete": false'), "unfinished evidence"),
     ],
     ids=["cut", "changed", "gone", "no manifest", "cut manifest", "deep", "version", "wrong type", "unfinished"],
 )
@@ -205,7 +205,7 @@ def test_a_recording_answers_only_what_was_asked(tmp_path: Path) -> None:
     longer = dataclasses.replace(exercise.scenarios[0], span=Span(20 * 10**9))
     found = run_of(open_evidence(tmp_path), [dataclasses.replace(exercise, scenarios=(longer,))])
     (trace,) = found.traces.values()
-    assert "describes the scenario alone otherwise than when it was recorded" in trace.harness_problem
+    assert "has changed the scenario alone since it was recorded" in trace.harness_problem
 
 
 def test_the_digest_of_a_scenario_is_of_what_differs_from_defaults() -> None:

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.ros
 
 #: Harm begins at the 40th tick, at two seconds.
 BEGIN_NS = 2 * NS_PER_S
-REST = "the rest was not looked at"
+REST = "the rest was ignored"
 
 
 @pytest.fixture
@@ -130,7 +130,7 @@ def test_a_large_message_is_counted_but_not_read(run: Callable[..., Trace]) -> N
     (big,) = trace.messages("/big")
     assert (big.cdr, big.value) == (b"", {})
     assert len(trace.messages("/cmd_vel")) == 199
-    assert trace.notes == ("/big: the content of messages larger than 32 KiB was not looked at (1 in all)",)
+    assert trace.notes == ("/big: the content of messages larger than 32 KiB was ignored (1 in all)",)
 
 
 def test_output_without_end_is_cut_and_the_run_goes_on(run: Callable[..., Trace]) -> None:

@@ -95,7 +95,7 @@ def test_messages_that_fill_the_worker_end_the_nodes(machine: dict[int, Usage]) 
         machine[os.getpid()] = Usage(memory_bytes=module.UNREAD_BYTES + MIB)
         for student in students:
             student.held.wait(30)
-    assert {s.stopped for s in students} == {"stopped at 224 MiB of messages that were under way at once"}
+    assert {s.stopped for s in students} == {"stopped at 224 MiB of messages in transit at once"}
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_the_workers_own_processor_time_is_limited(machine: dict[int, Usage], mo
     with ResourceMonitor(processes(student), Limits(processor_ns=NS_PER_S)):
         monkeypatch.setattr(time, "process_time_ns", lambda: 10_000 * NS_PER_S)
         student.held.wait(30)
-    assert student.stopped == "stopped at 1 s of processor time to take what was sent"
+    assert student.stopped == "stopped at 1 s of processor time to receive what was sent"
 
 
 def test_the_guard_ends_with_its_block(machine: dict[int, Usage]) -> None:

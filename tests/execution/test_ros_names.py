@@ -155,4 +155,4 @@ def test_too_many_types_on_a_topic_are_a_limit_of_the_node(run: Callable[..., Tr
     )
     assert trace.harness_problem == ""
     (mark,) = trace.marks("limit")
-    assert mark.detail == f"more than {PARTICIPANTS} types of messages on /cmd_vel: the rest was not looked at"
+    assert mark.detail == f"more than {PARTICIPANTS} types of messages on /cmd_vel: the rest was ignored"

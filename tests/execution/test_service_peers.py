@@ -190,7 +190,7 @@ def test_more_requests_than_the_limit_end_the_recording() -> None:
     run.services.add_server(0, server())
     run.ask(*range(1, 6))
     assert [type(o) for o in run.recorder.observations] == [Mark, Request, Request, Request, Mark]
-    assert run.recorder.full == f"more than 3 requests and responses of {NAME}: the rest was not looked at"
+    assert run.recorder.full == f"more than 3 requests and responses of {NAME}: the rest was ignored"
     run = Run(limits=Limits(message_bytes=64))
     run.services.call(0, PlannedCall(calls(), 0))
     run.ends.responses = [Arrived(NAME, 0, Trigger.Response(message="x" * 99), None, 1, 2)]

@@ -474,7 +474,7 @@ def test_output_beyond_the_cap_is_read_but_not_kept(
     student.drain()
     assert student._kept[stream] == length
     assert len(student._streams[stream]) == most
-    assert student.notes == ([f"a.py: more than 4 MiB on {stream}: the rest was not looked at"] if more else [])
+    assert student.notes == ([f"a.py: more than 4 MiB on {stream}: the rest was ignored"] if more else [])
 
 
 def test_endless_output_does_not_keep_the_report_away(start: Callable[[str], NodeProcess]) -> None:

@@ -367,7 +367,7 @@ def test_an_answer_without_end_is_not_read_to_its_end(
     monkeypatch.setattr(module, "ANSWER_BYTES", 1 << 20)
     recorder, stage = make("talks without end")
     (trace,) = recorder.record(jobs("alone"), nothing)
-    assert "without end" in trace.harness_problem
+    assert "did not end" in trace.harness_problem
     assert not any(map(alive, stage.pids()))
 
 
@@ -637,7 +637,7 @@ def test_two_workers_at_a_limit_of_theirs_are_the_nodes_doing(
     """They do it again and again: a fault of theirs, and no third try."""
     recorder, stage = make(behaviour, behaviour, "answers")
     (trace,) = recorder.record(jobs("alone"), nothing)
-    words = f"stopped: what the nodes sent took the grader's own process to {LIMITS[behaviour]}"
+    words = f"stopped: receiving what the nodes sent took the grader's process to {LIMITS[behaviour]}"
     assert [(fault.process, fault.text) for fault in trace.faults()] == [("a.py", words)]
     assert (trace.harness_problem, trace.stop_ns, len(stage.pids())) == ("", 5, 2)
 

@@ -16,7 +16,7 @@ from grader.execution import trace_recorder as module
 from grader.execution.observer import Taken
 from grader.execution.trace_recorder import TraceRecorder
 
-REST = "the rest was not looked at"
+REST = "the rest was ignored"
 
 
 def taken(topic: str = "/cmd_vel", size: int = 10) -> Taken:

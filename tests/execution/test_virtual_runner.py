@@ -272,7 +272,7 @@ def test_a_first_message_is_not_waited_for_for_ever() -> None:
 def test_too_many_messages_end_the_run_with_a_mark() -> None:
     """A flood is evidence enough; the mark and the note say on which topic."""
     run = Run(publisher("/cmd_vel", 1), limits=Limits(messages=5))
-    said = "more than 5 messages on /cmd_vel: the rest was not looked at"
+    said = "more than 5 messages on /cmd_vel: the rest was ignored"
     assert run.seen()[-1] == f"5 limit {said}"
     assert run.trace.notes == (said,)
     assert len(run.trace.messages()) == 5
@@ -287,7 +287,7 @@ def test_too_many_wake_ups_end_the_run_with_a_mark(monkeypatch: pytest.MonkeyPat
         while True:
             yield idle(0)
 
-    assert Run(restless).seen() == ["0 limit more than 50 wake-ups: the rest was not looked at"]
+    assert Run(restless).seen() == ["0 limit more than 50 wake-ups: the rest was ignored"]
 
 
 def player(mine: str, theirs: str, *, serves: bool = False, last: int = 1_000, cost_ns: int = 0) -> Behaviour:
@@ -311,7 +311,7 @@ def test_nodes_that_answer_each_other_without_end_end_the_run(monkeypatch: pytes
     slow = player("/a", "/b", serves=True, cost_ns=HOPELESS_NS // 3)
     run = Run(slow, player("/b", "/a"), stop_when_unfit=True)
     assert [m.t_ns / MS for m in run.trace.messages()] == [10, 10, 10, 10, 10, 10.25, 10.5, 10.75, 11]
-    said = "the nodes answered each other 8 times without a rest: the rest was not looked at"
+    said = "the nodes answered each other 8 times without a pause: the rest was ignored"
     assert run.seen(Message) == [f"11.25 limit {said}"]
     assert not run.trace.clock_reason
 

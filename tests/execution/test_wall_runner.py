@@ -182,7 +182,7 @@ def test_too_many_messages_end_the_run_with_a_mark(clock: Clock) -> None:
     trace = Run(publisher("/cmd_vel", every_ms=1), limits=Limits(messages=5)).trace
     assert len(trace.messages()) == 5
     (mark,) = trace.marks("limit")
-    assert mark.detail == "more than 5 messages on /cmd_vel: the rest was not looked at"
+    assert mark.detail == "more than 5 messages on /cmd_vel: the rest was ignored"
     assert trace.stop_ns == mark.t_ns
 
 

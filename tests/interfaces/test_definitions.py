@@ -122,7 +122,7 @@ def test_reads_types_values_and_comments() -> None:
         ("Header h", 1, "no message my_interfaces/Header", "did you mean std_msgs/Header?"),
         ("nav2_msgs/Costmap c", 1, "no message nav2_msgs/Costmap", "bring the package"),
         ("int32", 1, "has no name", "a type and a name"),
-        ("int32 Name", 1, "'Name' is not a valid field name", "small letters"),
+        ("int32 Name", 1, "'Name' is not a valid field name", "lower-case letters"),
         ("int32 a__b", 1, "valid field name", "single underscores"),
         ("int32 a\nint32 a", 2, "used twice", "another"),
         ("uint8 A=256", 1, "'256' is not of type uint8", "from 0 to 255"),
@@ -138,7 +138,7 @@ def test_reads_types_values_and_comments() -> None:
         ("string A=a\\nb", 1, "control characters", "leave"),
         ("int32 lambda", 1, "word of Python", "another"),
         ("@{import os}", 1, "is not a type", "such as float64"),
-        ("int32 a');import_os", 1, "valid field name", "small letters"),
+        ("int32 a');import_os", 1, "valid field name", "lower-case letters"),
     ],
 )
 def test_a_mistake_is_told_with_line_and_fix(text: str, line: int, problem: str, fix: str) -> None:
@@ -175,7 +175,7 @@ def test_messages_nested_too_deeply_are_refused() -> None:
 
 def test_types_of_one_file_name_are_refused() -> None:
     package = InterfacePackage("twice", (Definition("msg", "Foo", ""), Definition("msg", "FOO", "")))
-    assert "capitals only" in refusal(package).problem
+    assert "upper and lower case" in refusal(package).problem
 
 
 def test_too_many_definitions_are_refused() -> None:

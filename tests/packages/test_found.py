@@ -33,7 +33,7 @@ def test_an_executable_stands_for_the_file_of_its_name(tmp_path: Path) -> None:
     """Where there is no such file; the report says so."""
     file, notes = found(WORKSPACE, "talker.py", tmp_path / "s")
     assert (file.found, file.executable) == (NODES, "talker")
-    assert notes == (f"talker.py: graded is the executable talker, which is in {NODES}",)
+    assert notes == (f"talker.py: the graded executable is talker, in {NODES}",)
 
 
 def test_what_is_there_instead_is_told(tmp_path: Path) -> None:

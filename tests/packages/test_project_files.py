@@ -269,7 +269,7 @@ def test_too_many_packages_are_counted(tmp_path: Path) -> None:
         (tmp_path / f"p{number:02}" / "package.xml").touch()
     found, notes = read_projects(tmp_path)
     assert len(found) == projects.MOST_PACKAGES
-    assert notes == ("only the first 50 packages were looked at, of 52",)
+    assert notes == ("only the first 50 packages were read, of 52",)
 
 
 def test_files_that_collide_or_never_end_are_noted(tmp_path: Path, ros: RosInstallation) -> None:

@@ -265,7 +265,7 @@ def test_a_report_without_a_sandbox_says_so_at_the_top_and_at_the_end() -> None:
     """It is the first thing after the score, in words."""
     text = Page(render_html(undecided())).text
     assert text.index("No sandbox.") < text.index("Exercise 1")
-    assert "isolation" in text[text.index("How to get this report again") :]
+    assert "isolation" in text[text.index("How to reproduce this report") :]
     assert "No sandbox." not in Page(render_html(replace(undecided(), environment=ENVIRONMENT))).text
 
 

@@ -109,7 +109,7 @@ def test_what_was_graded_can_be_judged_without_the_key(read: Callable[..., Any])
     kept = {"pump": dict(graded.variant.values)}
     assert read(draw=Recorded(Drawn("ada", kept))) == graded
     del kept["pump"]["rate"]
-    with pytest.raises(RubricError, match=r"r\.yaml:5:3: expected a variant that was graded"):
+    with pytest.raises(RubricError, match=r"r\.yaml:5:3: no value was stored"):
         read(draw=Recorded(Drawn("ada", kept)))
 
 

@@ -71,7 +71,7 @@ def test_of_several_the_one_nearest_the_top_is_taken(work: Path, into: Path) -> 
     assert file.found == "fan_controller.py"
     assert file.others == ("b/fan_controller.py", "old/fan_controller.py", "z/y/fan_controller.py")
     assert submission.notes == (
-        "fan_controller.py is graded, nearest the top; not graded: "
+        "fan_controller.py is graded, because it is nearest the top; not graded: "
         "b/fan_controller.py, old/fan_controller.py and z/y/fan_controller.py",
     )
 

@@ -65,7 +65,7 @@ class WorkerPool:
                 first.hint,
             )
         if not threads:
-            return ("cluster: there is no worker yet, grading begins when one joins",)
+            return ("cluster: no worker yet; grading starts when one joins",)
         remarks = dict.fromkeys(f"{fitness.machine}: {remark}" for fitness in found for remark in fitness.remarks)
         return (*(f"{_problem(fitness)}; it is not used" for fitness in unfit), *remarks)
 
@@ -147,8 +147,8 @@ class WorkerPool:
 def scheduler_lost() -> HarnessError:
     """Build the error for a scheduler that no longer answers."""
     return HarnessError(
-        "cluster: expected the scheduler to answer, found it gone",
-        "what was graded is kept; when the scheduler is back, the same command goes on where it was",
+        "cluster: the scheduler no longer answers",
+        "what was graded is kept; run the same command again when the scheduler is back",
     )
 
 
@@ -313,7 +313,7 @@ class Dispatcher:
     def _erred(self, sending: _Sending, error: BaseException | None) -> Attempt | None:
         if isinstance(error, KilledWorker):
             problem = f"{error.allowed_failures + 1} workers of the cluster ended while they graded it"
-            return failed(sending.task, problem, "look at what ended them, such as a limit of memory")
+            return failed(sending.task, problem, "check what ended them, such as a memory limit")
         self._worker_pool.forget(self._worker_pool.usable())  # one of them may have become unable to grade
         return self._once_more(sending, f"{_CLUSTER}: {type(error).__name__}")
 
@@ -411,8 +411,6 @@ def _client(address: str, timeout_s: float) -> Client:
         return Client(address, timeout=timeout_s, set_as_default=False, name="grade-batch")
     except (OSError, TimeoutError):
         message = f"--scheduler {address}: expected a Dask scheduler, found none that answers"
-        raise EnvironmentFault(
-            message, "start it with `dask scheduler`, or look whether a firewall is between"
-        ) from None
+        raise EnvironmentFault(message, "start it with `dask scheduler`, or check for a firewall in between") from None
     except (ValueError, TypeError) as error:
         raise EnvironmentFault(f"--scheduler {address}: expected an address, found: {error}") from None

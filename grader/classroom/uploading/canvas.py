@@ -104,7 +104,7 @@ class Canvas:
             hint = "use a token of somebody who may grade in this course"
             raise PlatformError(f"{self._url}: not allowed: {said(str(error).encode())}", hint) from None
         except (CanvasException, requests.RequestException, ValueError) as error:
-            hint = "check --url and the network; the same command goes on where it stopped"
+            hint = "check --url and the network; run the same command again to continue"
             raise PlatformError(f"{self._url}: no usable answer: {type(error).__name__}: {error}"[:300], hint) from None
 
 

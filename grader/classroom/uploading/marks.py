@@ -223,7 +223,7 @@ def send(changes: Iterable[Change], platform: Platform, tell: Callable[[str], No
             continue
         except PlatformError as error:
             text = f"{error.message}; {len(sent)} of {len(wanted)} marks were sent"
-            raise PlatformError(text, "the same command goes on where it stopped") from None
+            raise PlatformError(text, "run the same command again to continue") from None
         sent.append(change)
         tell(f"{len(sent)}/{len(wanted)} {change.mark.name}")
     return Sent(len(sent), tuple(refused), tuple(_wrong(sent, platform.scores())) if sent else ())

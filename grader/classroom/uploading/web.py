@@ -43,7 +43,9 @@ def address_of(text: str) -> str:
     if parts.scheme not in ("http", "https") or not parts.hostname or parts.query or parts.fragment or parts.username:
         raise ClassError(f"--url: expected an address such as https://canvas.example.edu, found {text[:80]!r}")
     if parts.scheme == "http" and not _is_here(parts.hostname):
-        raise ClassError(f"--url: expected https, found {text[:80]!r}", "with http anybody on the way reads the token")
+        raise ClassError(
+            f"--url: expected https, found {text[:80]!r}", "with http, anybody on the network can read the token"
+        )
     return text.strip().rstrip("/")
 
 

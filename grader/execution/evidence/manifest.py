@@ -64,7 +64,7 @@ def refuse_foreign(folder: Path, names: Iterable[str], own: Iterable[str]) -> No
         if inner != folder and inner.is_symlink():
             raise EvidenceError(f"{inner}: expected a folder, found a link", "name another folder for the evidence")
         if os.path.lexists(path) and (name not in known or not stat.S_ISREG(path.lstat().st_mode)):
-            message = f"{path}: expected nothing or evidence kept before, found a file of somebody else"
+            message = f"{path}: expected nothing or kept evidence, found another file"
             raise EvidenceError(message, "name another folder for the evidence")
 
 

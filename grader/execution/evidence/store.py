@@ -122,7 +122,7 @@ def open_evidence(folder: Path) -> Evidence:
     except EvidenceError as error:
         raise EvidenceError(f"{path}: {error.message}", "grade the submission again") from error
     if not manifest.complete:
-        raise EvidenceError(f"{path}: expected complete evidence, found some that was not finished", "grade again")
+        raise EvidenceError(f"{path}: expected complete evidence, found unfinished evidence", "grade again")
     return Evidence(folder, manifest)
 
 
@@ -192,7 +192,7 @@ def _trace(
 ) -> Trace:
     asked = next((kept.scenario_digest(s) for s in exercise.scenarios if s.id == recording.scenario), "")
     if asked != recording.asked:
-        problem = f"the rubric describes the scenario {recording.scenario} otherwise than when it was recorded"
+        problem = f"the rubric has changed the scenario {recording.scenario} since it was recorded"
         return Trace(recording.scenario, ClockKind.VIRTUAL, 0, (), harness_problem=f"{problem}; grade again")
     name = files.recording_name(owner.id, recording.scenario)
     path = evidence.folder / name

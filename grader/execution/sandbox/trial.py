@@ -70,7 +70,7 @@ def trial(request: dict[str, Any], segment: str) -> dict[str, Any]:
     if achieved and not (answered and kept):
         achieved[EXCHANGE].append(NO_EXCHANGE)
     if achieved and (signals or condition() != before):
-        achieved["signals"].append("the worker felt it")
+        achieved["signals"].append("it affected the worker")
     return {"achieved": achieved, "outgrown": lines[1:] == ["outgrown"], "said": errors[-1][:300] if errors else ""}
 
 

@@ -285,5 +285,5 @@ def test_no_client_is_explained() -> None:
     for check in (REACTS, STILL):
         assert FAULT_KEY in check.judge(Recording(9, process=CLIENT).crashed(0.0, process=CLIENT).trace()).evidence
         other = check.judge(Recording(9, process=CLIENT).service("client", "/get_status", TRIGGER).trace())
-        assert "asks /get_status" in other.reason
+        assert "calls /get_status" in other.reason
         assert check.judge(Recording(9).trace()).credit == 0

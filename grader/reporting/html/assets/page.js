@@ -115,7 +115,7 @@
 
   function fill(place, figure) {
     (figure.kind === "graph" ? graphTables : chartTables)(place, figure);
-    if (!place.hasChildNodes()) place.textContent = "There is nothing in it.";
+    if (!place.hasChildNodes()) place.textContent = "No data.";
   }
 
   function graphTables(parent, figure) {
