@@ -17,7 +17,7 @@ from fractions import Fraction
 from typing import Any
 
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Check, Criterion, Finding, Outcome, reads_sources
+from grader.core.exercise import Check, Criterion, Finding, Outcome, ask
 from grader.core.quantities import NS_PER_S, nanoseconds
 from grader.core.report import Verdict
 from grader.core.trace import (
@@ -66,11 +66,11 @@ def judge(check: Check, trace: Trace, sources: Mapping[str, str] | None = None) 
             which other checks share.
     """
     before = repr(trace)
-    finding = _asked(check, trace, sources)
+    finding = ask(check, trace, sources)
     wrong = breach(finding)
     if wrong:
         raise ValueError(f"{type(check).__name__} {wrong}")
-    if repr(_asked(check, trace, sources)) != repr(finding):  # NaN never equals itself
+    if repr(ask(check, trace, sources)) != repr(finding):  # NaN never equals itself
         raise ValueError(f"{type(check).__name__} gave another finding when it judged again")
     if repr(trace) != before:
         raise ValueError(f"{type(check).__name__} changed the trace")
@@ -88,12 +88,6 @@ def builtin_check(name: str, **parameters: Any) -> Check:
 
     check: Check = known_checks()[name](**parameters)
     return check
-
-
-def _asked(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
-    if sources is not None and reads_sources(check):
-        return check.judge_sources(trace, sources)
-    return check.judge(trace)
 
 
 def explain(

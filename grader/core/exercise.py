@@ -330,6 +330,13 @@ def reads_sources(check: object) -> TypeGuard[SourceCheck]:
     return has(check, "judge_sources")
 
 
+def ask(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
+    """Return the finding of a check, which may need the students' files too."""
+    if sources is not None and reads_sources(check):
+        return check.judge_sources(trace, sources)
+    return check.judge(trace)
+
+
 def of_beginning(check: Check) -> Check | None:
     """Return the check that judges the beginning of a recording on the wall clock; None if none can."""
     if not has(check, "of_beginning"):

@@ -9,7 +9,7 @@ from itertools import pairwise
 from grader.core.author_files import AuthorMistake
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Check, Criterion, Exercise, Finding, of_beginning, reads_sources
+from grader.core.exercise import Criterion, Exercise, Finding, ask, of_beginning, reads_sources
 from grader.core.scenario import Scenario, is_launch_file
 from grader.core.submission import Submission
 from grader.core.trace import ClockKind, Fault, FaultKind, Request, Response, Trace
@@ -201,18 +201,11 @@ def _placed(finding: Finding, submission: Submission) -> Finding:
     return finding if place is None or not found else replace(finding, location=replace(place, file=found))
 
 
-def _put(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
-    """Return the finding of a check, which may need the students' files too."""
-    if sources is not None and reads_sources(check):
-        return check.judge_sources(trace, sources)
-    return check.judge(trace)
-
-
 def _judged(criterion: Criterion, scenario: Scenario, trace: Trace, sources: Mapping[str, str] | None) -> Answer:
     name = check_name(criterion)
     authored = bool(criterion.check_name) and is_authored(criterion.check)
     try:
-        finding = _put(criterion.check, trace, sources)
+        finding = ask(criterion.check, trace, sources)
     except HarnessError as error:
         return Answer(problem=f"{name} cannot be judged: {error.message}")
     except KeyboardInterrupt:
