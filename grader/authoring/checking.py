@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import fields, replace
 from fractions import Fraction
@@ -29,12 +29,6 @@ from grader.submissions.collected import shown
 ROUND = 5
 #: Check parameters with a duration that must fit into the scenario.
 _STRETCHES = ("window", "silence")
-#: Check -> parameters that name topics on which only the grader's stimuli can publish.
-_GIVEN: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(("logs_position", "log_period", "waits_gracefully"), ("topic",)),
-    **dict.fromkeys(("logs_received", "logs_values", "logs_texts", "stays_in_range"), ("topic",)),
-    "reaches_goal": ("topic", "goals"),
-}
 #: Checks of the graph, where a service is seen that nobody calls.
 _SEEN = ("service_available",)
 #: How alike two names are of which one is taken for a misspelling of the other.
@@ -83,12 +77,12 @@ def _of_inputs(criterion: Criterion, exercise: Exercise, path: TreePath, tree: Y
     name, scenario = criterion.check_name, next(s for s in exercise.scenarios if s.id == criterion.scenario)
     given, others = _given(scenario), len(scenario.processes) > 1 or any(map(is_launch_file, scenario.processes))
     own = {topic for other in exercise.criteria for topic in _published(other)}
-    topics = roles_of(type(criterion.check)).hears
-    for parameter in _GIVEN.get(name) or (() if others else _needed(criterion)):
+    roles = roles_of(type(criterion.check))
+    for parameter in roles.given or (() if others else _needed(criterion)):
         asked = getattr(criterion.check, parameter)
-        known = set() if name in _GIVEN else own
+        known = set() if roles.given else own
         if asked not in given | known and not any(end[:1] == "~" and asked.endswith(end[1:]) for end in given):
-            what = "publishes on" if name in _GIVEN or parameter in topics else "uses"
+            what = "publishes on" if parameter in (*roles.given, *roles.hears) else "uses"
             text = f"no stimulus of {scenario.id} {what} {shown(asked)}{_did_you_mean(asked, given)}"
             yield tree.at((*path, "check", name, parameter)).mistake(text)
 
@@ -102,7 +96,7 @@ def _needed(criterion: Criterion) -> tuple[str, ...]:
 
 def _published(criterion: Criterion) -> Iterator[str]:
     """Yield the topics that a criterion expects the student's nodes to publish on."""
-    other = (*_GIVEN.get(criterion.check_name, ()), *_needed(criterion))
+    other = (*roles_of(type(criterion.check)).given, *_needed(criterion))
     yield from named(criterion.check, *(parameter for parameter in ("topic", "output") if parameter not in other))
 
 

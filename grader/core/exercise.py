@@ -244,10 +244,10 @@ class Finding:
 class Roles:
     """What the parameters of a check are, by their names; a name that the check does not have is ignored.
 
-    A parameter with one of the usual names, which are the defaults here, needs no declaration. The last five have no
+    A parameter with one of the usual names, which are the defaults here, needs no declaration. The last six have no
     usual name: a check that declares them lets the general hint rules explain a topic that is silent or that nobody
     subscribes to, missing logs, and a service that nobody offers or calls. Criteria that need a sign of the data wait
-    for one that declares `logs`.
+    for one that declares `logs`. `grade rubric check` warns if no stimulus publishes on a topic that is `given`.
     """
 
     topics: tuple[str, ...] = ("input", "topic", "output", "forward", "back", "publishes", "subscribes")
@@ -259,6 +259,7 @@ class Roles:
     hears: tuple[str, ...] = ()  # topics to which a node of the student's has to subscribe
     speaks: tuple[str, ...] = ()  # topics on which the check itself misses messages of the student's nodes
     logs: tuple[str, ...] = ()  # topics of which the process has to log what arrives
+    given: tuple[str, ...] = ()  # topics of which the check reads what the grader publishes, and nobody else
     serves: tuple[str, ...] = ()  # services that a node of the student's has to offer
     calls: tuple[str, ...] = ()  # services that a node of the student's has to call
 

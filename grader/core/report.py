@@ -149,7 +149,7 @@ class DescribedPackage:
     name: str
     origin: str  # as in `BroughtPackage`
     digest: str  # of its definitions
-    types: tuple[str, ...]  # e.g. `lab_msgs/msg/Battery`, sorted
+    types: tuple[str, ...]  # e.g. `lab_msgs/msg/Level`, sorted
     folder: str  # where its modules are kept; empty if the installed package of this name is used instead
 
 

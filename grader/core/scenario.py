@@ -178,7 +178,7 @@ class Choose:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A text with a drawn number in place of `{}`: `Battery: {}% remaining`."""
+    """A text with a drawn number in place of `{}`: `{} m left`."""
 
     text: str  # holds `{}` once
     number: Between  # what is drawn

@@ -142,7 +142,7 @@ class LogRecord:
     """One record written through an rclpy logger."""
 
     t_ns: int  # when it was written
-    process: str  # file name of the student process, e.g. `odom_subscriber.py`
+    process: str  # file name of the student process, e.g. `scan_listener.py`
     severity: str  # DEBUG, INFO, WARN, ERROR or FATAL
     logger: str  # logger name, usually the node's
     text: str  # the message; may hold line breaks
@@ -167,7 +167,7 @@ class Endpoint:
     kind: str  # `publisher` or `subscription`
     topic: str  # absolute name
     type: str  # message type
-    node: str  # fully qualified node name, e.g. `/odom_subscriber`
+    node: str  # fully qualified node name, e.g. `/scan_listener`
     participant: int  # number of the DDS participant in order of appearance, one for each process; -1 is the grader
     reliability: str  # `reliable` or `best_effort`
     durability: str  # `volatile` or `transient_local`

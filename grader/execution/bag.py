@@ -285,7 +285,7 @@ def _decoded(path: Path, topic: str, type_: str, raw: Sequence[_Raw], define: De
         if not _has_finite_positions(value):
             raise RecordingError(
                 f"{_line(path)}: expected a position in {where}, found a number that is not finite",
-                "play a recording whose robot knew where it was",
+                "play a recording in which every position is known",
             )
         last_ns = max(received_ns - start_ns, last_ns + 1)
         yield TimedMessage(last_ns, cdr, value)

@@ -63,9 +63,12 @@ class LogFacts:
 class WrongLogFacts:
     """What logs show in place of the fields that they should show."""
 
-    cause: str  # such as `swapped`; `nothing` if there is no log at all, `few` if they are right and too few
+    # A word of the check's own, such as `swapped`. The general rules know three: `nothing` if there is no log at all,
+    # `few` if the logs are right and too few, `constant` if they never change
+    cause: str
     right: int  # logs that show the fields
     fields: tuple[str, ...] = ()  # their paths in the message
+    absent: bool = False  # whether no log holds as many numbers as there are fields
 
 
 @dataclass(frozen=True, slots=True)

@@ -140,7 +140,8 @@ def _parameters(cls: type) -> type[Shape]:
 def _forms(kind: type) -> dict[str, object]:
     """Return the required form of text parameters by their name, beyond being text."""
     roles = roles_of(kind)
-    topics, services = (*roles.topics, *roles.hears, *roles.speaks), (*roles.services, *roles.serves, *roles.calls)
+    topics = (*roles.topics, *roles.hears, *roles.speaks, *roles.logs, *roles.given)
+    services = (*roles.services, *roles.serves, *roles.calls)
     names = dict.fromkeys((*topics, *services, *roles.actions), Topic)
     return {**names, roles.type: MessageType, roles.process: ProgramName}
 

@@ -34,13 +34,24 @@ def install_alarms(give_up: Callable[[], None]) -> None:
 
 
 def install_processes(give_up: Callable[[], None]) -> None:
-    """Call `give_up` before the program starts another process or replaces itself by one."""
+    """Call `give_up` before the program starts another process or replaces itself by one.
+
+    `multiprocessing` starts processes by a function that tells no audit hook, unless it forks.
+    """
+    import _posixsubprocess
+
+    fork_exec = _posixsubprocess.fork_exec
 
     def hook(event: str, arguments: Any) -> None:
         if event in PROCESSES:
             give_up()
 
+    def guarded_fork_exec(*arguments: Any) -> int:
+        give_up()
+        return int(fork_exec(*arguments))
+
     sys.addaudithook(hook)
+    _posixsubprocess.fork_exec = guarded_fork_exec
 
 
 def any_outside(descriptors: Iterable[int]) -> bool:

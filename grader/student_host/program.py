@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import ctypes
 import functools
 import gc
 import importlib
@@ -17,7 +16,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from . import entry, launch_files, machine, originals
+from . import closures, entry, launch_files, machine, originals
 from .faults import Describer, report_threads
 from .link import Link, Log
 from .outside import install_alarms, install_processes
@@ -33,6 +32,8 @@ if TYPE_CHECKING:
 
     from .wall import WallTime
 
+#: The number of a descriptor above `starter.PARENT` that stays open in a forked process, None if there is none.
+KEPT = closures.KEPT
 #: Files whose frames lead to the program's own: this package, and the importing of a module.
 STARTING = (os.path.join(os.path.dirname(__file__), ""), importlib.__file__, "<frozen importlib.")
 
@@ -195,6 +196,8 @@ def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | Wal
 
 def die_with_parent() -> None:
     """Make the kernel kill this process when its parent ends."""
+    import ctypes
+
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG, linux/prctl.h
 
 

@@ -61,6 +61,7 @@ ROS_PARTS = (
     "rclpy.task",
     "rclpy.time",
     "rclpy.time_source",
+    "rclpy.timer",
     "rclpy.utilities",
 )
 

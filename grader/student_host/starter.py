@@ -137,7 +137,11 @@ def become(request: dict[str, Any], descriptors: list[int], sandbox: Any, progra
     # First to numbers beyond, because one of them may have a number that another one gets.
     for number, descriptor in enumerate([fcntl.fcntl(d, fcntl.F_DUPFD_CLOEXEC, PARENT + 1) for d in descriptors]):
         os.dup2(descriptor, number, inheritable=number != PARENT)
-    os.closerange(PARENT + 1, os.sysconf("SC_OPEN_MAX"))
+    first = PARENT + 1
+    if program.KEPT is not None:
+        os.closerange(first, program.KEPT)
+        first = program.KEPT + 1
+    os.closerange(first, os.sysconf("SC_OPEN_MAX"))
     os.environ.clear()
     os.environ.update(request["environment"])
     sandbox.make_memory_private()

@@ -6,6 +6,7 @@ chosen that agree most often with the x and y that were current. What the texts 
 
 from __future__ import annotations
 
+import math
 import re
 import statistics
 from bisect import bisect_left, bisect_right
@@ -111,7 +112,7 @@ class LogsPosition:
         topic: Topic of the odometry.
     """
 
-    roles: ClassVar[Roles] = Roles(logs=("topic",))
+    roles: ClassVar[Roles] = Roles(logs=("topic",), given=("topic",))
     process: str
     topic: str
 
@@ -147,13 +148,14 @@ class LogsPosition:
         if fault is not None and fault.t_ns < track.times_ns[0]:
             return _ended_early(fault)
         cause = cause_of(found, track)
-        evidence, facts = _evidence(found) | {"cause": cause.name}, WrongLogFacts(cause.name, len(found.right), (X, Y))
+        evidence = _evidence(found) | {"cause": cause.name}
+        facts = WrongLogFacts(cause.name, len(found.right), (X, Y), absent=cause.name == "no_pair")
         if fault is not None and cause.name in ("no_pair", "few"):
             return faulted(fault, cause.sentence if found.right else "no position was logged before it", evidence)
         if not found.groups and not any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process)):
             during = span(track.stop_ns - track.start_ns)
             reason = f"{self.process}: nothing was logged while {self.topic} was played for {during}"
-            silent = replace(facts, cause="nothing")
+            silent = replace(facts, cause="nothing", absent=True)
             return not_met(reason, evidence | {"cause": "nothing"}, problem=ProblemKind.NOT_LOGGED, facts=silent)
         problem = Problem(ProblemKind.WRONG_VALUE, detail=cause.name)
         return not_met(f"{self.process}: {cause.sentence}", evidence, hint=cause.hint, problem=problem, facts=facts)
@@ -199,7 +201,7 @@ def _evidence(found: Analysis) -> dict[str, object]:
 class LogPeriod:
     """A process logs positions with a period while odometry is played, and not one for every message.
 
-    The position logs are judged; if none is right, the most frequent log with a number.
+    The position logs are judged; if none is right, or something else is played, the most frequent log with a number.
 
     Attributes:
         process: File name of the student process.
@@ -208,6 +210,7 @@ class LogPeriod:
         tolerance: Largest difference of the average, as a share of the period; the edge is inside.
     """
 
+    roles: ClassVar[Roles] = Roles(given=("topic",))
     process: str
     topic: str
     period: DurationNs
@@ -304,7 +307,7 @@ class LogPeriod:
         return time_chart(
             trace,
             f"period {self.topic}",
-            "When positions were logged",
+            f"When {'numbers' if math.isnan(track.pose(0).x) else 'positions'} were logged",
             _describe_period(times, self),
             Panel("logs", "", (dots,), lanes=("log",), grid=(seconds(times[0]), period_s)),
             gaps_panel("log", times, bands=(Band(period_s - share, period_s + share, label),)),
@@ -384,7 +387,6 @@ def _describe_period(times: Sequence[int], check: LogPeriod) -> str:
 
 #: How long a pose stays acceptable after the next one arrived: a slow loop may read from a queue.
 STALE_NS = 500 * NS_PER_MS
-_NAN = float("nan")
 
 
 @dataclass(frozen=True, slots=True)
@@ -475,7 +477,7 @@ def track_of(trace: Trace, topic: str) -> Track | None:
 
 def _number(fields: Mapping[str, object], path: str) -> float:
     found = number_at(fields, path)
-    return _NAN if found is None else found
+    return math.nan if found is None else found
 
 
 #: Output written within this time is one block; in virtual time, output of exactly one instant.

@@ -9,11 +9,12 @@ from typing import Any, ClassVar
 import pytest
 
 from grader.api import NODE_GRAPH, Check, Drawing, Finding, Plot, Roles, Trace, TraceBuilder, met, not_met
+from grader.authoring.checking import check_rubric
 from grader.core.exercise import has, named, of_beginning, reads_sources, roles_of
 from grader.core.submission import StudentFile, Submission
-from grader.judging.checks import CHECKS
 from grader.judging.judge_run import judge_exercise
 from grader.judging.plots import chart_of, shows_graph
+from grader.rubrics.exercise_checks import known_checks
 from grader.rubrics.loader import read_rubric
 
 FLOAT = "std_msgs/msg/Float32"
@@ -192,9 +193,20 @@ def test_roles_open_the_hint_rules_about_services(
     assert (said in report.verdicts[0].hint) == declared
 
 
-def test_a_declared_topic_has_to_be_written_as_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("declared", [True, False])
+def test_an_input_that_no_stimulus_gives_is_odd(tmp_path: Path, *, declared: bool) -> None:
+    """The check says which of its topics the grader has to play."""
+    roles = 'roles: ClassVar[Roles] = Roles(given=("outlet",))' if declared else "pass"
+    (tmp_path / "pump_checks.py").write_text(ROLES.replace("ROLES", roles), encoding="utf-8")
+    (tmp_path / "pump.yaml").write_text(RUBRIC, encoding="utf-8")
+    found = [str(one) for one in check_rubric(tmp_path / "pump.yaml").warnings]
+    assert any("no stimulus of alone publishes on /flow" in one for one in found) == declared
+
+
+@pytest.mark.parametrize("role", ["speaks", "hears", "logs", "given"])
+def test_a_declared_topic_has_to_be_written_as_one(tmp_path: Path, role: str) -> None:
     """Its form is checked, as that of a parameter with one of the usual names."""
-    roles = 'roles: ClassVar[Roles] = Roles(speaks=("outlet",))'
+    roles = f'roles: ClassVar[Roles] = Roles({role}=("outlet",))'
     (tmp_path / "pump_checks.py").write_text(ROLES.replace("ROLES", roles), encoding="utf-8")
     (tmp_path / "pump.yaml").write_text(RUBRIC.replace("outlet: /flow", "outlet: flow"), encoding="utf-8")
     with pytest.raises(Exception, match="expected an absolute topic name"):
@@ -203,11 +215,12 @@ def test_a_declared_topic_has_to_be_written_as_one(tmp_path: Path) -> None:
 
 def test_every_role_names_a_parameter() -> None:
     """Of the check that declares it: a name that is mistyped would be ignored."""
-    for kind in CHECKS.values():
+    for kind in known_checks().values():
         declared: Roles | None = vars(kind).get("roles")
         if declared is not None:
             held = {field.name for field in fields(kind)}
-            asked = {*declared.hears, *declared.speaks, *declared.serves, *declared.calls}
+            ends = (*declared.hears, *declared.speaks, *declared.serves, *declared.calls)
+            asked = {*ends, *declared.logs, *declared.given}
             assert asked
             assert asked <= held
     assert named(Plain(), "topic", "nothing") == ("/flow",)

@@ -160,6 +160,9 @@ def test_a_forked_process_is_in_the_sandbox_of_an_executed_one(sandbox: Sandbox)
     texts = (OWN_FOLDER.sub("own", "".join(text.splitlines())) for text in (forked, executed))
     found, expected = (json.loads(text) for text in texts)
     assert found["descriptors"].pop("3") == "socket"
+    # Where the library of ctypes keeps its own file open, the connection has taken the first free number here.
+    kept = [[d.pop(n) for n in list(d) if "libffi" in d[n]] for d in (found["descriptors"], expected["descriptors"])]
+    assert kept[0] == kept[1]
     assert (found["leads"], found["dies by"]) == ([True, True], [0, signal.SIGKILL])
     if isinstance(sandbox.isolation, Bubblewrap):
         placeholder = ["/grader_host/cat"]

@@ -43,6 +43,14 @@ WAITS = {
         "",
         "import multiprocessing\np = multiprocessing.Process(target=time.sleep, args=(.1,))\np.start()\np.join()",
     ),
+    "spawn": (
+        "",
+        "from multiprocessing import get_context\np = get_context('spawn').Process(target=print)\np.start()",
+    ),
+    "forkserver": (
+        "",
+        "from multiprocessing import get_context\np = get_context('forkserver').Process(target=print)\np.start()",
+    ),
     "signal": ("", "import signal\nsignal.sigtimedwait([signal.SIGUSR1], 0.1)"),
 }
 

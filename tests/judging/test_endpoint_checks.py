@@ -9,11 +9,14 @@ import pytest
 from tracing import FLOAT32, FLOAT64, Recording
 
 from grader.core.errors import HarnessError
+from grader.core.exercise import Location
 from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.core.trace import FaultKind
-from grader.judging.checks.graph import GraphEdge, GraphEdges, NodeName, Qos, TopicNames
+from grader.judging.checks.graph import BidirectionalGraph, GraphEdge, GraphEdges, NodeName, Qos, TopicNames
 from grader.judging.checks.programs import CleanShutdown, NoFault
+from grader.judging.diagnosis import RULES
 from grader.judging.findings import FAULT_KEY
+from grader.testing import explain
 
 
 def talking() -> Recording:
@@ -129,6 +132,23 @@ def test_an_edge_needs_one_type_and_perhaps_two_processes_and_one_moment() -> No
     assert GraphEdges(both).judge(rec.trace()).credit == 1
     assert "never all of them at once" in GraphEdges(both, at_once=True).judge(rec.trace()).reason
     assert FAULT_KEY in GraphEdges(both).judge(Recording().crashed(0.0).trace()).evidence
+
+
+def test_a_missing_edge_is_explained_by_the_name_in_a_file() -> None:
+    """Whichever check asks for the edge: it says which topics have none."""
+    files = {
+        "talker.py": "class Talker(Node):\n    def __init__(self):\n"
+        "        self.out = self.create_publisher(Float32, 'level', 10)\n",
+        "listener.py": "class Listener(Node):\n    def __init__(self):\n"
+        "        self.create_subscription(Float32, '/topic', self.heard, 10)\n",
+    }
+    rec = Recording().endpoint("publisher", "/level", node="/talker").endpoint("subscription", "/topic", node="/l")
+    rule = next(rule for rule in RULES if rule.id == "graph_topic")
+    for check in (GraphEdges((GraphEdge("/topic"),)), BidirectionalGraph("/topic", "/back")):
+        clue = explain(rule, check, rec.trace(), files)
+        assert clue is not None
+        assert clue.location == Location("talker.py", 3)
+        assert "publishes on /level: the task asks for /topic" in clue.hint
 
 
 def test_no_fault_means_none_before_the_stop() -> None:

@@ -38,13 +38,14 @@ class _LogsLevel:
 
     process: str = FILE
     topic: str = "/level"
+    absent: bool = False
 
     def judge(self, trace: Trace) -> Finding:
         if any("1.5" in record.text for record in student_records(trace, self.process)):
             return met("it is logged")
         if any("1.5" in line.text for line in printed_lines(trace, self.process)):
             return only_printed("it is printed", None, "")
-        return not_met("it is not logged", facts=WrongLogFacts("nothing", 0, ("data",)))
+        return not_met("it is not logged", facts=WrongLogFacts("nothing", 0, ("data",), self.absent))
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,16 @@ def test_what_is_printed_instead_is_explained_by_the_general_rule() -> None:
     assert verdict.location.line == 2
     (verdict,) = judged(rec, PRINTS, _LogsLevel())
     assert verdict.hint == ""
+
+
+def test_what_goes_into_a_file_is_no_log() -> None:
+    """The rule is asked where the check says that no log holds anything like it."""
+    source = f"{HIDES}open('levels.txt', 'w').write(str(node))\n".replace("debug", "info")
+    rec = listening().log(0.5, "started")
+    (verdict,) = judged(rec, source, _Declared(absent=True))
+    assert "the grader does not see what goes into a file" in verdict.hint
+    (verdict,) = judged(rec, source, _Declared())
+    assert "into a file" not in verdict.hint
 
 
 def test_a_log_of_the_fields_at_a_hidden_level_is_named() -> None:

@@ -22,8 +22,8 @@ class BidirectionalGraph:
     """At one moment, the live graph connects two processes by two topics, one in each direction, with matching types.
 
     Attributes:
-        forward: Topic that the first process publishes and the second subscribes to, e.g. `/temperature`.
-        back: Topic of the other direction, e.g. `/fan_speed`.
+        forward: Topic that the first process publishes and the second subscribes to, e.g. `/ping`.
+        back: Topic of the other direction, e.g. `/pong`.
     """
 
     drawing: ClassVar[str] = NODE_GRAPH
@@ -313,7 +313,9 @@ class GraphEdges:
         if missing is None:
             return not_met("every edge is there, but never all of them at once", evidence)
         return explain_fault(trace, f"no edge {missing}", evidence) or not_met(
-            f"no edge {missing}; {self._instead(trace, missing)}", evidence, problem=ProblemKind.NO_EDGE
+            f"no edge {missing}; {self._instead(trace, missing)}",
+            evidence,
+            problem=Problem(ProblemKind.NO_EDGE, (missing.topic,)),
         )
 
     def _has(self, graph: GraphSnapshot, edge: GraphEdge) -> bool:

@@ -80,6 +80,7 @@ class LogsValues:
             products that name each other's units for every message do not count. No unit needs to be named.
     """
 
+    roles: ClassVar[Roles] = Roles(given=("topic",))
     noun: ClassVar[str] = "message"
     process: str
     topic: str
@@ -351,7 +352,7 @@ class LogsReceived:
     """
 
     noun: ClassVar[str] = "value"
-    roles: ClassVar[Roles] = Roles(hears=("topic",))
+    roles: ClassVar[Roles] = Roles(hears=("topic",), given=("topic",))
     process: str
     topic: str
     field: Annotated[str, FieldOf("topic")] = ""

@@ -36,8 +36,8 @@ class ServiceAvailable:
     """A node of the submission offers a service of a type: it is in the ROS graph, or it has answered.
 
     Attributes:
-        service: Service name as on the wire, e.g. `/battery/get_status`.
-        type: Service type, e.g. `std_srvs/srv/Trigger`.
+        service: Service name as on the wire, e.g. `/add_two_ints`.
+        type: Service type, e.g. `example_interfaces/srv/AddTwoInts`.
     """
 
     roles: ClassVar[Roles] = Roles(serves=("service",))

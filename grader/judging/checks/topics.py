@@ -53,8 +53,8 @@ class Subscribes:
     """A subscription that a RELIABLE and VOLATILE publisher of a type on a topic would reach.
 
     Attributes:
-        topic: Topic name as on the wire, e.g. `/odom`.
-        type: Message type, e.g. `nav_msgs/msg/Odometry`.
+        topic: Topic name as on the wire, e.g. `/scan`.
+        type: Message type, e.g. `sensor_msgs/msg/LaserScan`.
     """
 
     drawing: ClassVar[str] = NODE_GRAPH
@@ -247,7 +247,7 @@ class Transform:
     Every published one must be right. A quaternion and its negative are the same rotation.
 
     Attributes:
-        parent: Parent frame of the transform, e.g. `odom`.
+        parent: Parent frame of the transform, e.g. `map`.
         child: Child frame of the transform, e.g. `base_link`.
         static: Whether it must be on `/tf_static`, or on `/tf`; either if left out.
         translation: Expected metres along `x`, `y` and `z`; those left out are free.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from typing import ClassVar
 
 from grader.core.chart import Case
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import DurationNs, seconds
 from grader.core.trace import Fault, Trace
 from grader.judging.checks.logs import complained
@@ -29,6 +30,7 @@ class WaitsGracefully:
         silence: Minimum duration of the silence in the recording.
     """
 
+    roles: ClassVar[Roles] = Roles(given=("topic",))
     process: str
     topic: str
     silence: DurationNs

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 
 from grader.core.trace import FaultKind
-from grader.judging.checks.fields import RandomInRange
 from grader.judging.diagnosis.names import MESSAGE_FIELDS, SINGLE_NUMBERS, SPINS
 from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
 from grader.judging.diagnosis.wiring import (
@@ -38,8 +37,8 @@ def _wrong_field_type(crash: Crash) -> Clue | None:
     if type_ != "float":
         other = {"int": "an integer", "str": "text", "bool": "True or False"}.get(type_)
         written = crash.source.code(value, 40) if value is not None else "..."
-        asked = (crash.case.check, *crash.case.siblings)
-        if type_ == "str" and field == "data" and any(isinstance(check, RandomInRange) for check in asked):
+        asked = {criterion.check_name for criterion in (crash.case.criterion, *crash.case.others)}
+        if type_ == "str" and field == "data" and "random_in_range" in asked:
             item = next((m for m in made(crash.source, "publisher") if m.type == "String"), None)
             if item is not None:
                 hint = "String holds text, but the task asks for numbers: use a numeric type such as Float32"

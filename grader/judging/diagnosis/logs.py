@@ -6,9 +6,6 @@ import ast
 import re
 
 from grader.core.exercise import Location, Outcome, ProblemKind
-from grader.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
-from grader.judging.checks.received import LogsReceived, LogsValues
-from grader.judging.checks.waiting import WaitsGracefully
 from grader.judging.diagnosis.rules import Case, Clue, hint_rule, log_call
 from grader.judging.diagnosis.wiring import (
     Made,
@@ -45,7 +42,7 @@ def _prints(source: Source) -> list[ast.Call]:
 
 def _must_log(case: Case) -> Case | None:
     """Return a case whose check asks for any record, or for records of what arrived."""
-    return case if case.logs or isinstance(case.check, (UsesLogger, LogsReceived)) else None
+    return case if case.logs or case.criterion.check_name in ("uses_logger", "logs_received") else None
 
 
 @hint_rule(outcome=Outcome.NOT_MET, given=_must_log, priority=11010)
@@ -60,12 +57,11 @@ def _into_file(case: Case) -> Clue | None:
 
 
 def _unseen(case: Case) -> bool:
-    check = case.check
-    if isinstance(check, UsesLogger):
+    if case.criterion.check_name == "uses_logger":
         return not student_records(case.trace, case.process) and not printed_lines(case.trace, case.process)
     wrong, logged = case.found(WrongLogFacts), case.found(LogFacts)
     if wrong is not None:
-        return wrong.cause in ("nothing", "no_pair") and wrong.right == 0
+        return wrong.absent
     return logged is not None and logged.expected == logged.missing
 
 
@@ -84,16 +80,16 @@ def _writes(call: ast.Call) -> bool:
 @hint_rule(outcome=Outcome.PARTLY, fault=None, given=_must_log, priority=11020)
 def _printed(case: Case) -> Clue | None:
     """Lines are printed instead of logged."""
-    check, source = case.check, case.source
+    name, source = case.criterion.check_name, case.source
     prints = [c for c in _prints(source) if c.args]
-    if isinstance(check, LogsReceived):
-        item = made_for(source, "subscription", check.topic)
+    if name == "logs_received":
+        item = made_for(source, "subscription", case.check.topic)
         inside = set(runs(source, item)) if item is not None else set()
         prints = [c for c in prints if c in inside] or prints
     elif len(prints) > 1:
         prints = _most_printed(case, prints)
     if not prints:
-        return _by_python(case) if isinstance(check, UsesLogger) and case.fault is None else None
+        return _by_python(case) if name == "uses_logger" and case.fault is None else None
     code = source.code(prints[0], 60)
     hint = f"{code} does not log: write self.get_logger().info(...)"
     return Clue(hint, source.place(prints[0]), key="printed")
@@ -110,7 +106,7 @@ def _most_printed(case: Case, prints: list[ast.Call]) -> list[ast.Call]:
     return sorted(prints, key=seen, reverse=True) if case.logs else prints
 
 
-@hint_rule(UsesLogger, priority=11030)
+@hint_rule("uses_logger", priority=11030)
 def _python_logging(case: Case) -> Clue | None:
     """Python's logging module is used instead of the node's logger."""
     return _by_python(case)
@@ -138,7 +134,7 @@ _PERCENT = re.compile(r"%[-+ 0#]*\d*(?:\.\d+)?[dfgeEsi](?![A-Za-z])")
 
 def _must_show(case: Case) -> Case | None:
     """Return a case whose check asks for certain texts in the logs."""
-    return case if case.logs or isinstance(case.check, (LogsReceived, LogsValues, LogsMatching)) else None
+    return case if case.logs or case.criterion.check_name in ("logs_received", "logs_values", "logs_matching") else None
 
 
 @hint_rule(given=_must_show, priority=11040)
@@ -183,7 +179,7 @@ def _level_raised(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule(LogsReceived, priority=11060)
+@hint_rule("logs_received", priority=11060)
 def _received_at_debug(case: Case) -> Clue | None:
     """What is received is logged at a level that is not shown."""
     item = made_for(case.source, "subscription", case.check.topic)
@@ -197,7 +193,7 @@ def _received_at_debug(case: Case) -> Clue | None:
 
 def _shows_nothing(case: Case) -> Case | None:
     """Return a case whose check asks for any record, or finds no record that shows the fields of a message."""
-    return case if case.logs or isinstance(case.check, UsesLogger) else None
+    return case if case.logs or case.criterion.check_name == "uses_logger" else None
 
 
 @hint_rule(given=_shows_nothing, priority=11070)
@@ -230,7 +226,7 @@ def _commented_out(case: Case) -> Clue | None:
 def _must_repeat(case: Case) -> Case | None:
     """Return a case whose check asks for a log of each message, or for logs at a certain pace."""
     paced = case.found(LogPaceFacts) is not None
-    return case if paced or case.logs or isinstance(case.check, LogsReceived) else None
+    return case if paced or case.logs or case.criterion.check_name == "logs_received" else None
 
 
 @hint_rule(given=_must_repeat, priority=11090)
@@ -308,7 +304,7 @@ def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: 
     return Clue(hint, source.place(worth.origin), key="log_pace")
 
 
-@hint_rule(LogsReceived, priority=11110)
+@hint_rule("logs_received", priority=11110)
 def _received_not_logged(case: Case) -> Clue | None:
     """The callback of the subscription does not log, or does not log what it received."""
     source, check = case.source, case.check
@@ -357,7 +353,7 @@ def _shows(log: ast.AST, attributes: set[str]) -> bool:
     return any(chain(n) in attributes for n in ast.walk(log) if isinstance(n, ast.Attribute))
 
 
-@hint_rule(WaitsGracefully, priority=11120)
+@hint_rule("waits_gracefully", priority=11120)
 def _error_while_waiting(case: Case) -> Clue | None:
     if case.verdict.location is None:
         return None
@@ -368,7 +364,7 @@ def _error_while_waiting(case: Case) -> Clue | None:
     return Clue(f"this is not a failure of the node: use info or warn instead of {last_name(call.func)}")
 
 
-@hint_rule(LogsEvery, priority=11130)
+@hint_rule("logs_every", priority=11130)
 def _log_every(case: Case) -> Clue | None:
     """`count % 100 == 0` where one log for every ten messages is asked for, or no condition at all."""
     source, every, call = case.source, case.check.every, log_call(case)

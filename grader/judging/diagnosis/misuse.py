@@ -28,8 +28,8 @@ from grader.judging.source import (
     text_of,
 )
 
-#: Fields of messages that hold a number.
-_LEAVES = {"data", "x", "y", "z", "w", "temperature", "variance", "position", "effort", "sec", "nanosec"}
+#: Fields of messages that may hold a number.
+_LEAVES = {name for names in MESSAGE_FIELDS.values() for name in names} | {"sec", "nanosec"}
 _PLACEHOLDER = re.compile(r"%(?!%)[-+ 0#]*[\d.*]*[a-zA-Z]")
 #: An argument is missing, or there are too many: of any function, as Python says it from 3.10 to 3.14.
 _ARITY = (

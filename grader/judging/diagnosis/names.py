@@ -173,7 +173,7 @@ FIELDS = {
     ("Temperature", "data"): "msg.temperature",
 }
 _NUMBERS = ("Float32", "Float64", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64", "String")
-#: Fields of the messages that the exercises use.
+#: Fields of messages that beginners use.
 MESSAGE_FIELDS = {
     "Twist": ("linear", "angular"),
     "Vector3": ("x", "y", "z"),

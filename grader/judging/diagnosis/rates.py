@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import ProblemKind
-from grader.judging.checks.rate import TopicRate
 from grader.judging.diagnosis.rules import Case, Clue, hint_rule, lines_of, silent_topic
 from grader.judging.diagnosis.wiring import (
     Constant,
@@ -61,7 +60,7 @@ class _Paced:
 
 
 def _paced(case: Case) -> _Paced | None:
-    check: TopicRate = case.check
+    check = case.check
     if silent_topic(case):
         return None
     calls = publish_calls(case.source, made_for(case.source, "publisher", check.topic))
@@ -73,7 +72,7 @@ def _same(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=_SAME)
 
 
-@hint_rule(TopicRate, given=_paced, priority=9010)
+@hint_rule("topic_rate", given=_paced, priority=9010)
 def _period(paced: _Paced) -> Clue | None:
     """The period of the timer explains the rate."""
     timers = paced.timers()
@@ -106,7 +105,7 @@ def _period_clue(source: Source, timer: Made, worth: Constant, wanted_hz: float)
     return Clue(hint, source.place(worth.origin), key=f"period:{timer.call.lineno}")
 
 
-@hint_rule(TopicRate, given=_paced, priority=9020)
+@hint_rule("topic_rate", given=_paced, priority=9020)
 def _callback_held_up(paced: _Paced) -> Clue | None:
     """The callback of the timer sleeps, or never returns."""
     if not paced.found_hz < paced.wanted_hz:
@@ -126,7 +125,7 @@ def _callback_held_up(paced: _Paced) -> Clue | None:
     return _held_up_now_and_then(paced)
 
 
-@hint_rule(TopicRate, given=_paced, priority=9030)
+@hint_rule("topic_rate", given=_paced, priority=9030)
 def _loops_in_callback(paced: _Paced) -> Clue | None:
     """The callback of the timer publishes in a loop that never ends."""
     for timer in paced.timers():
@@ -181,7 +180,7 @@ def _pause(source: Source, loop: ast.AST) -> list[Constant]:
     return sorted([*_sleeps(source, inside), *timeouts], key=lambda s: first_line(s.origin))
 
 
-@hint_rule(TopicRate, problem=ProblemKind.BURSTS, given=_paced, priority=9040)
+@hint_rule("topic_rate", problem=ProblemKind.BURSTS, given=_paced, priority=9040)
 def _published_several_times(paced: _Paced) -> Clue | None:
     """Each iteration publishes more than once, or several timers publish."""
     timers = paced.timers()
@@ -202,7 +201,7 @@ def _published_several_times(paced: _Paced) -> Clue | None:
     return Clue(f"{hint}: publish one every {number(paced.period_s)} s", source.place(loop))
 
 
-@hint_rule(TopicRate, given=_paced, priority=9050)
+@hint_rule("topic_rate", given=_paced, priority=9050)
 def _stopped_itself(paced: _Paced) -> Clue | None:
     """A callback cancels its timer, destroys the node, or stops publishing on a condition."""
     if not (paced.case.is_about(ProblemKind.STOPPED) or paced.facts.count == 1):
@@ -220,7 +219,7 @@ def _stopped_itself(paced: _Paced) -> Clue | None:
     return None
 
 
-@hint_rule(TopicRate, given=_paced, priority=9060)
+@hint_rule("topic_rate", given=_paced, priority=9060)
 def _too_slow(paced: _Paced) -> Clue | None:
     """The period is right, but the rate is too low."""
     timers = paced.timers()
@@ -234,7 +233,7 @@ def _too_slow(paced: _Paced) -> Clue | None:
     return Clue(f"{hint}: do less in it", paced.source.place(start[0] if start else timers[0].call))
 
 
-@hint_rule(TopicRate, given=_paced, priority=9070)
+@hint_rule("topic_rate", given=_paced, priority=9070)
 def _waits_to_spin(paced: _Paced) -> Clue | None:
     """A loop that publishes spins once without a timeout, which waits until something wakes the node."""
     rare = math.isnan(paced.found_hz) or paced.found_hz < (1 - _SAME) * paced.wanted_hz
@@ -252,7 +251,7 @@ def _waits_to_spin(paced: _Paced) -> Clue | None:
     return None
 
 
-@hint_rule(TopicRate, given=_paced, priority=9080)
+@hint_rule("topic_rate", given=_paced, priority=9080)
 def _loop_pace(paced: _Paced) -> Clue | None:
     """A loop publishes, but its pause is not the requested period."""
     if paced.timers() or math.isnan(paced.found_hz):
@@ -301,7 +300,7 @@ def _no_pause(paced: _Paced, loop: Loop) -> Clue | None:
     return Clue(hint, paced.source.place(loop))
 
 
-@hint_rule(TopicRate, given=_paced, priority=9090)
+@hint_rule("topic_rate", given=_paced, priority=9090)
 def _published_once(paced: _Paced) -> Clue | None:
     """Neither a timer nor a loop publishes."""
     if paced.facts.count != 1 or paced.timers() or not paced.calls:

@@ -6,12 +6,8 @@ import ast
 import re
 
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Location, Outcome, named, roles_of
+from grader.core.exercise import Location, Outcome, ProblemKind, named, roles_of
 from grader.core.quantities import seconds
-from grader.judging.checks.graph import BidirectionalGraph
-from grader.judging.checks.logs import UsesLogger
-from grader.judging.checks.received import LogsReceived
-from grader.judging.checks.topics import Publishes, Subscribes
 from grader.judging.diagnosis.rules import NO_SOURCE, Case, Clue, file_for, hint_rule, silent_topic, unheard_topic
 from grader.judging.diagnosis.wiring import (
     MOST_MADE,
@@ -67,7 +63,7 @@ def _unseen(case: Case) -> _Unseen | None:
         return _Unseen(case, source, publish_calls(source, made_for(source, "publisher", topic)))
     logged = case.found(WrongLogFacts)
     if (logged is not None and logged.right == 0) or (
-        isinstance(case.check, UsesLogger) and not student_records(case.trace, case.process)
+        case.criterion.check_name == "uses_logger" and not student_records(case.trace, case.process)
     ):
         return _Unseen(case, case.source, _unseen_logs(case))
     return None
@@ -154,10 +150,9 @@ def _elsewhere(source: Source, item: Made, found: str, topic: str) -> Clue:
     return Clue(hint, source.place(item.call), key=f"topic:{source.file}:{item.call.lineno}")
 
 
-@hint_rule(Publishes, Subscribes, priority=8040)
+@hint_rule("publishes", "subscribes", priority=8040)
 def _wrong_type(case: Case) -> Clue | None:
-    check: Publishes | Subscribes = case.check
-    kind = "publisher" if isinstance(check, Publishes) else "subscription"
+    check, kind = case.check, "publisher" if case.speaks else "subscription"
     wrong = student_endpoints(case.trace, kind, check.topic)
     if not wrong or any(e.type == check.type for e in wrong):
         return None
@@ -216,11 +211,10 @@ def _file_with(case: Case, kind: str, topic: str) -> tuple[Source, Made] | None:
     return found[0] if len(found) == 1 else None
 
 
-@hint_rule(BidirectionalGraph, priority=8070)
+@hint_rule(problem=ProblemKind.NO_EDGE, priority=8070)
 def _graph_topic(case: Case) -> Clue | None:
     """A direction is missing from the graph because one file uses another name for its topic."""
-    check: BidirectionalGraph = case.check
-    for topic in (t for t in (check.forward, check.back) if t in case.topics):
+    for topic in case.topics:
         for kind in ("publisher", "subscription"):
             source, ends = file_for(case, kind, topic), student_endpoints(case.trace, kind)
             if any(e.topic == topic for e in ends):
@@ -235,10 +229,9 @@ def _graph_topic(case: Case) -> Clue | None:
 @hint_rule(priority=8080)
 def _no_subscription(case: Case) -> Clue | None:
     """One of two directions is not implemented."""
-    check = case.check
     topic = unheard_topic(case)
-    if isinstance(check, BidirectionalGraph):
-        topic = next((t for t in (check.back, check.forward) if t in case.topics), "")
+    if case.is_about(ProblemKind.NO_EDGE):
+        topic = next(reversed(case.topics), "")
         there = student_endpoints(case.trace, "subscription", topic)
         topic = "" if there else topic
     source = file_for(case, "subscription", topic)
@@ -383,10 +376,10 @@ def _not_spun(unseen: _Unseen) -> Clue | None:
     return Clue(f"{hint} is ever called", source.place(node))
 
 
-@hint_rule(LogsReceived, priority=8160)
+@hint_rule("logs_received", priority=8160)
 def _no_number_heard(case: Case) -> Clue | None:
     """A subscription has a type without a number."""
-    check: LogsReceived = case.check
+    check = case.check
     types = {e.type for e in student_endpoints(case.trace, "subscription", check.topic)}
     item = made_for(case.source, "subscription", check.topic)
     if item is None or len(types) != 1 or carries_number(next(iter(types))):

@@ -5,12 +5,11 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import ProblemKind
 from grader.core.trace import Message
-from grader.judging.checks.fields import FieldFunction, RandomInRange
-from grader.judging.checks.topics import FieldValues
 from grader.judging.diagnosis.rules import Case, Clue, hint_rule
 from grader.judging.diagnosis.wiring import (
     Constant,
@@ -57,7 +56,7 @@ class _Wrong:
 
 
 def _wrong(case: Case) -> _Wrong | None:
-    check: FieldValues = case.check
+    check = case.check
     for message in published(case.trace, check.topic):
         got = {path: as_number(value_at(message.value, path)) for path in check.values}
         wrong = {p: g for p, g in got.items() if g is not None and not _is(g, check.values[p])}
@@ -110,7 +109,7 @@ def draws(source: Source) -> list[ast.Call]:
     return list(source.calls(*_DRAWS))
 
 
-@hint_rule(FieldValues, given=_wrong, priority=10010)
+@hint_rule("field_values", given=_wrong, priority=10010)
 def _set_elsewhere(wrong: _Wrong) -> Clue | None:
     """The field gets the right number, in an object that is not published or is replaced before."""
     source = wrong.source
@@ -167,7 +166,7 @@ def _used(source: Source, owner: str, begin: ast.AST, end: ast.AST) -> bool:
     return any(chain(n) == owner and first_line(n) in rows for n in source.names())
 
 
-@hint_rule(FieldValues, given=_wrong, priority=10020)
+@hint_rule("field_values", given=_wrong, priority=10020)
 def _misplaced_field(wrong: _Wrong) -> Clue | None:
     """The right numbers are in the wrong fields."""
     numbers = leaves(wrong.message.value)
@@ -197,16 +196,16 @@ def _exchanged(case: Case, path: str, other: str, value: float) -> bool:
     """Return whether the value in one field is the one expected in the other."""
     return any(
         other in check.values and _is(check.values[other], value)
-        for check in case.siblings
-        if isinstance(check, FieldValues) and path not in check.values
+        for check in case.asked("field_values")
+        if path not in check.values
     ) or _is(case.check.values.get(other, math.nan), value)
 
 
-@hint_rule(FieldValues, given=_wrong, priority=10030)
+@hint_rule("field_values", given=_wrong, priority=10030)
 def _strayed_value(wrong: _Wrong) -> Clue | None:
     """A field that must be zero holds the value expected in another field."""
     numbers = leaves(wrong.message.value)
-    others = {p: v for check in wrong.case.siblings if isinstance(check, FieldValues) for p, v in check.values.items()}
+    others = {p: v for check in wrong.case.asked("field_values") for p, v in check.values.items()}
     for path, value in wrong.found.items():
         homes = [p for p, v in others.items() if _is(v, value) and p in numbers and not _is(numbers[p], v)]
         places = [g for g in _given_values(wrong.source, path) if g.worth is not None and _is(g.worth.value, value)]
@@ -216,7 +215,7 @@ def _strayed_value(wrong: _Wrong) -> Clue | None:
     return None
 
 
-@hint_rule(FieldValues, given=_wrong, priority=10040)
+@hint_rule("field_values", given=_wrong, priority=10040)
 def _not_every_message(wrong: _Wrong) -> Clue | None:
     """The field gets the right number, but not in every message."""
     source = wrong.source
@@ -244,7 +243,7 @@ def _not_every_message(wrong: _Wrong) -> Clue | None:
     return None
 
 
-@hint_rule(FieldValues, given=_wrong, priority=10050)
+@hint_rule("field_values", given=_wrong, priority=10050)
 def _not_assigned(wrong: _Wrong) -> Clue | None:
     """`msg.linear.x == 0.5` compares, and `msg.linear.x: 0.5` is a note on the type: neither sets the field."""
     source = wrong.source
@@ -261,7 +260,7 @@ def _not_assigned(wrong: _Wrong) -> Clue | None:
     return None
 
 
-@hint_rule(FieldValues, given=_wrong, priority=10060)
+@hint_rule("field_values", given=_wrong, priority=10060)
 def _field_never_set(wrong: _Wrong) -> Clue | None:
     """A required field is never set."""
     for path, value in wrong.found.items():
@@ -286,7 +285,7 @@ def _touched(source: Source, path: str) -> bool:
     return wholes or aliases or keywords or bool(list(source.calls("setattr", "deepcopy", "copy")))
 
 
-@hint_rule(FieldValues, given=_wrong, priority=10070)
+@hint_rule("field_values", given=_wrong, priority=10070)
 def _wrong_number(wrong: _Wrong) -> Clue | None:
     """The only assignment of the field gives another number."""
     # first the field that should hold a value, then those that should be zero
@@ -320,7 +319,7 @@ def _number_clue(source: Source, got: _Given, path: str, value: float, want: flo
     return Clue(hint, source.place(place))
 
 
-@hint_rule(FieldFunction, priority=10080)
+@hint_rule("field_function", priority=10080)
 def _set_after_publishing(case: Case) -> Clue | None:
     """The field is set after the message was published."""
     source, values = case.source, _first_values(case)
@@ -345,7 +344,7 @@ def _publishes(call: ast.Call, name: str) -> bool:
     return bool(name) and any(chain(argument) == name for argument in call.args)
 
 
-@hint_rule(FieldFunction, problem=ProblemKind.WRONG_VALUE, priority=10090)
+@hint_rule("field_function", problem=ProblemKind.WRONG_VALUE, priority=10090)
 def _in_degrees(case: Case) -> Clue | None:
     """The argument of a sine is turned into degrees."""
     source = case.source
@@ -359,7 +358,7 @@ def _in_degrees(case: Case) -> Clue | None:
     return Clue(hint, source.place(turned[0]))
 
 
-@hint_rule(FieldFunction, priority=10100)
+@hint_rule("field_function", priority=10100)
 def _other_function(case: Case) -> Clue | None:
     """`cos` for `sin`, or a division that rounds down."""
     source, formula = case.source, str(case.check.formula)
@@ -377,7 +376,7 @@ def _other_function(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule(FieldFunction, priority=10110)
+@hint_rule("field_function", priority=10110)
 def _counter_reset(case: Case) -> Clue | None:
     """The counter is set to its first value before each message."""
     source = case.source
@@ -393,7 +392,7 @@ def _counter_reset(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule(FieldFunction, priority=10120)
+@hint_rule("field_function", priority=10120)
 def _counts_sometimes(case: Case) -> Clue | None:
     """The counter grows only on a condition, or `=+ 1` gives it the same number again and again."""
     source = case.source
@@ -422,7 +421,7 @@ def _publishes_beside(source: Source, test: ast.If) -> bool:
     return bool(sends) and not any(test in list(source.around(c, ast.If)) for c in sends)
 
 
-@hint_rule(FieldFunction, problem=ProblemKind.WRONG_VALUE, priority=10130)
+@hint_rule("field_function", problem=ProblemKind.WRONG_VALUE, priority=10130)
 def _needless_pi(case: Case) -> Clue | None:
     """The value is computed with pi, which the formula does not have."""
     formula = str(case.check.formula)
@@ -435,7 +434,7 @@ def _needless_pi(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule(FieldFunction, priority=10140)
+@hint_rule("field_function", priority=10140)
 def _counter_never_changes(case: Case) -> Clue | None:
     """The counter never changes."""
     values = _first_values(case)
@@ -447,7 +446,7 @@ def _counter_never_changes(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule(FieldFunction, problem=ProblemKind.COUNT_START, priority=10150)
+@hint_rule("field_function", problem=ProblemKind.COUNT_START, priority=10150)
 def _count_starts_elsewhere(case: Case) -> Clue | None:
     """The count starts at another number than 0, or is incremented before its use."""
     source, problem = case.source, case.verdict.problem
@@ -493,7 +492,7 @@ def _attributes(value: ast.expr) -> Iterator[str]:
             yield chain(node)
 
 
-@hint_rule(RandomInRange, problem=ProblemKind.NO_NUMBER, priority=10160)
+@hint_rule("random_in_range", problem=ProblemKind.NO_NUMBER, priority=10160)
 def _drawn_as_text(case: Case) -> Clue | None:
     """The type of the messages has no number."""
     item = made_for(case.source, "publisher", case.check.topic)
@@ -503,7 +502,7 @@ def _drawn_as_text(case: Case) -> Clue | None:
     return Clue(hint, case.source.place(item.call), key=f"apart:{case.check.topic}")
 
 
-@hint_rule(RandomInRange, priority=10170)
+@hint_rule("random_in_range", priority=10170)
 def _draw_limits(case: Case) -> Clue | None:
     """The limits of the random draw are wrong."""
     source, check = case.source, case.check
@@ -525,7 +524,7 @@ def _draw_limits(case: Case) -> Clue | None:
     return _scaled_draw(source, check, call)
 
 
-def _scaled_draw(source: Source, check: RandomInRange, call: ast.Call) -> Clue | None:
+def _scaled_draw(source: Source, check: Any, call: ast.Call) -> Clue | None:
     """`random.random() * 10`: a draw from 0 to 1, scaled to other limits."""
     whole: ast.AST = call
     while isinstance(source.parents.get(whole), ast.BinOp):
@@ -557,7 +556,7 @@ def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: in
     return left * right if isinstance(node.op, ast.Mult) else None
 
 
-@hint_rule(RandomInRange, priority=10180)
+@hint_rule("random_in_range", priority=10180)
 def _drawn_and_lost(case: Case) -> Clue | None:
     """The drawn number is put into a variable that is not used."""
     source, calls = case.source, draws(case.source)
@@ -572,7 +571,7 @@ def _drawn_and_lost(case: Case) -> Clue | None:
     return Clue(hint, source.place(calls[0]))
 
 
-@hint_rule(RandomInRange, priority=10190)
+@hint_rule("random_in_range", priority=10190)
 def _shifted_draw(case: Case) -> Clue | None:
     """Something is added to a draw between the right limits."""
     source, check, calls = case.source, case.check, draws(case.source)
@@ -593,7 +592,7 @@ def _shifted_draw(case: Case) -> Clue | None:
     return Clue(f"{hint}{source.code(calls[0], 50)} alone", source.place(around))
 
 
-@hint_rule(RandomInRange, problem=ProblemKind.CONSTANT, priority=10200)
+@hint_rule("random_in_range", problem=ProblemKind.CONSTANT, priority=10200)
 def _drawn_once(case: Case) -> Clue | None:
     """The value is drawn only once at the start, or the seed is set each time."""
     source = case.source
@@ -613,7 +612,7 @@ def _drawn_once(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule(RandomInRange, priority=10210)
+@hint_rule("random_in_range", priority=10210)
 def _not_drawn(case: Case) -> Clue | None:
     """The file draws no random numbers."""
     source, check = case.source, case.check

@@ -33,7 +33,7 @@ def wrong_field(program: Program) -> Iterator[Mutation]:
 
 
 def wrong_part(program: Program) -> Iterator[Mutation]:
-    """The speed instead of the position."""
+    """The twist of a message instead of its pose."""
     for node in program.all(cst.Attribute):
         text = program.code(node)
         for ending, other in _LONGER.items():

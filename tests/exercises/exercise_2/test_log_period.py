@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tracing import position_logs
+from tracing import Recording, position_logs
 
 from grader.core.errors import HarnessError
 from grader.core.quantities import NS_PER_S
@@ -61,6 +61,21 @@ def test_credit_never_falls_as_the_tolerance_grows(period: float, a: float, b: f
     trace = position_logs(plain, times).trace()
     narrow, wide = (LOG_PERIOD("odom_subscriber.py", "/odom", NS_PER_S, t).judge(trace).credit for t in sorted((a, b)))
     assert narrow <= wide
+
+
+def test_numbers_of_other_messages_have_a_period_too() -> None:
+    """A rubric about another topic may use this check; its chart does not speak of positions."""
+    rec = (
+        Recording(12.0, process="listener.py").mark(2.0, "stream_starts", "/level").mark(12.0, "stream_stops", "/level")
+    )
+    for k in range(100):
+        rec.deliver(2.0 + k / 10, "/level", {"data": 0.5 + k})
+    for k in range(10):
+        rec.log(2.5 + k, f"level {k}")
+    check, trace = LOG_PERIOD("listener.py", "/level", NS_PER_S), rec.trace()
+    assert check.judge(trace).credit == 1
+    assert check.drawing(trace).title == "When numbers were logged"
+    assert PERIOD.drawing(position_logs(plain).trace()).title == "When positions were logged"
 
 
 def test_a_recording_in_which_nothing_was_played_cannot_be_judged() -> None:
