@@ -21,8 +21,8 @@ from .faults import Describer, report_threads
 from .link import Link, Log
 from .outside import install_alarms, install_processes
 from .quick_imports import import_without_needless
-from .replaced import rename
-from .shadows import Around
+from .replaced import guard_methods, rename_functions
+from .shadows import ROS_PARTS, Around
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
@@ -62,6 +62,7 @@ class Host:
             if not hidden:
                 import_without_needless("rosidl_generator_py")
             self.time.install_ros()
+            guard_methods(ROS_PARTS)
         self.has_ros = True
 
 
@@ -112,7 +113,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
         install_processes(functools.partial(watchdog.give_up_outside, "process"))
         time.give_up_outside = watchdog.give_up_outside
         Watch(link, request["root"]).install()
-    rename()
+    rename_functions()
     home = os.environ.get("HOME", "")
     kept = tuple(os.path.join(home, name) for name in ("log", ".cache", ".config"))
     written = Written((request["root"], os.getcwd(), home), kept)
