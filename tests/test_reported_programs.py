@@ -28,13 +28,13 @@ HINTS = {
     "stale_odometry.py": (
         "odom_subscriber.py",
         "time.sleep(1.0)",
-        "time.sleep(1.0) in the callback makes messages wait in the queue: take it out",
+        "time.sleep(1.0) in the callback makes messages wait in the queue: remove it",
     ),
     "stale_odometry_spin_once.py": (
         "odom_subscriber.py",
         "time.sleep(1.0)",
-        "rclpy.spin_once(node, timeout_sec=0.1) takes one message, and time.sleep(1.0) lets others wait: "
-        "spin all the time and log from a timer",
+        "rclpy.spin_once(node, timeout_sec=0.1) takes one message, and time.sleep(1.0) makes others wait: "
+        "spin continuously and log from a timer",
     ),
     "spin_once_blocks.py": (
         "velocity_publisher.py",

@@ -12,7 +12,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Check
-from grader.core.quantities import NS_PER_MS, SLACK, FieldNumber, Pattern, within
+from grader.core.quantities import NS_PER_MS, FieldNumber, Pattern, within
 from grader.core.trace import ClockKind, Delivery, Endpoint, Message, Trace
 from grader.judging.wording import number, quote
 
@@ -230,6 +230,11 @@ _LONGEST = 2_000
 _YES_OR_NO = MappingProxyType({"yes": True, "no": False})
 
 
+def _slack(value: object, edge: float) -> float:
+    """Return how far a number may be beyond an edge of its range: as far as single precision rounds a fraction."""
+    return 0.0 if isinstance(value, int) else max(EXACT, abs(edge) * 2.0**-24)
+
+
 def equals(got: float, want: float, tolerance: float) -> bool:
     """Return whether a field has a value within a tolerance; infinities and NaN equal only themselves."""
     if math.isfinite(want):
@@ -282,9 +287,9 @@ class FieldRule:
         got = as_number(value)
         if got is None or math.isnan(got):
             return False
-        low = -math.inf if self.low is None else self.low
-        high = math.inf if self.high is None else self.high
-        return low - SLACK * max(1.0, abs(low)) <= got <= high + SLACK * max(1.0, abs(high))
+        low = -math.inf if self.low is None else self.low - _slack(value, self.low)
+        high = math.inf if self.high is None else self.high + _slack(value, self.high)
+        return low <= got <= high
 
     def _of_form(self, value: object) -> bool:
         if self.pattern is None:

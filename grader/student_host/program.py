@@ -21,6 +21,7 @@ from .faults import Describer, report_threads
 from .link import Link, Log
 from .outside import install_alarms, install_processes
 from .quick_imports import import_without_needless
+from .replaced import rename
 from .shadows import Around
 from .virtual import VirtualTime
 from .watch import Watch
@@ -111,6 +112,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:
         install_processes(functools.partial(watchdog.give_up_outside, "process"))
         time.give_up_outside = watchdog.give_up_outside
         Watch(link, request["root"]).install()
+    rename()
     home = os.environ.get("HOME", "")
     kept = tuple(os.path.join(home, name) for name in ("log", ".cache", ".config"))
     written = Written((request["root"], os.getcwd(), home), kept)

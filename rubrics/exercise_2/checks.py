@@ -848,9 +848,9 @@ class _Variant:
 _SIGN_HINT = "log the position as it is, without a change of sign"
 _VARIANTS = (
     _Variant("swapped", Y, X, "x and y are swapped", _SWAP_HINT),
-    _Variant("sign", X, Y, "the sign of x is the wrong way round", _SIGN_HINT, (-1, 1)),
-    _Variant("sign", X, Y, "the sign of y is the wrong way round", _SIGN_HINT, (1, -1)),
-    _Variant("sign", X, Y, "the signs of x and y are the wrong way round", _SIGN_HINT, (-1, -1)),
+    _Variant("sign", X, Y, "the sign of x is inverted", _SIGN_HINT, (-1, 1)),
+    _Variant("sign", X, Y, "the sign of y is inverted", _SIGN_HINT, (1, -1)),
+    _Variant("sign", X, Y, "the signs of x and y are inverted", _SIGN_HINT, (-1, -1)),
     _Variant("sign", X, Y, "x and y have lost their signs", _SIGN_HINT, absolute=True),
     _Variant("twist", f"{_TWIST}.x", f"{_TWIST}.y", "the logged values are the linear velocity (twist), not the pose"),
     _Variant("twist", f"{_TWIST}.x", _TURN, "the logged values are the velocities (twist), not the pose"),
@@ -894,8 +894,8 @@ def _few(analysis: Analysis) -> Cause | None:
     if not times or analysis.wrong:
         return None
     first = moment(min(times))
-    found = f"the position is logged once only, at {first}" if len(times) == 1 else f"only {len(times)} position logs"
-    hint = "log again and again: from a timer or a throttled callback"
+    found = f"the position is logged only once, at {first}" if len(times) == 1 else f"only {len(times)} position logs"
+    hint = "log repeatedly: from a timer or a throttled callback"
     return Cause("few", f"{found}, expected one every second", hint)
 
 

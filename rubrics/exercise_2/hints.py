@@ -95,7 +95,7 @@ def _swapped_axes(case: Case) -> Clue | None:
     call = log_call(case)
     if call is None or _order_in(call)[:2] != ["y", "x"]:
         return None
-    return Clue(f"y stands before x in {source.code(call, 60)}", source.place(call))
+    return Clue(f"y comes before x in {source.code(call, 60)}", source.place(call))
 
 
 def _axis(name: str) -> str:
@@ -135,7 +135,7 @@ def _no_sign(case: Case) -> Clue | None:
     near = [c for c in calls if source.function_of(c) is function or "pos" in source.code(c)]
     if not near:
         return None
-    return Clue(f"{source.code(near[0])} takes the sign away: log the number as it is", source.place(near[0]))
+    return Clue(f"{source.code(near[0])} drops the sign: log the number as it is", source.place(near[0]))
 
 
 @_position_rule("no_y", "no_x", "only_x", "only_y", priority=12040)
@@ -145,7 +145,7 @@ def _wrong_axis(case: Case) -> Clue | None:
     missing = "y" if cause in ("no_y", "only_x") else "x"
     if cause in ("no_y", "no_x"):
         reads = [n for n in source.all(ast.Attribute) if n.attr == "z" and isinstance(n.ctx, ast.Load)]
-        hint = f"{source.code(reads[0], 50)} is the height: {missing} of the position is asked for" if reads else ""
+        hint = f"{source.code(reads[0], 50)} is the height: log {missing} of the position" if reads else ""
         return Clue(hint, source.place(reads[0])) if len(reads) == 1 else None
     call = log_call(case)
     if call is None:
@@ -172,7 +172,7 @@ def _rounded_away(case: Case) -> Clue | None:
     for call in source.calls("round"):
         places = number_in_code(source, argument(call, 1, "ndigits"))
         if places is not None and places < 0:
-            hint = f"{source.code(call)} leaves tens of metres: keep a decimal or two"
+            hint = f"{source.code(call)} rounds to tens of metres: keep a decimal or two"
             return Clue(hint, source.place(call))
     return None
 
@@ -188,7 +188,7 @@ def _thrown_away(case: Case) -> Clue | None:
         fresh = isinstance(statement.value, ast.Call) and last_name(statement.value.func) in message_classes(source)
         kept = any(source.function_of(n) in callbacks for n in source.stores(name))
         if function is not None and source.function_of(statement) is function and fresh and kept:
-            hint = f"{source.code(statement)} throws away what came: take it out"
+            hint = f"{source.code(statement)} discards the received message: remove it"
             return Clue(hint, source.place(statement))
     return None
 
@@ -203,7 +203,7 @@ def _never_stored(case: Case) -> Clue | None:
             lost = [n for n in names if source.stores(f"self.{n.id}")]
             if lost:
                 first = min(lost, key=first_line)
-                hint = f"{first.id} is a variable of the callback only: assign to self.{first.id}"
+                hint = f"{first.id} is local to the callback: assign to self.{first.id}"
                 return Clue(hint, source.place(first))
     return None
 
@@ -235,7 +235,7 @@ def _old_messages(case: Case) -> Clue | None:
     for item in made(source, "subscription"):
         for node in runs(source, item):
             if isinstance(node, ast.Call) and source.resolved(node.func) in ("time.sleep", "sleep"):
-                hint = f"{source.code(node)} in the callback makes messages wait in the queue: take it out"
+                hint = f"{source.code(node)} in the callback makes messages wait in the queue: remove it"
                 return Clue(hint, source.place(node), key="old_messages")
     return _one_at_a_time(source)
 
@@ -247,8 +247,8 @@ def _one_at_a_time(source: Source) -> Clue | None:
         inside = list(reached(source, [loop])) if loop is not None else []
         sleeps = [n for n in inside if isinstance(n, ast.Call) and source.resolved(n.func) in ("time.sleep", "sleep")]
         if sleeps:
-            hint = f"{source.code(call)} takes one message, and {source.code(sleeps[0])} lets others wait: "
-            return Clue(f"{hint}spin all the time and log from a timer", source.place(sleeps[0]), key="old_messages")
+            hint = f"{source.code(call)} takes one message, and {source.code(sleeps[0])} makes others wait: "
+            return Clue(f"{hint}spin continuously and log from a timer", source.place(sleeps[0]), key="old_messages")
     return None
 
 
@@ -257,8 +257,8 @@ def _oldest_taken(source: Source) -> Clue | None:
     for call in source.calls("pop", "popleft"):
         first = last_name(call.func) == "popleft" or (len(call.args) == 1 and number_in_code(source, call.args[0]) == 0)
         if first and isinstance(call.func, ast.Attribute) and any(source.calls("append")):
-            hint = f"{source.code(call, 50)} takes the oldest of what is stored, and more comes than is taken"
-            return Clue(f"{hint}: keep the newest only", source.place(call))
+            hint = f"{source.code(call, 50)} takes the oldest stored message, and more arrive than are taken"
+            return Clue(f"{hint}: keep only the newest", source.place(call))
     return None
 
 

@@ -252,7 +252,7 @@ class CallKind(str, Enum):
 
 _SAID = {
     CallKind.FAILED: "a response without success",
-    CallKind.UNREADABLE: "an answer without a number",
+    CallKind.UNREADABLE: "a response without a number",
     CallKind.UNANSWERED: "a request that got no response",
 }
 _CASES = {
@@ -482,7 +482,7 @@ class _Decides:
 
     def _nothing_of_its_own(self, words: _Words) -> str:
         """Return a clause: the client writes nothing that only follows numbers above the threshold."""
-        text = f"it writes the same after numbers above {number(self.threshold)} as after others"
+        text = f"its output after numbers above {number(self.threshold)} is the same as after others"
         if words.shared is None:
             return text
         output, value = words.shared
@@ -490,7 +490,7 @@ class _Decides:
 
     def _unshown(self, reason: str, evidence: dict[str, object]) -> Finding:
         """Return no credit for a client that does not show whether it goes on."""
-        hint = "log that it goes on, in the branch for numbers above the limit only"
+        hint = "log that it goes on, but only in the branch for numbers above the limit"
         return not_met(reason, evidence, hint=hint, blocked_by="reacts_to_responses", problem=ProblemKind.WRONG_ANSWER)
 
     def _not_reached(self, trace: Trace, episodes: Sequence[Episode]) -> Finding:
@@ -500,25 +500,25 @@ class _Decides:
             HarnessError: Neither is true, so the server sent no such response.
         """
         if not episodes:
-            crashed = explain_fault(trace, f"it had not asked {self.service} by then", process=self.process)
+            crashed = explain_fault(trace, f"it had not called {self.service} by then", process=self.process)
             return crashed or waiting_for("service_calls", explain_no_client(trace, self.service))
         last = episodes[-1]
-        asked = f"{self.service}: {self.process} asked {counted(len(episodes), 'time')}"
-        effect = f"{asked} and got no answer of the kind that is judged here"
+        asked = f"{self.service}: {self.process} called it {counted(len(episodes), 'time')}"
+        effect = f"{asked} and got no response that this criterion judges"
         if crashed := explain_fault(trace, effect, process=self.process):
             return crashed
         ended = trace.marks("exited", self.process)
         stopped = trace.stop_ns - last.start_ns > _ASKS_AGAIN_NS
         if ended or stopped or last.kind is CallKind.UNANSWERED:
             waits = last.kind is CallKind.UNANSWERED
-            why = "waits for a response that is never sent" if waits else "then stopped asking"
+            why = "waits for a response that is never sent" if waits else "then made no more calls"
             why = f"ended at {moment(ended[0].t_ns)}" if ended else why
             return not_met(
-                f"{asked} and {why}; it got no answer of the kind that is judged here",
+                f"{asked} and {why}; it got no response that this criterion judges",
                 blocked_by="service_calls",
                 problem=ProblemKind.ENDED if ended else ProblemKind.STOPPED,
             )
-        raise HarnessError(f"{self.service}: no answer of the kind that is judged here was sent")
+        raise HarnessError(f"{self.service}: no response that this criterion judges was sent")
 
     def drawing(self, trace: Trace) -> Drawing:
         """Return the numbers that came with the threshold, the kind of each response, and what the client wrote."""
@@ -695,7 +695,7 @@ class NoGoWithoutAnswer(_Decides):
 
     @property
     def expected(self) -> str:
-        return f"{self.process} does not go on where {self.service} gives no answer, no success or no number"
+        return f"{self.process} does not go on unless {self.service} responds with success and a number"
 
     def judge(self, trace: Trace) -> Finding:
         episodes = self.episodes(trace)
@@ -715,7 +715,7 @@ class NoGoWithoutAnswer(_Decides):
             found = [o for o in going.outputs(episode) if not self._due(o, episode, episodes, going)]
             if found:
                 return self._went_on(episode, found[0], evidence)
-        reason = f"{self.process}: does not go on after {counted(len(useless), 'useless answer')}"
+        reason = f"{self.process}: does not go on after any of {counted(len(useless), 'unusable response')}"
         reason += f" ({', '.join(dict.fromkeys(_SAID[e.kind] for e in useless))})"
         fault = first_fault(trace, self.process)
         if fault is not None and fault.t_ns >= useless[0].asked_ns:

@@ -55,5 +55,5 @@ def _unseen_level(case: Case, level: str) -> Clue | None:
     hidden = [c for c in case.source.calls("debug") if is_log(case.source, c)]
     if len(hidden) != 1 or any(case.source.calls("set_level", "set_logger_level")):
         return None
-    hint = f"{case.source.code(hidden[0], 60)} is not shown: the level is INFO unless it is changed; use {level}"
+    hint = f"{case.source.code(hidden[0], 60)} is not shown, because the default level is INFO: use {level}"
     return Clue(hint, case.source.place(hidden[0]))

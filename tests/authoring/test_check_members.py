@@ -167,12 +167,12 @@ CHECKS = {"asks": Asks}
 @pytest.mark.parametrize(
     ("role", "kind", "line", "said"),
     [
-        ("calls", "client", 'self.create_client(Trigger, "/fil")', "asks /fil: the service asked for is /fill"),
+        ("calls", "client", 'self.create_client(Trigger, "/fil")', "asks /fil: the task asks for /fill"),
         (
             "serves",
             "service",
             'self.create_service(Trigger, "/fil", self.fill)',
-            "offers /fil: the service asked for is /fill",
+            "offers /fil: the task asks for /fill",
         ),
     ],
 )

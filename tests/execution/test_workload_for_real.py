@@ -45,7 +45,7 @@ WAITS = {
     ),
     "spawn": (
         "",
-        "from multiprocessing import get_context\np = get_context('spawn').Process(target=print)\np.start()",
+        "import multiprocessing as m\nm.get_context('spawn').Process(target=time.sleep, args=(.1,)).start()",
     ),
     "forkserver": (
         "",

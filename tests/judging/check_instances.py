@@ -66,7 +66,7 @@ INSTANCES: dict[str, Check] = {
     "lifecycle_states": CHECKS["lifecycle_states"](topic="/cmd_vel"),
     "transform": CHECKS["transform"]("odom", "base_link"),
     "reaches_goal": CHECKS["reaches_goal"]("/odom", "/goal", {"pose.pose.position.x": "x"}, 0.1, 5 * NS_PER_S),
-    "stays_in_range": CHECKS["stays_in_range"]("/temperature", "data", low=0.0, high=40.0),
+    "stays_in_range": CHECKS["stays_in_range"]("/temperature", field="data", low=0.0, high=40.0),
     "source_uses": CHECKS["source_uses"]("velocity_publisher.py", ("rclpy.node.Node",)),
     "source_avoids": CHECKS["source_avoids"]("velocity_publisher.py", ("time.sleep",)),
 }

@@ -90,7 +90,7 @@ def waiting_only(**kw: Any) -> Recording:
 def test_giving_up_is_not_waiting() -> None:
     """By an exception, by ending, or by never asking although the server is there."""
     raised = WAITS.judge(waiting_only().crashed(1.0, "SystemExit: 1").trace())
-    assert "while /battery/get_status was not there" in raised.reason
+    assert "while /battery/get_status was not available" in raised.reason
     assert FAULT_KEY in raised.evidence
     early = Recording(1.0, process=CLIENT).log(0.5, "waiting").crashed(1.0)
     assert FAULT_KEY in WAITS.judge(early.trace()).evidence

@@ -76,7 +76,7 @@ def test_what_the_student_publishes_on_the_topic_is_no_evidence() -> None:
         recording.message(number / 10, "/odom", pose, ODOMETRY)
     trace = recording.trace()
     assert reached(trace).credit == 0
-    assert StaysInRange("/odom", "pose.pose.position.x", high=1.0).judge(trace).credit == 1
+    assert StaysInRange("/odom", field="pose.pose.position.x", high=1.0).judge(trace).credit == 1
 
 
 def test_without_a_goal_that_was_observed_long_enough_nothing_is_decided() -> None:
@@ -85,7 +85,7 @@ def test_without_a_goal_that_was_observed_long_enough_nothing_is_decided() -> No
     with pytest.raises(HarnessError, match=r"no goal was observed for 5\.0 s"):
         reached(recording.trace())
     flooded = drive(lambda _: 0.0, stop_s=3.0).add(Mark(NS_PER_S, "limit", "more than 20,000 messages"))
-    for check in (ReachesGoal("/odom", "/goal", FIELDS, 0.1, NS_PER_S), StaysInRange("/scan", "ranges", low=1.0)):
+    for check in (ReachesGoal("/odom", "/goal", FIELDS, 0.1, NS_PER_S), StaysInRange("/scan", field="ranges", low=1.0)):
         found = check.judge(flooded.trace())
         assert (found.credit, "more than 20,000 messages" in found.reason) == (0, True)
 
@@ -111,20 +111,20 @@ def scan(*ranges: tuple[float, ...]) -> Trace:
 )
 def test_a_list_of_numbers_lies_in_a_range_if_each_of_them_does(ranges: tuple[float, ...], credit: int) -> None:
     """The edge is inside, even after rounding to single precision; NaN is in no range."""
-    assert StaysInRange("/scan", "ranges", low=0.3).judge(scan((2.0, 2.0), ranges)).credit == credit
+    assert StaysInRange("/scan", field="ranges", low=0.3).judge(scan((2.0, 2.0), ranges)).credit == credit
 
 
 def test_what_came_before_a_time_is_not_judged() -> None:
     """So a robot may take its time to arrive."""
     trace = scan((5.0,), (4.0,), (0.4,), (0.4,))
-    assert StaysInRange("/scan", "ranges.0", high=0.5).judge(trace).credit == 0
-    assert StaysInRange("/scan", "ranges[0]", high=0.5, after=2 * NS_PER_S).judge(trace).credit == 1
+    assert StaysInRange("/scan", field="ranges.0", high=0.5).judge(trace).credit == 0
+    assert StaysInRange("/scan", field="ranges[0]", high=0.5, after=2 * NS_PER_S).judge(trace).credit == 1
 
 
 def test_a_field_without_numbers_decides_nothing() -> None:
     """It is the author's mistake."""
     with pytest.raises(HarnessError, match="expected a number at header"):
-        StaysInRange("/scan", "header", low=0.3).judge(scan((1.0,)))
+        StaysInRange("/scan", field="header", low=0.3).judge(scan((1.0,)))
 
 
 def test_charts_show_the_distance_and_the_nearest_range() -> None:
@@ -135,11 +135,11 @@ def test_charts_show_the_distance_and_the_nearest_range() -> None:
     away = chart.panels[-1]
     assert away.levels[0].value == 0.1
     assert away.series[0].points[0] == (0.0, 2.0)
-    nearest = chart_of(StaysInRange("/scan", "ranges", low=0.3), scan((2.0, 1.0), (0.5, math.inf)))
+    nearest = chart_of(StaysInRange("/scan", field="ranges", low=0.3), scan((2.0, 1.0), (0.5, math.inf)))
     assert nearest is not None
     assert nearest.panels[0].series[0].points == ((0.0, 1.0), (1.0, 0.5))
-    assert chart_of(StaysInRange("/odom", "pose.pose.position.x", low=0.3), driven) is not None
-    assert chart_of(StaysInRange("/nothing", "x", low=0.3), driven) is None
+    assert chart_of(StaysInRange("/odom", field="pose.pose.position.x", low=0.3), driven) is not None
+    assert chart_of(StaysInRange("/nothing", field="x", low=0.3), driven) is None
 
 
 def test_on_the_wall_clock_a_moment_is_granted() -> None:

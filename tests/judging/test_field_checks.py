@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from fractions import Fraction
 from typing import Any
 
@@ -54,7 +55,7 @@ def test_fields_of_every_kind_are_compared(change: dict[str, Any], credit: int, 
     ("values", "credit", "said"),
     [
         ([0.0, 0.5, 1.0], 1, "from 0 to 1 in 3 messages, expected 0 to 1"),
-        ([0.0, 1.1, 2.0], 0, "t = 1.100 s, /a: data is 1.1, expected 0 to 1; 2 of 3 values are outside"),
+        ([0.0, 1.1, 2.0], 0, "t = 1.100 s, /a: data is 1.1, expected 0 to 1; outside in 2 of 3 messages"),
         ([-0.1], 0, "data is -0.1"),
         ([math.nan], 0, "data is nan"),
         ([math.inf], 0, "data is inf"),
@@ -68,6 +69,30 @@ def test_a_range_has_its_edges_inside(values: list[Any], credit: int, said: str)
     finding = FieldInRange("/a", 0, 1).judge(sending(values).trace())
     assert finding.credit == credit, finding.reason
     assert said in finding.reason
+
+
+@pytest.mark.parametrize(
+    ("values", "credit", "said"),
+    [
+        ([[0.0, 1.0], [0.5]], 1, "from 0 to 1 in 2 messages"),
+        ([[0.0, 1.0], [0.5, 1.1, 2.0]], 0, "data is 1.1, expected 0 to 1; outside in 1 of 2 messages"),
+        ([[0.5], []], 0, "has no number data"),
+        ([[0.5, "1"]], 0, "has no number data"),
+    ],
+)
+def test_a_list_lies_in_a_range_if_each_number_does(values: list[Any], credit: int, said: str) -> None:
+    """As in the messages of a simulation; an empty list shows nothing."""
+    finding = FieldInRange("/a", 0, 1).judge(sending(values).trace())
+    assert finding.credit == credit, finding.reason
+    assert said in finding.reason
+
+
+def test_an_edge_that_single_precision_has_rounded_is_inside() -> None:
+    """A node that publishes its limit as float32 keeps it."""
+    rounded = struct.unpack("f", struct.pack("f", 0.1))[0]
+    assert rounded > 0.1
+    assert FieldInRange("/a", 0, 0.1).judge(sending([rounded]).trace()).credit == 1
+    assert FieldInRange("/a", 0, 0.1).judge(sending([0.1001]).trace()).credit == 0
 
 
 @pytest.mark.parametrize(

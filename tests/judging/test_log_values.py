@@ -90,7 +90,7 @@ WRONG: dict[str, tuple[Callable[[float], str], str]] = {
     "ten times": (lambda a: f"{a:.3f} rad ({math.degrees(a) * 10:.1f})", "instead there is 572.9"),
     "whole radians": (lambda a: f"{int(a)} rad ({math.degrees(a):.1f})", "whole number"),
     "absolute": (lambda a: f"{abs(a):.3f} rad ({abs(math.degrees(a)):.1f})", "sign is lost"),
-    "negative": (lambda a: f"{-a:.3f} rad ({-math.degrees(a):.1f})", "the other sign"),
+    "negative": (lambda a: f"{-a:.3f} rad ({-math.degrees(a):.1f})", "its sign is inverted"),
     "wrapped": (lambda a: f"{a:.3f} rad ({math.degrees(a) % 360:.1f})", "expected -1 and -57.2958"),
     "constant": (lambda a: "got 0.5 rad (28.6)", "expected"),
     "no number": (lambda a: "got a message", "expected"),

@@ -106,7 +106,7 @@ def test_a_log_of_the_fields_at_a_hidden_level_is_named() -> None:
     """The check says which fields; a record about something else is no reason."""
     rec = listening().log(0.5, "started")
     (verdict,) = judged(rec, HIDES, _Declared())
-    assert "is not shown: the level is INFO" in verdict.hint
+    assert "is not shown, because the default level is INFO" in verdict.hint
     (verdict,) = judged(rec, HIDES.replace("msg.data", "msg.other"), _Declared())
     assert "is not shown" not in verdict.hint
 

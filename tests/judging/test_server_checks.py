@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from typing import Any
 
 import pytest
@@ -25,6 +26,11 @@ FORM = FieldRule(pattern=r"Battery: [0-9]+\.[0-9]% remaining", example="Battery:
 AVAILABLE = ServiceAvailable(BATTERY, TRIGGER)
 RESPONSE = ServiceResponse(BATTERY, {"success": True, "message": FORM})
 ALL = ServiceAnswersAll(BATTERY, NS_PER_S)
+
+
+def single(value: float) -> float:
+    """Return a number as a field of type float32 holds it."""
+    return float(struct.unpack("f", struct.pack("f", value))[0])
 
 
 def test_the_chapters_server_meets_everything() -> None:
@@ -141,6 +147,8 @@ def test_what_cannot_have_been_answered_yet_is_left_out() -> None:
         (FieldRule(equals=False), [False], [True, 0, 0.0, ""]),
         (FieldRule(low=1), [1, 2, math.inf], [0.9, math.nan, "2", True]),
         (FieldRule(high=1), [1, -5], [1.1, math.nan]),
+        (FieldRule(low=-0.1, high=0.1), [single(0.1), single(-0.1), 0.1], [0.10001, -0.10001]),
+        (FieldRule(high=1_000_000.8), [single(1_000_000.8), 1_000_000], [1_000_001, 1_000_001.0]),
         (FieldRule(low=0, high=1, pattern="x"), [], [0.5, "x"]),
         (FieldRule(pattern="a+"), ["aa"], ["ab", "", 1, "a" * 3000]),
     ],

@@ -36,7 +36,7 @@ from grader.judging.service_calls import (
 from grader.judging.values import RuleOrValue, breach, broken_rules, rules_text
 from grader.judging.wording import moment, number, quote, span
 
-_WAIT_HINT = "wait in a loop: while not client.wait_for_service(timeout_sec=1.0): log that it is still waited for"
+_WAIT_HINT = "wait in a loop: while not client.wait_for_service(timeout_sec=1.0): log that the node is waiting"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ class CallsOfClient:
         place, gap = wrong
         wanted = f"{span(self.period or 0)} ± {number(seconds(self.tolerance))} s"
         reason = f"{asked}; {seconds(gap):.3f} s from number {place} to number {place + 1}, expected {wanted}"
-        hint = f"wait {span(self.period or 0)} after each answer before asking again"
+        hint = f"wait {span(self.period or 0)} after each response before the next request"
         return not_met(reason, evidence, hint=hint, problem=ProblemKind.WRONG_RATE)
 
     def drawing(self, trace: Trace) -> Drawing:
@@ -127,7 +127,7 @@ class CallsOfClient:
     def _miscounted(self, trace: Trace, calls: Sequence[Call], evidence: dict[str, object]) -> Finding:
         reason = f"{self.service}: {counted(len(calls), 'request')}, expected {self.calls}"
         if len(calls) > self.calls:
-            hint = f"ask {self.calls} times: for i in range({self.calls})"
+            hint = f"call the service {self.calls} times: for i in range({self.calls})"
             return not_met(reason, evidence, hint=hint, problem=ProblemKind.TOO_MANY)
         if crashed := explain_fault(trace, reason, evidence, last=True):
             return crashed
@@ -160,7 +160,7 @@ class WaitsForService:
 
     @property
     def expected(self) -> str:
-        return f"{self.process} waits for {self.service}, logs that it does, and asks once it is there"
+        return f"{self.process} waits for {self.service}, logs that it waits, and calls it once it is available"
 
     def judge(self, trace: Trace) -> Finding:
         starts = trace.marks("server_starts", self.service)
@@ -179,7 +179,7 @@ class WaitsForService:
         """Return the calls with what the client wrote, and the time without a server."""
         starts = trace.marks("server_starts", self.service)
         until_ns = min(starts[0].t_ns if starts else trace.stop_ns, trace.stop_ns)
-        cases = (drawn_case(0, until_ns, f"{self.service} is not there"),)
+        cases = (drawn_case(0, until_ns, f"{self.service} is not available"),)
         panels = []
         if not calls_of(trace, self.service, "student"):
             lanes = Lanes()
@@ -191,7 +191,7 @@ class WaitsForService:
     def _gave_up(self, trace: Trace, appears_ns: int) -> Finding | None:
         """Return a finding if the client ended while waiting, or logged an error; None otherwise."""
         fault = first_fault(trace, self.process)
-        when = f"while {self.service} was not there"
+        when = f"while {self.service} was not available"
         if fault is not None and fault.t_ns < appears_ns:
             hint = fault_hint(fault) or _WAIT_HINT
             return not_met(f"{fault_sentence(fault)}, {when}", {"fault_s": seconds(fault.t_ns)}, hint=hint, fault=fault)
@@ -227,13 +227,15 @@ class WaitsForService:
             "records": len(records),
             "printed_lines": len(lines),
         }
-        waited = f"{self.process}: alive through {span(appears_ns)} without {self.service}, asks at {moment(asked_ns)}"
+        waited = (
+            f"{self.process}: alive through {span(appears_ns)} without {self.service}, calls it at {moment(asked_ns)}"
+        )
         if records:
             return met(
                 f"{waited}; {counted(len(records), 'record')} meanwhile: {quote(records[-1].text, 80)}", evidence
             )
         if lines:
-            return only_printed(f"{waited}; that it waits is printed, not logged", evidence)
+            return only_printed(f"{waited}; it prints that it waits, but does not log it", evidence)
         return not_met(
             f"{waited}, but logs nothing while it waits", evidence, hint=_WAIT_HINT, problem=ProblemKind.NOT_LOGGED
         )

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind, Roles
-from grader.core.quantities import DurationNs, FieldNumber, FieldOf, Topic, counted, seconds
+from grader.core.quantities import DurationNs, FieldOf, Topic, counted, seconds
 from grader.core.trace import Delivery, Trace
+from grader.judging.checks.fields import InRange
 from grader.judging.findings import explain_fault, faulted, first_fault, met, not_met
 from grader.judging.plots import Drawing, Plot, value_panels
-from grader.judging.values import JITTER_NS, FieldRule, as_number, delivered, number_at, value_at
+from grader.judging.values import JITTER_NS, FieldRule, delivered, number_at, value_at
 from grader.judging.wording import moment, number, span
 
 #: Rounding to single precision must not push a value out of its range.
 _EDGE = 1e-6
-#: Names of what is drawn: the distance from a goal, and the extremes of a list with the edge that each may cross.
+#: The name of what is drawn of a goal.
 _AWAY = "distance"
-_EXTREMES: tuple[tuple[str, Callable[[Sequence[float]], float], str], ...] = (
-    ("smallest", min, "low"),
-    ("largest", max, "high"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +128,7 @@ class ReachesGoal:
 
 
 @dataclass(frozen=True, slots=True)
-class StaysInRange:
+class StaysInRange(InRange):
     """A number in every message that the grader publishes on a topic lies in a range, its edges inside.
 
     The topic is one of a simulation's, such as the pose of a robot that the student's node drives. A list of numbers,
@@ -139,78 +136,35 @@ class StaysInRange:
 
     Attributes:
         topic: Topic on which the simulation publishes.
-        field: Path of the number, or of the list of numbers.
         low: Smallest value allowed; none if left out.
         high: Largest value allowed; none if left out.
+        field: Path of the number, or of the list of numbers.
         after: Messages before this time are not judged.
     """
 
     roles: ClassVar[Roles] = Roles(given=("topic",))
-    topic: Topic
-    field: Annotated[str, FieldOf("topic")]
-    low: FieldNumber | None = None
-    high: FieldNumber | None = None
     after: DurationNs = 0
-
-    @property
-    def _rule(self) -> FieldRule:
-        low, high = (None if edge is None else edge + slack for edge, slack in ((self.low, -_EDGE), (self.high, _EDGE)))
-        return FieldRule(low=low, high=high)
-
-    @property
-    def _wanted(self) -> str:
-        return FieldRule(low=self.low, high=self.high).wanted
 
     @property
     def expected(self) -> str:
         after = f" from {span(self.after)} on" if self.after else ""
-        return f"{self.field} on {self.topic} {self._wanted}{after}"
+        return f"{self.field} on {self.topic} {self.rule.wanted}{after}"
 
     def judge(self, trace: Trace) -> Finding:
         states = self._states(trace)
         if not states:
             after = f" after {span(self.after)}" if self.after else ""
             return _cut_short(trace, f"{self.topic}: the simulation published nothing{after}")
-        each = [(state, self._numbers(state)) for state in states]
-        outside = [
-            (state, bad[0]) for state, values in each if (bad := [v for v in values if not self._rule.allows(v)])
-        ]
-        every = [v for _, values in each for v in values]
-        evidence: dict[str, object] = {"messages": len(states), "outside": len(outside)}
-        evidence |= {"min": min(every), "max": max(every)} if every else {}
-        if not outside:
-            seen = f"from {number(min(every))} to {number(max(every))}" if every else "without numbers"
-            reason = f"{self.topic}: {self.field} {seen} in {counted(len(states), 'message')}"
-            return met(f"{reason}, expected {self._wanted}", evidence)
-        state, value = outside[0]
-        reason = f"{moment(state.t_ns)}, {self.topic}: {self.field} is {number(value)}, expected {self._wanted}; "
-        reason += f"outside in {len(outside)} of {counted(len(states), 'message')}"
-        known = evidence | {"first_outside_s": seconds(state.t_ns)}
-        fault = first_fault(trace)
-        if fault is not None and fault.t_ns <= state.t_ns:
-            return faulted(fault, reason, known, last=True)
-        return not_met(reason, known, problem=ProblemKind.WRONG_VALUE)
+        if not all(self.numbers(s.value) or value_at(s.value, self.field) in ([], ()) for s in states):
+            raise HarnessError(f"{self.topic}: expected a number at {self.field}, found none")
+        return self.judged(states, first_fault(trace))
 
     def _states(self, trace: Trace) -> tuple[Delivery, ...]:
         return tuple(d for d in delivered(trace, self.topic) if d.t_ns >= self.after)
 
-    def _numbers(self, state: Delivery) -> list[float]:
-        found = value_at(state.value, self.field)
-        values = [as_number(v) for v in (found if isinstance(found, (list, tuple)) else (found,))]
-        if any(value is None for value in values):
-            raise HarnessError(f"{self.topic}: expected a number at {self.field}, found none")
-        return [value for value in values if value is not None]
-
     def drawing(self, trace: Trace) -> Drawing:
         """Return the number with its range; of a list, the smallest and the largest."""
-        rule = FieldRule(low=self.low, high=self.high)
-        states = self._states(trace)
-        if not any(isinstance(value_at(state.value, self.field), (list, tuple)) for state in states):
-            return Drawing((Plot(self.topic, rules={self.field: rule}),))
-        kept = [(name, pick) for name, pick, edge in _EXTREMES if getattr(self, edge) is not None]
-        ends = [(s.t_ns, {name: pick(values) for name, pick in kept}) for s in states if (values := self._numbers(s))]
-        plot = Plot(self.topic, rules={name: rule for name, _ in kept})
-        return Drawing(panels=tuple(value_panels(plot, ends, f"{self.field} on {self.topic}")))
+        return self.drawn(self._states(trace))
 
 
 def _cut_short(trace: Trace, what: str) -> Finding:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -12,9 +12,9 @@ from grader.core.chart import Band
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern, counted, seconds, within
-from grader.core.trace import Message, Trace
+from grader.core.trace import Delivery, Fault, Message, Trace
 from grader.judging.facts import DrawFacts, SeriesFacts
-from grader.judging.findings import explain_fault, explain_no_message, met, not_met
+from grader.judging.findings import explain_fault, explain_no_message, faulted, met, not_met
 from grader.judging.logs.outputs import number_told
 from grader.judging.plots import Drawing, Plot, value_panels
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
@@ -25,6 +25,7 @@ from grader.judging.values import (
     FieldRule,
     Reading,
     RuleOrValue,
+    as_number,
     as_rule,
     breach,
     broken_rules,
@@ -33,8 +34,15 @@ from grader.judging.values import (
     published_numbers,
     rules_text,
     text_at,
+    value_at,
 )
 from grader.judging.wording import in_unit, moment, number, numbers, quote
+
+#: Names of the extremes of a list, with the edge that each may cross.
+_EXTREMES: tuple[tuple[str, Callable[[Sequence[float]], float], str], ...] = (
+    ("smallest", min, "low"),
+    ("largest", max, "high"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,52 +89,87 @@ class FieldEqual(FewSuffice):
 
 
 @dataclass(frozen=True, slots=True)
-class FieldInRange(FewSuffice):
-    """A number in every message on a topic lies in a range, its edges inside; NaN lies in none.
-
-    Attributes:
-        topic: Topic name as on the wire.
-        low: Smallest value allowed; none if left out.
-        high: Largest value allowed; none if left out.
-        field: Path of the number.
-        at_least: Number of messages needed for a judgement.
-        after_discovery: Whether messages do not count that are sent as soon as the publisher is created, before anybody
-            can have discovered it.
-    """
+class InRange:
+    """A question about numbers that lie in a range."""
 
     topic: str
     low: FieldNumber | None = None
     high: FieldNumber | None = None
     field: Annotated[str, FieldOf("topic")] = "data"
+
+    @property
+    def rule(self) -> FieldRule:
+        """What each number has to keep."""
+        return FieldRule(low=self.low, high=self.high)
+
+    def numbers(self, value: Mapping[str, object]) -> list[float]:
+        """Return the number of a message, or those of a list; none if something else is among them."""
+        found = value_at(value, self.field)
+        read = [as_number(v) for v in (found if isinstance(found, (list, tuple)) else (found,))]
+        return [] if None in read else [v for v in read if v is not None]
+
+    def judged(self, messages: Sequence[Message | Delivery], fault: Fault | None = None) -> Finding:
+        """Judge messages; a fault before the first wrong number is its reason."""
+        each = [(m, self.numbers(m.value)) for m in messages]
+        outside = [(m, bad[0]) for m, values in each if (bad := [v for v in values if not self.rule.allows(v)])]
+        every = [v for _, values in each for v in values]
+        evidence: dict[str, object] = {"messages": len(each), "outside": len(outside)}
+        evidence |= {"min": min(every), "max": max(every)} if every else {}
+        if not outside:
+            seen = f"from {number(min(every))} to {number(max(every))}" if every else "without numbers"
+            reason = f"{self.topic}: {self.field} {seen} in {counted(len(each), 'message')}"
+            return met(f"{reason}, expected {self.rule.wanted}", evidence)
+        message, value = outside[0]
+        reason = f"{moment(message.t_ns)}, {self.topic}: {self.field} is {number(value)}, expected {self.rule.wanted}; "
+        reason += f"outside in {len(outside)} of {counted(len(each), 'message')}"
+        known = evidence | {"first_outside_s": seconds(message.t_ns)}
+        if fault is not None and fault.t_ns <= message.t_ns:
+            return faulted(fault, reason, known, last=True)
+        return not_met(reason, known, problem=ProblemKind.WRONG_VALUE)
+
+    def drawn(self, messages: Sequence[Message | Delivery]) -> Drawing:
+        """Return the number with its range; of a list, the smallest and the largest."""
+        if not any(isinstance(value_at(m.value, self.field), (list, tuple)) for m in messages):
+            return Drawing((Plot(self.topic, rules={self.field: self.rule}),))
+        kept = [(name, pick) for name, pick, edge in _EXTREMES if getattr(self, edge) is not None]
+        ends = [(m.t_ns, {name: pick(v) for name, pick in kept}) for m in messages if (v := self.numbers(m.value))]
+        plot = Plot(self.topic, rules={name: self.rule for name, _ in kept})
+        return Drawing(panels=tuple(value_panels(plot, ends, f"{self.field} on {self.topic}")))
+
+
+@dataclass(frozen=True, slots=True)
+class FieldInRange(FewSuffice, InRange):
+    """A number in every message on a topic lies in a range, its edges inside; NaN lies in none.
+
+    A list of numbers, such as the ranges of a laser scan, lies in the range if each of them does.
+
+    Attributes:
+        topic: Topic name as on the wire.
+        low: Smallest value allowed; none if left out.
+        high: Largest value allowed; none if left out.
+        field: Path of the number, or of the list of numbers.
+        at_least: Number of messages needed for a judgement.
+        after_discovery: Whether messages do not count that are sent as soon as the publisher is created, before anybody
+            can have discovered it.
+    """
+
     at_least: int = 1
     after_discovery: bool = False
 
     @property
     def expected(self) -> str:
-        return f"{self.field} {FieldRule(low=self.low, high=self.high).wanted} in every message on {self.topic}"
+        return f"{self.field} {self.rule.wanted} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
         messages = published(trace, self.topic, self.after_discovery)
         if len(messages) < max(1, self.at_least):
             return too_few_messages(trace, self.topic, len(messages), self.at_least)
-        values = _numbers(messages, self.field)
-        if isinstance(values, Finding):
-            return values
-        rule = FieldRule(low=self.low, high=self.high)
-        outside = [(m, v) for m, v in zip(messages, values, strict=True) if not rule.allows(v)]
-        evidence: dict[str, object] = {"messages": len(values), "outside": len(outside)}
-        evidence |= {"min": min(values), "max": max(values)}
-        if not outside:
-            reason = f"{self.topic}: {self.field} from {number(min(values))} to {number(max(values))} in "
-            return met(f"{reason}{counted(len(values), 'message')}, expected {rule.wanted}", evidence)
-        message, value = outside[0]
-        reason = f"{moment(message.t_ns)}, {self.topic}: {self.field} is {number(value)}, expected {rule.wanted}; "
-        reason += f"{len(outside)} of {counted(len(values), 'value')} are outside"
-        return not_met(reason, evidence | {"first_outside_s": seconds(message.t_ns)}, problem=ProblemKind.WRONG_VALUE)
+        bare = next((m for m in messages if not self.numbers(m.value)), None)
+        return self.judged(messages) if bare is None else _no_number(bare, self.field)
 
-    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
-        """Return the number with its range."""
-        return Drawing((Plot(self.topic, rules={self.field: FieldRule(low=self.low, high=self.high)}),))
+    def drawing(self, trace: Trace) -> Drawing:
+        """Return the number with its range; of a list, the smallest and the largest."""
+        return self.drawn(published(trace, self.topic, self.after_discovery))
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,8 +236,12 @@ def _numbers(messages: Sequence[Message], path: str, pattern: str | None = None)
     if pattern is not None and text is not None:
         reason = f"{moment(bare.t_ns)}, {bare.topic}: no number where expected in {path}, {quote(text, 60)!r}"
         return not_met(reason, {"topic": bare.topic, "text": text[:200]}, problem=ProblemKind.NO_NUMBER)
-    reason = f"{moment(bare.t_ns)}, {bare.topic}: {quote(bare.type)} has no number {path}"
-    return not_met(reason, {"topic": bare.topic, "type": bare.type}, problem=ProblemKind.NO_FIELD)
+    return _no_number(bare, path)
+
+
+def _no_number(message: Message, path: str) -> Finding:
+    reason = f"{moment(message.t_ns)}, {message.topic}: {quote(message.type)} has no number {path}"
+    return not_met(reason, {"topic": message.topic, "type": message.type}, problem=ProblemKind.NO_FIELD)
 
 
 def _number(message: Message, path: str, pattern: str | None) -> float | None:

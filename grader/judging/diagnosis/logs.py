@@ -187,7 +187,7 @@ def _received_at_debug(case: Case) -> Clue | None:
     logs = [n for n in inside if isinstance(n, ast.Call) and is_log(case.source, n)]
     if not logs or any(last_name(c.func) != "debug" for c in logs) or any(case.source.calls("set_level")):
         return None
-    hint = f"{case.source.code(logs[0], 60)} is not shown: the level is INFO unless it is changed; use info"
+    hint = f"{case.source.code(logs[0], 60)} is not shown, because the default level is INFO: use info"
     return Clue(hint, case.source.place(logs[0]))
 
 
@@ -209,7 +209,7 @@ def _debug_only(case: Case) -> Clue | None:
         return None
     if not logs or any(last_name(c.func) != "debug" for c in logs):
         return None
-    hint = f"{case.source.code(logs[0], 60)} is not shown: the level is INFO unless it is changed; use info"
+    hint = f"{case.source.code(logs[0], 60)} is not shown, because the default level is INFO: use info"
     return Clue(hint, case.source.place(logs[0]))
 
 

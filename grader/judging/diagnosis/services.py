@@ -73,7 +73,7 @@ def _other_service(end: _End) -> Clue | None:
             continue
         call, written = fitting[0]
         does = "asks" if end.kind == "client" else "offers"
-        hint = f"{source.code(call)} {does} {quote(found, 60)}: the service asked for is {end.service}"
+        hint = f"{source.code(call)} {does} {quote(found, 60)}: the task asks for {end.service}"
         return Clue(hint + elsewhere_because(written, end.service), source.place(call))
     return None
 
@@ -98,7 +98,7 @@ def _other_service_type(end: _End) -> Clue | None:
         if not wanted or not types or wanted in types or len(calls) != 1:
             continue
         module, _, name = wanted.rpartition("/")
-        hint = f"{source.code(calls[0])} uses {short(next(iter(types)))}: the type asked for is {name}, "
+        hint = f"{source.code(calls[0])} uses {short(next(iter(types)))}: the task asks for {name}, "
         return Clue(f"{hint}from {module.replace('/', '.')} import {name}", source.place(calls[0]))
     return None
 
@@ -121,10 +121,10 @@ def _synchronous_call(case: Case) -> Clue | None:
     for call in calls:
         code = source.code(call)
         if call in _callbacks(source) and not (grouped and "MultiThreadedExecutor" in names):
-            hint = f"{code} waits in a callback for an answer that can only be taken after the callback has returned"
+            hint = f"{code} waits in a callback for a response that can only arrive after the callback returns"
             return Clue(f"{hint}: use call_async and add_done_callback", source.place(call), key="waits_in_callback")
         if not names & {*_THREADS, "MultiThreadedExecutor"}:
-            hint = f"{code} waits for ever: nothing spins the node meanwhile; use call_async, "
+            hint = f"{code} waits forever: nothing spins the node meanwhile; use call_async, "
             return Clue(f"{hint}then rclpy.spin_until_future_complete(node, future)", source.place(call), key="unspun")
     return None
 
@@ -137,7 +137,9 @@ def _spins_in_callback(case: Case) -> Clue | None:
     call = next((c for c in source.calls("spin_until_future_complete", "spin_once") if c in inside), None)
     if call is None or not any(last_name(n) == "spin" for n in source.names()):
         return None
-    hint = f"{source.code(call)} runs in a callback, while the node is spinning already: take the answer in a function"
+    hint = (
+        f"{source.code(call)} runs in a callback, while the node is already spinning: take the response in a function"
+    )
     return Clue(f"{hint} given to future.add_done_callback", source.place(call), key="waits_in_callback")
 
 
@@ -151,7 +153,7 @@ def _future_never_done(case: Case) -> Clue | None:
         asks = any(isinstance(n, ast.Call) and last_name(n.func) == "done" for n in ast.walk(loop.test))
         inside = {last_name(n.func) for n in reached(source, [loop]) if isinstance(n, ast.Call)}
         if asks and not inside & set(SPINS):
-            hint = f"'while {source.code(loop.test, 40)}' never ends: an answer is taken only while the node spins; "
+            hint = f"'while {source.code(loop.test, 40)}' never ends: a response is taken only while the node spins; "
             return Clue(f"{hint}use rclpy.spin_until_future_complete(node, future)", source.place(loop))
     return None
 
@@ -167,7 +169,7 @@ def _shared_callback_group(case: Case) -> Clue | None:
     if grouped or not waits or len(clients) != 1:
         return None
     hint = f"{source.code(waits[0])} waits in a callback, and the client shares its callback group: "
-    hint += "no answer is taken meanwhile; create_client(..., callback_group=ReentrantCallbackGroup())"
+    hint += "no response is taken meanwhile; create_client(..., callback_group=ReentrantCallbackGroup())"
     return Clue(hint, source.place(clients[0]), key="shared_group")
 
 
@@ -193,7 +195,7 @@ def _too_early(source: Source) -> Clue | None:
     found = _unawaited(source)
     if found is None:
         return None
-    hint = f"{source.code(found)} is read before the answer has come, so it is None: "
+    hint = f"{source.code(found)} is read before the response has arrived, so it is None: "
     hint += "first call rclpy.spin_until_future_complete(node, future)"
     return Clue(hint, source.place(found), key="result_too_early")
 
@@ -229,7 +231,7 @@ def _future_is_no_answer(crash: Crash) -> Clue | None:
         if isinstance(source.function_of(call), ast.AsyncFunctionDef) and not waits:
             code = source.code(call, 50)
             return Clue(f"call_async returns a future: write await {code} to get the response", source.place(call))
-    hint = f"call_async returns a future, and {name} belongs to the response: call "
+    hint = f"call_async returns a future, and {name} is in the response: call "
     return Clue(f"{hint}rclpy.spin_until_future_complete(node, future), then future.result().{name}")
 
 
@@ -247,7 +249,7 @@ def _request_is_response(crash: Crash) -> Clue | None:
                 pair = names[len(own) :]
                 if len(pair) == 2 and pair[0].lower().startswith("res") and pair[1].lower().startswith("req"):
                     wanted = ", ".join([*own, pair[1], pair[0]])
-                    hint = f"a service hands over the request first: def {function.name}({wanted}):"
+                    hint = f"a service passes the request first: def {function.name}({wanted}):"
                     return Clue(hint, source.place(function))
     return None
 

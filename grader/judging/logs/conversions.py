@@ -63,7 +63,7 @@ def wrong_conversion(logged: Sequence[LoggedNumbers], factor: float, others: Seq
     lost = [h for h in left if factor * h.value < 0]
     if len(lost) >= _FEWEST and _share(lost, lambda h, n: _shows_value(n, -factor * h.value)) >= _SURE:
         every = _share(left, lambda h, n: _shows_value(n, -factor * h.value)) >= _SURE
-        return ("it has the other sign", "keep the sign") if every else ("its sign is lost", "keep the sign")
+        return ("its sign is inverted", "keep the sign") if every else ("its sign is lost", "keep the sign")
     return _factor(left, factor)
 
 

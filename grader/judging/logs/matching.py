@@ -149,7 +149,7 @@ def surroundings(outputs: Sequence[Output], one: Sought) -> str:
     texts = [o.text for o, _ in _active(outputs, [one])]
     count = sum(len(_readings(text)[0][1]) for text in texts)
     longest = max(texts, key=len, default="")
-    return f"among {counted(count, 'number')} written in its time, as in {quote(longest, 60)!r}"
+    return f"among {counted(count, 'number')} written meanwhile, as in {quote(longest, 60)!r}"
 
 
 def _knows(place: _Record, tried: int, beside: int, *, several: bool) -> bool:

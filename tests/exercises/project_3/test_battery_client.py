@@ -147,7 +147,7 @@ def looks_later_at_a_refusal(answer: Answer) -> Said:
         (always_warns, ABOVE, "WARN at"),
         (deciding(lambda v: v > 20, 60.0), STILL, "after a response without success (request 4)"),
         (goes_on([FAILED]), STILL, "'charge is fine, off it goes' after a response without success (request 4)"),
-        (goes_on([UNREADABLE]), STILL, "after an answer without a number (request 5)"),
+        (goes_on([UNREADABLE]), STILL, "after a response without a number (request 5)"),
         (goes_on([None]), STILL, "after a request that got no response (request 6)"),
     ],
 )
@@ -273,7 +273,7 @@ def test_what_was_never_asked_is_not_judged_by_guesses() -> None:
         assert check.judge(ended.trace()).blocked_by == "service_calls"
         assert FAULT_KEY in check.judge(crashed.trace()).evidence
         idle = check.judge(asking(chapter, only_good).trace())
-        assert (idle.blocked_by, "then stopped asking" in idle.reason) == ("service_calls", True)
+        assert (idle.blocked_by, "then made no more calls" in idle.reason) == ("service_calls", True)
         with pytest.raises(HarnessError):
             check.judge(dataclasses.replace(asking(chapter, only_good).trace(), stop_ns=7_000_000_000))
     assert BELOW.judge(hangs.trace()).blocked_by == "service_calls"
