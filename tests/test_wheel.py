@@ -84,6 +84,8 @@ def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel: Path) -> N
         "exercise_1/selftest.yaml",
         "exercise_2/rubric.yaml",
         "exercise_3/rubric.yaml",
+        "exercise_2/checks.py",
+        "exercise_2/hints.py",
         "exercise_3/checks.py",
         "exercise_3/hints.py",
         "rubric.schema.json",
