@@ -61,12 +61,13 @@ _GENERATED = "Metaclass_"
 TOPICS = {"feedback": "{}_FeedbackMessage", "status": "action_msgs/msg/GoalStatusArray"}
 
 
-def type_name(interface: type) -> str:
+def type_name(interface: object) -> str:
     """Return the ROS name of a message, service or action class, e.g. `geometry_msgs/msg/Twist`.
 
-    A class of the student's own has the type of the generated class that it is derived from.
+    A class of the student's own has the type of the generated class that it is derived from. So has a message: rclpy
+    takes one in place of its class for everything but sending.
     """
-    meta: type = type(interface)
+    meta: type = type(interface if isinstance(interface, type) else type(interface))
     for generated in meta.__mro__:
         package, _, rest = generated.__module__.partition(".")
         if generated.__name__.startswith(_GENERATED) and rest:

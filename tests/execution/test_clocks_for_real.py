@@ -1,8 +1,6 @@
 """Nodes see the same of time on both clocks: simulated clocks, the times of messages, and timed events."""
 
 import ast
-import subprocess
-import sys
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
@@ -269,26 +267,3 @@ def test_a_timer_that_is_polled_fires_on_time(run: Callable[..., Trace], loop: s
     told = [(line.text, line.t_ns / 1e6) for line in trace.of(OutputLine) if line.t_ns < NS_PER_S]
     assert [t for text, t in told if text == "quick"] == [4 * number for number in range(1, 250)]
     assert [t for text, t in told if text == "slow"] == [125 * number for number in range(1, 8)]
-
-
-#: Prints which functions of a program's usual modules cannot be pickled, as `multiprocessing` has to.
-PICKLING = """
-import importlib, pickle
-for name in "time select signal os socket queue random selectors".split():
-    module = importlib.import_module(name)
-    for each, value in sorted(vars(module).items()):
-        try:
-            callable(value) and pickle.dumps(value)
-        except Exception:
-            print(name, each, flush=True)
-print("all tried", flush=True)
-"""
-
-
-def test_what_is_replaced_can_be_pickled_as_before(run: Callable[..., Trace]) -> None:
-    """A program may hand `time.sleep` to another process."""
-    plain = subprocess.run([sys.executable, "-c", PICKLING], capture_output=True, text=True, check=True)
-    trace = run(PICKLING, clock="virtual")
-    found = [line.text for line in trace.of(OutputLine) if line.stream == "stdout"]
-    assert set(found) <= set(plain.stdout.splitlines())
-    assert found[-1] == "all tried"
