@@ -96,4 +96,4 @@ def test_a_scheduler_that_is_gone_is_problem() -> None:
     client.status = "connecting"
     with pytest.raises(HarnessError, match="the scheduler no longer answers") as error:
         worker_pool(client)[0].usable()
-    assert "run the same command again where it was" in error.value.hint
+    assert "run the same command again when" in error.value.hint

@@ -223,7 +223,7 @@ def _super_init(crash: Crash) -> Clue | None:
     if misspelt and closest(misspelt[1], ("__init__",)):
         return Clue(f"{misspelt[1]} is a typo: write super().__init__('node_name')")
     if crash.said(r"Node\.__init__\(\) missing 1 required positional argument: 'node_name'"):
-        return _no_name(crash.fault, crash.source)
+        return _no_name(crash.fault, crash.source) or _super_of_other(crash)
     return _no_base(crash) or _super_of_other(crash) or _used_before_super(crash)
 
 
@@ -367,9 +367,12 @@ def _kind_of(source: Source, node: ast.expr) -> str:
     return "depth" if "qos" in dotted.lower() else ""
 
 
-@crash_rule(r"has no attribute '(?:__name__|_TYPE_SUPPORT|_CREATE_ROS_MESSAGE)'", priority=4100)
+@crash_rule(
+    r"has no attribute '(?:__name__|_TYPE_SUPPORT|_CREATE_ROS_MESSAGE)'|isinstance\(\) arg 2 must be a type",
+    priority=4100,
+)
 def _made_for_type(crash: Crash) -> Clue | None:
-    """`create_publisher(Twist(), ...)`: an object stands in the place of the message class."""
+    """`create_publisher(Twist(), ...)`: an object stands in the place of the message class, as publishing shows."""
     for item in made(crash.source, "publisher", "subscription"):
         first = item.call.args[0] if item.call.args else None
         if isinstance(first, ast.Call):
