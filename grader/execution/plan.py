@@ -135,7 +135,7 @@ class Plan:
         scenario: Scenario id.
         processes: Name (the wanted file) and found file of each student process, in start order.
         root: The staged submission.
-        host_seed: Hex; seeds the randomness of the student's processes, and reveals nothing about the stimuli.
+        host_seed: Hex; seeds the student's processes by `seed_of`, and reveals nothing about the stimuli.
         duration_ns: How long to observe.
         first_message_on: Topic whose first message starts the observation, or empty.
         wait_at_most_ns: How long to wait for that message.
@@ -203,6 +203,15 @@ class Plan:
     def start_of(self, process: str) -> PlannedStart:
         """Return what a process is started with."""
         return next((start for start in self.starts if start.process == process), PlannedStart(process))
+
+    def seed_of(self, process: str) -> str:
+        """Return what seeds the randomness of a process, in hex; each has its own, as processes do on any machine.
+
+        Otherwise the clients of two processes would send goals with the same ids, and an action's server would reject
+        those of the second one.
+        """
+        first = not self.processes or process == self.processes[0][0]
+        return self.host_seed if first else hashlib.sha256(f"{self.host_seed}/{process}".encode()).hexdigest()
 
     def scripts_of(self, file: str) -> tuple[tuple[str, str, str], ...]:
         """Return the console scripts of the package that a file is in; none if it is in none."""

@@ -235,7 +235,7 @@ class Worker:
             "scripts": plan.scripts_of(file),
             "installed": plan.is_installed(file, start.executable),
             "imported": plan.imported,
-            "seed": plan.host_seed,
+            "seed": plan.seed_of(name),
             "clock": plan.clock,
             "charged": plan.charged,
             "steady_ns": plan.epoch_ns - plan.uptime_ns,

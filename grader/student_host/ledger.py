@@ -439,6 +439,10 @@ class Ledger:
                 if end.kind == kind and names.keys() & set(end.services()):
                     served = _asked(functools.partial(HAS_SERVER, end.handle))
                     found.setdefault(end.services()[0], []).append(math.inf if served is None else served)
+            for end in self._actions if kind == "service" else ():
+                for name in names.keys() & set(end.services()) if end.kind == kind else ():
+                    asking = self._clients_of(name)
+                    found.setdefault(name, []).append(math.inf if asking is None else asking)
             for name, matches in found.items():
                 wanted = sorted(names[name], reverse=True)
                 if any(has < want for has, want in zip(sorted(matches, reverse=True), wanted, strict=False)):

@@ -186,6 +186,8 @@ class RosClocks:
         return Time(nanoseconds=self._clock.now_ns, clock_type=ClockType.ROS_TIME)
 
 
+#: The methods by which servers and clients of actions tell what a wait set found ready.
+ACTION_READY = {cls: cls.is_ready for cls in (_rclpy.ActionServer, _rclpy.ActionClient)}
 _WATCH_JUMPS = Clock.create_jump_callback
 #: Checks whether a task has ended, without counting as a look, which would let time pass.
 _DONE = rclpy.task.Future.done
@@ -367,6 +369,8 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
             self._receivers: list[int] = []
             self._event_handles: list[Any] = []
             self._included = ledger.included
+            #: Servers and clients of actions, with what their `is_ready` returned after the last poll.
+            self._actions: dict[Any, Any] = {}
 
         def clear_entities(self) -> None:
             super().clear_entities()
@@ -375,6 +379,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
             self._guards.clear()
             self._receivers.clear()
             self._event_handles.clear()
+            self._actions.clear()
 
         def _add(self, add: Callable[..., Any], entity: Any) -> Any:
             self._added.append((add, entity))
@@ -403,6 +408,36 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
         def add_event(self, entity: Any) -> Any:
             self._event_handles.append(entity)
             return self._add(REAL_WAIT_SET.add_event, entity)
+
+        def add_action(self, add: Callable[[Any, Any], Any], handle: Any) -> None:
+            """Add what a server or client of an action waits for; `add` is its own method for that."""
+            self._actions[handle] = None
+            self._added.append((lambda wait_set, end: add(end, wait_set), handle))
+            add(handle, self)
+
+        def ready_of_action(self, handle: Any) -> Any:
+            """Return what a server or client of an action found ready at the last poll; None if it is not in the set.
+
+            It notes its places in the latest set that it was added to, of which the ledger makes some of its own.
+            """
+            return self._actions.get(handle)
+
+        def _poll(self) -> None:
+            """Look, without waiting, what is ready; all else is removed."""
+            super().wait(0)
+            for handle in self._actions:
+                self._actions[handle] = ACTION_READY[type(handle)](handle, self)
+
+        def _fill(self) -> None:
+            """Add all entities again."""
+            super().clear_entities()
+            for add, entity in self._added:
+                add(self, entity)
+
+        def _is_whole(self) -> bool:
+            """Return whether all entities are known; those of other waitables are not."""
+            parts = sum(sum(handle.get_num_entities()) - 1 for handle in self._actions)
+            return bool(len(self._added) + parts == self._capacity)
 
         def is_ready(self, kind: str, index: int) -> Any:
             handle = self._event_handles[index] if kind == "event" and index < len(self._event_handles) else None
@@ -434,7 +469,9 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
             if not ledger.expects_anything():
                 return False
             known = ledger.handles()
-            return ledger.await_arrivals([known[p] for p in self._receivers if p in known])
+            receivers = [known[p] for p in self._receivers if p in known]
+            acting = [end for end in ledger.actions() if end.handle in self._actions]
+            return ledger.await_arrivals([*receivers, *(r for end in acting for r in end.receivers.values())])
 
         def _next_timer_ns(self) -> int | None:
             waits = [timer.time_until_next_call() for timer in self._timers if timer]
@@ -443,8 +480,10 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
         def wait(self, timeout_ns: int) -> None:
             clock.charge()
             deadline_ns = None if timeout_ns < 0 else clock.end_of(timeout_ns)
+            if self._actions:
+                self._fill()  # the ledger may have looked for messages since they were added
             while True:
-                super().wait(0)
+                self._poll()
                 guards = REAL_WAIT_SET.get_ready_entities(self, GUARD)
                 news = wake_ups.news(guards, self._guards) if guards and timeout_ns else guards
                 if self._ready(guards=news):
@@ -462,12 +501,9 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
                         scheduler.pause(min(wakes, default=None), polls=True)
                     finally:
                         ledger.awaited.subtract(self._receivers)
-                if len(self._added) < self._capacity or self._included != ledger.included:
-                    return  # actions add their entities without these methods: let the executor rebuild the set
-                # Polling has removed everything that was not ready from the set.
-                super().clear_entities()
-                for add, entity in self._added:
-                    add(self, entity)
+                if not self._is_whole() or self._included != ledger.included:
+                    return  # other waitables add their entities without these methods: let the executor rebuild the set
+                self._fill()
 
     return VirtualWaitSet
 
@@ -477,6 +513,27 @@ def install_wait_sets(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger)
     wake_ups = WakeUps()
     wake_ups.install()
     _rclpy.WaitSet = wait_set_type(scheduler, clock, ledger, wake_ups)
+    for cls in ACTION_READY:
+        _install_action_waits(cls)
+
+
+def _install_action_waits(cls: Any) -> None:
+    """Let a virtual wait set know the servers or clients of actions in it, and tell what they found ready."""
+    add, is_ready = cls.add_to_waitset, cls.is_ready
+
+    @functools.wraps(add)
+    def added(self: Any, wait_set: Any) -> None:
+        if isinstance(wait_set, _rclpy.WaitSet):
+            wait_set.add_action(add, self)
+        else:
+            add(self, wait_set)
+
+    @functools.wraps(is_ready)
+    def ready(self: Any, wait_set: Any) -> Any:
+        found = wait_set.ready_of_action(self) if isinstance(wait_set, _rclpy.WaitSet) else None
+        return is_ready(self, wait_set) if found is None else found
+
+    cls.add_to_waitset, cls.is_ready = added, ready
 
 
 def install_callers() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -94,6 +95,14 @@ def test_students_cannot_tell_the_stimuli_from_their_seed() -> None:
         assert p.host_seed != derive(seed, "stimuli", "velocity_publisher", p.scenario)
         assert len(p.host_seed) == 64
         assert int(p.host_seed, 16)
+
+
+def test_each_process_has_randomness_of_its_own() -> None:
+    """Two programs that draw ids, such as those of goals, draw different ones."""
+    two = replace(plan(DRAWN), processes=(("one.py", "one.py"), ("two.py", "two.py")))
+    assert two.seed_of("one.py") == two.host_seed
+    assert len({two.seed_of(name) for name in ("one.py", "two.py", "three.py")}) == 3
+    assert two.seed_of("two.py") == two.seed_of("two.py")
 
 
 def test_the_date_follows_from_the_seed_alone() -> None:
