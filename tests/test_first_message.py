@@ -73,8 +73,8 @@ def test_a_message_without_a_listener_counts_if_the_rubric_says_so(
     """The note is there in either case, and a program with a timer gets none."""
     found, text = graded(tmp_path, rubric, program)
     assert found == points
-    assert ("on a real system no subscription would have heard it" in text) == noted
-    assert ("nobody can have discovered it by then" in text) == (points == 0)
+    assert ("on a real system no subscription would have received it" in text) == noted
+    assert ("before any subscription could discover it" in text) == (points == 0)
 
 
 @pytest.mark.parametrize(("rubric", "survivors"), [(USUAL, 1), (STRICT, 0)], ids=["usual", "strict"])

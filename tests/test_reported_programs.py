@@ -46,7 +46,7 @@ HINTS = {
         "velocity_publisher.py",
         "await asyncio.sleep(0.01)",
         "asyncio.sleep(0.01) works in asyncio's own loop only, and rclpy.spin runs callbacks without it: "
-        "take it out, a timer sets the pace",
+        "remove it, a timer sets the pace",
     ),
 }
 
