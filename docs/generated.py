@@ -344,7 +344,8 @@ def _members(value: Any) -> str:
         if name.startswith("_") or not about or not (inspect.isfunction(member) or isinstance(member, property)):
             continue
         call = f"{name}{_plain(inspect.signature(member))}" if inspect.isfunction(member) else name
-        rows.append(f"| `{_cell(call.replace('(self, ', '(').replace('(self)', '()'))}` | {_cell(about)} |")
+        call = call.replace("(self, ", "(").replace("(self)", "()").replace("|", "\\|")  # code needs no other escape
+        rows.append(f"| `{call}` | {_cell(about)} |")
     return "\n\n| member | |\n|---|---|\n" + "\n".join(rows) if rows else ""
 
 

@@ -33,9 +33,12 @@ from grader.rubrics.loader import read_rubric
 
 HERE = Path(__file__).parent / "diagnosis"
 FLOAT64 = "std_msgs/msg/Float64"
+STRING = "std_msgs/msg/String"
 BATTERY = "/battery/get_status"
-EXERCISES: dict[str, Exercise] = {name: read_rubric(path) for name, path in builtin_rubrics().items()}
-EXERCISES = {exercise.id: exercise for exercise in EXERCISES.values()}
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+#: The rubrics whose programs may be spoilt: together they ask most checks.
+RUBRICS = (*builtin_rubrics().values(), *(p.parent / f"{p.parent.name}.yaml" for p in EXAMPLES.glob("*/README.md")))
+EXERCISES: dict[Path, Exercise] = {path: read_rubric(path) for path in RUBRICS}
 RIGHT = {path.stem: path.read_text(encoding="utf-8") for path in sorted((HERE / "right").glob("*.py.txt"))}
 
 
@@ -58,8 +61,12 @@ def line_of(text: str, code: str) -> int:
     return next(k for k, row in enumerate(text.splitlines(), 1) if code in row)
 
 
+def rubric_of(file: str) -> Path:
+    return next(path for path, exercise in EXERCISES.items() if file in exercise.files)
+
+
 def exercise_of(file: str) -> Exercise:
-    return next(e for e in EXERCISES.values() if file in e.files)
+    return EXERCISES[rubric_of(file)]
 
 
 def report(file: str, traces: Mapping[str, Trace], texts: Mapping[str, str] | None) -> ExerciseReport:
@@ -338,6 +345,14 @@ def swinging(what: str = "right") -> Recording:
     return rec
 
 
+def greeting(period: float = 1.0) -> Recording:
+    """A node that greets the world."""
+    rec = Recording(13.0, process="greeter.py").endpoint("publisher", "/greeting", STRING, "/greeter")
+    for k in range(1, int(13 / period)):
+        rec.message(k * period, "/greeting", {"data": "Hello world!"}, STRING)
+    return rec
+
+
 def asking_once() -> Recording:
     """A client that waits, asks, and does nothing more."""
     rec = Recording(40.0, process="battery_service_client.py")
@@ -385,4 +400,5 @@ RECORDINGS: dict[str, tuple[str, Callable[..., Recording]]] = {
     "answering_once": ("controller_alone", answering_once),
     "swinging": ("alone", swinging),
     "asking_once": ("client_waits", asking_once),
+    "greeting": ("defaults", greeting),
 }

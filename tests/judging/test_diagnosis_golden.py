@@ -182,6 +182,7 @@ def test_a_right_program_that_does_right_is_left_alone(file: str) -> None:
         "simple_publisher.py": ("swinging", {}),
         "battery_service_client.py": ("asking_once", {}),
         "battery_service_server.py": ("asking_once", {}),
+        "greeter.py": ("greeting", {}),
     }[file]
     scenario, build = RECORDINGS[given[0]]
     traces = {scenario: build(**given[1]).trace(scenario)}

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from diagnosis_samples import RIGHT, exercise_of, rows, spoilt
+from diagnosis_samples import RIGHT, exercise_of, rows, rubric_of, spoilt
 
 from grader.app.grade import grade_in
 from grader.app.request import GradeRequest
@@ -36,7 +36,7 @@ def graded(session: RecordingSession, folder: Path, file: str, text: str) -> Rep
     for name in exercise.files:
         if name in RIGHT:
             (folder / name).write_text(text if name == file else RIGHT[name], encoding="utf-8")
-    request = GradeRequest(submission=str(folder), exercises=(exercise.id,), seed=42)
+    request = GradeRequest(submission=str(folder), rubrics=(rubric_of(file),), seed=42)
     return grade_in(session, request, lambda _: None, pictures=False)
 
 
