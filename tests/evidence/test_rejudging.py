@@ -154,7 +154,7 @@ def test_added_and_removed_criteria_are_changes(tmp_path: Path) -> None:
     less = grade("--diff", tmp_path / "e", "--rubric", tmp_path / "less.yaml").output
     assert "velocity_publisher/logging: was met 4/4; criterion removed" in less
     other = grade("--diff", tmp_path / "e", "--rubric", tmp_path / "other.yaml").output
-    assert "velocity_publisher/logs: was not asked, is met 4/4" in other
+    assert "velocity_publisher/logs: new criterion, is met 4/4" in other
 
 
 def test_reports_of_a_class_are_files_in_a_folder(tmp_path: Path) -> None:
