@@ -367,7 +367,8 @@ def test_a_gap_over_millions_of_messages_does_not_fill_the_grader(run: Callable[
 GHOSTS = """
 import inspect
 from _grader_host import ledger
-self.ledger = inspect.getclosurevars(Node.destroy_node).nonlocals["before"][0].__self__._ledger
+destroy = inspect.getclosurevars(Node.destroy_node).nonlocals["method"]
+self.ledger = inspect.getclosurevars(destroy).nonlocals["before"][0].__self__._ledger
 claims = ledger.Ledger.claims
 ghost = {"type": "std_msgs/msg/String", "reliable": True, "latched": False, "manual": False, "deadline_ns": 0}
 ledger.Ledger.claims = lambda it, domain: [
