@@ -470,19 +470,19 @@ class Ledger:
 
     def _clients_of(self, service: str) -> int | None:
         """Return how many clients of a service this process sees; None without a node to ask."""
-        node = self._node()
-        if node is None:
-            return None
-        with node.handle:
-            return int(node.handle.get_count_clients(service))
+        return self._ask_node(lambda handle: int(handle.get_count_clients(service)))
 
     def _servers_of(self, service: str) -> int | None:
         """Return how many receivers of a service's requests this process sees; None without a node to ask."""
+        topic = f"rq{service}Request"
+        return self._ask_node(lambda handle: len(_rclpy.rclpy_get_subscriptions_info_by_topic(handle, topic, True)))  # noqa: FBT003 - C++
+
+    def _ask_node(self, ask: Callable[[Any], int]) -> int | None:
         node = self._node()
         if node is None:
             return None
         with node.handle:
-            return len(_rclpy.rclpy_get_subscriptions_info_by_topic(node.handle, f"rq{service}Request", True))  # noqa: FBT003 - C++
+            return ask(node.handle)
 
     def _node(self) -> Any:
         """Return the newest node that can query the graph, or None."""
