@@ -16,6 +16,25 @@ from itertools import count
 from typing import Any
 
 import simpy
+from action_model import ClientModel, ServerModel
+from model_parts import (
+    NS_PER_MS,
+    SUSPENDED,
+    Ended,
+    Entity,
+    FutureModel,
+    GroupModel,
+    Leave,
+    Queue,
+    Resting,
+    ReturnedError,
+    Scope,
+    Steps,
+    Task,
+    TimerModel,
+    TimeUpError,
+    nothing,
+)
 from program_description import (
     FIRST_NAP_MS,
     LAST_NAP_MS,
@@ -23,10 +42,12 @@ from program_description import (
     Await,
     CallAndWait,
     Cancel,
+    CancelGoal,
     Client,
     End,
     Ending,
     Every,
+    Feedback,
     Fixed,
     Group,
     Heard,
@@ -43,6 +64,7 @@ from program_description import (
     Rest,
     Runs,
     Say,
+    SendGoal,
     Server,
     SetParameter,
     SleepRate,
@@ -54,9 +76,6 @@ from program_description import (
     Write,
 )
 
-NS_PER_MS = 1_000_000
-#: Steps of a SimPy process.
-Steps = Generator[simpy.Event, Any, Any]
 #: The priority of what the process that runs still has to do at an instant, and of the first process's next turn.
 CONTINUING, TURNS = 1, 10
 #: How late a pause ends in a program that has looked at a clock. Every node has.
@@ -68,29 +87,14 @@ LOOK_NS, LOOKS_OF_A_NODE = 1_000, 3
 FLUSH = 8
 
 
-@dataclass(frozen=True, slots=True)
-class Ended:
-    """How a process ends: a kind of fault and its text."""
-
-    kind: str
-    text: str
-
-
 @dataclass(slots=True)
 class Expected:
     """What a program must do: numbers by topic, texts by process for its log and its output, ends by process."""
 
-    topics: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
+    topics: dict[str, list[tuple[int, Any]]] = field(default_factory=dict)
     logs: dict[int, list[tuple[int, str]]] = field(default_factory=dict)
     lines: dict[int, list[tuple[int, str]]] = field(default_factory=dict)
     ends: dict[int, tuple[int, Ended]] = field(default_factory=dict)
-
-
-class Leave(BaseException):
-    """Unwinds a process that ends."""
-
-    def __init__(self, ended: Ended, how: Ending) -> None:
-        self.ended, self.how = ended, how
 
 
 ENDINGS = {
@@ -99,19 +103,6 @@ ENDINGS = {
     Ending.EXIT_WELL: Ended("exited", "exited with code 0"),
     Ending.LEAVE_AT_ONCE: Ended("exited", "exited with code 4"),
 }
-
-
-@dataclass(eq=False, slots=True)
-class Queue:
-    """The receiving end of a subscription, server or client."""
-
-    owner: Any
-    process: ProcessModel
-    messages: deque[Any]
-
-    def put(self, message: Any) -> None:
-        self.messages.append(message)
-        self.process.turn_at(self.process.world.now)
 
 
 class World:
@@ -123,6 +114,8 @@ class World:
         self.subscribed: dict[str, list[Queue]] = {}
         self.served: dict[str, list[Queue]] = {}
         self.asked: dict[str, list[Queue]] = {}
+        #: Those of actions, by the action and what they receive.
+        self.acting: dict[tuple[str, str], list[Queue]] = {}
         self.processes = [ProcessModel(self, number, process) for number, process in enumerate(program.processes)]
         for process in self.processes:
             process.begin()
@@ -148,6 +141,8 @@ class ProcessModel:
         self.alarms: list[tuple[int, int, simpy.Event]] = []
         self.numbers = count()
         self.ok, self.ended, self.sent, self.shown = True, False, 0, -LOOK_NS
+        #: Whether it has left the graph, so that the middleware sends no response to its clients.
+        self.has_left = False
         self.turns: set[int] = set()
 
     def begin(self) -> None:
@@ -170,10 +165,11 @@ class ProcessModel:
         """Note the end; no thread goes on."""
         if self.ended:
             return
-        self.ended, self.ok = True, False
+        self.ended, self.ok, self.has_left = True, False, ended != ENDINGS[Ending.LEAVE_AT_ONCE]
         self.world.expected.ends[self.number] = self.world.now, ended
         world = self.world
-        for queues in (*world.subscribed.values(), *world.served.values(), *world.asked.values()):
+        channels = (world.subscribed, world.served, world.asked, world.acting)
+        for queues in (queues for channel in channels for queues in channel.values()):
             queues[:] = [queue for queue in queues if queue.process is not self]
 
     def turn_at(self, t_ns: int) -> None:
@@ -349,127 +345,6 @@ class ProcessModel:
             self.world.expected.lines.setdefault(self.number, []).append((self.world.now, text))
 
 
-class TimerModel:
-    """A timer of rcl."""
-
-    def __init__(self, world: World, period_ms: int, *, starts: bool = True) -> None:
-        self.world = world
-        self.period = period_ms * NS_PER_MS
-        self.next = world.now + self.period
-        self.cancelled = not starts
-
-    def is_ready(self) -> bool:
-        return not self.cancelled and self.next <= self.world.now
-
-    def call(self) -> None:
-        """Move on by a period, and beyond what has been missed."""
-        self.next += self.period
-        behind = self.world.now - self.next
-        if behind > 0:
-            self.next += -(-behind // self.period) * self.period
-
-    def reset(self) -> None:
-        self.next, self.cancelled = self.world.now + self.period, False
-
-
-class GroupModel:
-    """A callback group: an exclusive one runs one callback at a time."""
-
-    def __init__(self, kind: Group) -> None:
-        self.kind, self.active = kind, 0
-
-    @property
-    def is_free(self) -> bool:
-        return self.kind is Group.REENTRANT or not self.active
-
-
-class FutureModel:
-    """What a call of a service will be answered with.
-
-    Args:
-        executor: Whose tasks the callbacks become.
-    """
-
-    def __init__(self, executor: Executor | None = None) -> None:
-        self.executor = executor
-        self.done, self.value = False, 0
-        #: The first one is of the client itself, which forgets the request.
-        self.callbacks: list[Callable[[], Steps]] = [nothing]
-
-    def set(self, executor: Executor, value: int) -> None:
-        self.done, self.value = True, value
-        for callback in self.callbacks:
-            executor.add_task(Task(callback()))
-
-
-def nothing() -> Steps:
-    """Do nothing, as a task."""
-    return
-    yield
-
-
-@dataclass(frozen=True, slots=True)
-class Resting:
-    """What a coroutine of asyncio yields when it sleeps."""
-
-    until_ns: int
-
-
-#: What a coroutine yields when it waits for a future.
-SUSPENDED = object()
-
-
-@dataclass(eq=False, slots=True)
-class Task:
-    """A callback or coroutine that an executor runs, perhaps in several parts."""
-
-    steps: Steps
-    done: bool = False
-    running: bool = False
-
-    def advance(self) -> Steps:
-        """Run it until it has ended or waits for a future."""
-        if self.done or self.running:
-            return
-        self.running = True
-        for event in self.steps:
-            if event is SUSPENDED:
-                self.running = False
-                return
-            yield event
-        self.done, self.running = True, False
-
-
-@dataclass(eq=False, slots=True)
-class Entity:
-    """What an executor waits for.
-
-    Attributes:
-        group: Its callback group.
-        is_ready: Whether there is anything to do.
-        take: Takes what there is to do, and returns how it is done.
-        claimed: Whether an executor is about to take it.
-    """
-
-    group: GroupModel
-    is_ready: Callable[[], bool]
-    take: Callable[[], Steps]
-    is_timer: bool = False
-    claimed: bool = False
-
-    def can_run(self) -> bool:
-        return not self.claimed and self.group.is_free
-
-
-@dataclass(slots=True)
-class Scope:
-    """The callback that runs: its name, what it logs under, and the number that it was called with."""
-
-    name: str
-    label: str
-    heard: int = 0
-
-
 class NodeModel:
     """A node's entities and variables, and what its callbacks do."""
 
@@ -491,6 +366,10 @@ class NodeModel:
             self.world.served.setdefault(queue.owner.service, []).append(queue)
         for queue in self.clients.values():
             self.world.asked.setdefault(queue.owner.service, []).append(queue)
+        #: Servers and clients of actions: an executor goes through those of all nodes before anything else.
+        self.action_servers = {server.name: ServerModel(self, server) for server in node.action_servers}
+        self.action_clients = {client.name: ClientModel(self, client) for client in node.action_clients}
+        self.waitables = [end.entity for end in (*self.action_servers.values(), *self.action_clients.values())]
         self.executor: Executor | None = None
         self.rate: TimerModel | None = None
         self.rate_set = False
@@ -565,7 +444,7 @@ class NodeModel:
 
             def deliver() -> None:
                 # The middleware wakes every client of the service; those that have not asked find nothing.
-                for each in self.world.asked.get(server.service, ()):
+                for each in () if client.process.has_left else self.world.asked.get(server.service, ()):
                     each.put((client, future, answer))
 
             yield from self.process.send(deliver)
@@ -614,6 +493,12 @@ class NodeModel:
                 self.leave(how)
             case Ask() | Await() | CallAndWait():
                 yield from self.ask(one, scope)
+            case SendGoal(client, value):
+                yield from self.action_clients[client].send_goal(one, scope, self.value(value, scope))
+            case CancelGoal(client):
+                yield from self.action_clients[client].cancel(one, scope)
+            case Feedback(value):
+                yield from self.action_servers[scope.name].feed(scope.goal, self.value(value, scope))
             case _:
                 self.do_at_once(one, scope)
 
@@ -691,14 +576,6 @@ class NodeModel:
             self.process.ok = False
             raise ReturnedError
         raise Leave(ENDINGS[how], how)
-
-
-class ReturnedError(Exception):
-    """A callback returns before its end."""
-
-
-class TimeUpError(Exception):
-    """An executor has waited long enough."""
 
 
 class Executor:
@@ -780,8 +657,9 @@ class Executor:
         return min([*moments, *([deadline] if deadline is not None else [])], default=None)
 
     def ready(self) -> list[Entity]:
-        """Return what is ready now, in the order of rclpy: by node, and of a node by the kind of entity."""
-        return [e for node in self.nodes for e in node.entities if e.can_run() and e.is_ready()]
+        """Return what is ready now, in the order of rclpy: waitables, then by node and by the kind of entity."""
+        kinds = ([e for node in self.nodes for e in node.waitables], [e for node in self.nodes for e in node.entities])
+        return [entity for entities in kinds for entity in entities if entity.can_run() and entity.is_ready()]
 
     def claim(self, entity: Entity) -> Task:
         """Make a task of what an entity has to do."""
