@@ -125,11 +125,15 @@ class World:
         """The time in nanoseconds since the start."""
         return int(self.environment.now)
 
-    def schedule(self, t_ns: int, priority: int, call: Callable[[], None]) -> None:
+    def schedule(self, t_ns: int, priority: int, call: Callable[[], object]) -> None:
         """Call something at a time; of one time, what has the lowest priority first."""
+
+        def happen(_: simpy.Event) -> None:
+            call()
+
         event = simpy.Event(self.environment)
         event._ok, event._value = True, None
-        event.callbacks.append(lambda _: call())
+        event.callbacks.append(happen)
         self.environment.schedule(event, priority=priority, delay=t_ns - self.now)  # type: ignore[arg-type]
 
 
@@ -144,22 +148,40 @@ class ProcessModel:
         #: Whether it has left the graph, so that the middleware sends no response to its clients.
         self.has_left = False
         self.turns: set[int] = set()
+        #: When it sent anything last.
+        self.sent_at = -1
+        #: What a thread waits for that lets the other processes run. No other thread of its process runs until then.
+        self.settling: simpy.Event | None = None
 
     def begin(self) -> None:
         """Start the main thread, in the order of the processes."""
-        self.world.schedule(0, TURNS + self.number, lambda: self.start(self.main()))
+        self.world.schedule(0, TURNS + self.number, lambda: self.start(self.guarded(self.main())))
 
     def start(self, steps: Steps) -> None:
         """Run a thread."""
-        self.world.environment.process(self.guarded(steps))
+        self.world.environment.process(self.held(steps))
+
+    def held(self, steps: Steps) -> Steps:
+        """Run a thread, but while another one waits until the others have taken its messages."""
+        for event in steps:
+            yield event
+            while self.settling is not None and self.settling is not event:
+                yield self.settling
 
     def guarded(self, steps: Steps) -> Steps:
         """Run the main thread until it ends, and note how."""
         try:
             yield from steps
-            self.end(Ended("exited", "exited with code 0"))
+            ended = Ended("exited", "exited with code 0")
         except Leave as leave:
-            self.end(leave.ended)
+            ended = leave.ended
+        yield from self.leave()
+        self.end(ended)
+
+    def leave(self) -> Steps:
+        """Let the others take what was sent at this instant, before its senders are gone."""
+        if self.sent_at == self.world.now:
+            yield from self.settle()
 
     def end(self, ended: Ended) -> None:
         """Note the end; no thread goes on."""
@@ -230,9 +252,17 @@ class ProcessModel:
         self.sent += 1
         if self.sent >= FLUSH:
             self.sent = 0
-            yield from self.pause(self.world.now)
+            yield from self.settle()
         if not self.ended:
+            self.sent_at = self.world.now
             deliver()
+
+    def settle(self) -> Steps:
+        """Let the other processes run at this instant, but no other thread of this one."""
+        goes_on = self.settling = simpy.Event(self.world.environment)
+        self.world.schedule(self.world.now, TURNS + self.number, goes_on.succeed)
+        yield goes_on
+        self.settling = None
 
     def main(self) -> Steps:
         """Do what the main function of the file does."""
@@ -289,7 +319,7 @@ class ProcessModel:
         assert loop is not None
         if loop.rate_ms:
             node.add_rate(loop.rate_ms)
-        self.world.environment.process(Executor(self, nodes).spin())
+        self.start(Executor(self, nodes).spin())
         yield from self.pause(self.end_of(FIRST_NAP_MS * NS_PER_MS))
         scope = Scope(loop.name, loop.name)
         for turn in range(loop.turns):
@@ -303,8 +333,8 @@ class ProcessModel:
         ready = deque([self.spin_and_rest(executor), self.work_and_rest(node)])
         left = len(ready)
         while left:
-            if not ready:
-                yield from self.pause(max(self.world.now, resting[0][0] + LATE_NS))
+            if not ready and resting[0][0] > max(self.world.now, self.shown):
+                yield from self.pause(resting[0][0] + LATE_NS)
             while resting and resting[0][0] <= max(self.world.now, self.shown):
                 ready.append(heapq.heappop(resting)[2])
             for _ in range(len(ready)):
@@ -700,7 +730,7 @@ class PoolExecutor(Executor):
             self.idle.pop().succeed()
         elif self.started < self.process.process.threads:
             self.started += 1
-            self.world.environment.process(self.work())
+            self.process.start(self.work())
         yield from nothing()
 
     def left_by(self, task: Task) -> Generator[simpy.Event, Any, Leave | None]:
@@ -717,6 +747,7 @@ class PoolExecutor(Executor):
             while self.submitted:
                 left = yield from self.left_by(self.submitted.popleft())
                 if left is not None and left.how is Ending.LEAVE_AT_ONCE:
+                    yield from self.process.leave()
                     self.process.end(left.ended)
                     return
             event = simpy.Event(self.world.environment)
