@@ -129,7 +129,7 @@ class ServerModel(WaitableModel):
         code, count = TERMINATED, 0
         if goal.status in (ACCEPTED, EXECUTING):
             code = NO_ERROR
-            self.process.say(f"{self.end.name}.cancel {goal.order}")
+            yield from self.process.say(f"{self.end.name}.cancel {goal.order}")
             if self.end.cancels:
                 count = 1
                 yield from self.move(goal, CANCELING)
@@ -181,13 +181,13 @@ class ServerModel(WaitableModel):
         except Leave as leave:
             if leave.how is not Ending.RAISE:
                 raise
-            self.process.say(f"Error raised in execute callback: {leave.ended.text.partition(': ')[2]}")
+            yield from self.process.say(f"Error raised in execute callback: {leave.ended.text.partition(': ')[2]}")
         else:
             value = small(node.value(server.answer, scope))
             if server.finish is not Finish.FORGET:
                 yield from self.move(goal, self.finish_of(goal))
         if goal.is_active:
-            self.process.say("Goal state not set, assuming aborted.")
+            yield from self.process.say("Goal state not set, assuming aborted.")
             yield from self.move(goal, ABORTED)
         assert node.executor is not None
         goal.result.set(node.executor, value)

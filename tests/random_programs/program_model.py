@@ -76,8 +76,10 @@ from program_description import (
     Write,
 )
 
-#: The priority of what the process that runs still has to do at an instant, and of the first process's next turn.
-CONTINUING, TURNS = 1, 10
+#: Who goes on first at an instant: in the process that runs, a thread that has let others go on after it has written
+#: something, but after those that another thread has started or woken, which have SimPy's usual priority; then an
+#: executor that looks for work, and a thread whose pause has ended. Then it is the next turn of the first process.
+LAST, LOOKING, DUE, TURNS = 2, 3, 4, 10
 #: How late a pause ends in a program that has looked at a clock. Every node has.
 LATE_NS = 1_000
 #: How much later each further look at a clock is within an instant, and how often rclpy looks while it makes a node: it
@@ -132,9 +134,20 @@ class World:
             call()
 
         event = simpy.Event(self.environment)
-        event._ok, event._value = True, None
         event.callbacks.append(happen)
-        self.environment.schedule(event, priority=priority, delay=t_ns - self.now)  # type: ignore[arg-type]
+        self.succeed(event, priority, t_ns - self.now)
+
+    def succeed(self, event: simpy.Event, priority: int, delay_ns: int = 0) -> None:
+        """Let an event happen with a priority, which SimPy's own method does not take."""
+        event._ok, event._value = True, None
+        self.environment.schedule(event, priority=priority, delay=delay_ns)  # type: ignore[arg-type]
+
+
+@dataclass(slots=True)
+class ThreadModel:
+    """One thread: whether another one has started or woken it, and it has neither waited nor written anything since."""
+
+    is_new: bool
 
 
 class ProcessModel:
@@ -148,6 +161,12 @@ class ProcessModel:
         #: Whether it has left the graph, so that the middleware sends no response to its clients.
         self.has_left = False
         self.turns: set[int] = set()
+        #: The thread that runs, how many others have been started or woken and have not gone on, and by which events:
+        #: whether the thread that woke one had not just been woken itself.
+        self.current: ThreadModel | None = None
+        self.runnable, self.woken = 0, dict[simpy.Event, bool]()
+        #: What the last thread waits for that lets others go on.
+        self.lets_others_go_on: simpy.Event | None = None
         #: When it sent anything last.
         self.sent_at = -1
         #: What a thread waits for that lets the other processes run. No other thread of its process runs until then.
@@ -155,18 +174,45 @@ class ProcessModel:
 
     def begin(self) -> None:
         """Start the main thread, in the order of the processes."""
-        self.world.schedule(0, TURNS + self.number, lambda: self.start(self.guarded(self.main())))
+        self.world.schedule(0, TURNS + self.number, lambda: self.start(self.guarded(self.main()), is_new=False))
 
-    def start(self, steps: Steps) -> None:
-        """Run a thread."""
-        self.world.environment.process(self.held(steps))
+    def start(self, steps: Steps, *, is_new: bool = True) -> simpy.Event:
+        """Start a thread, and return what the one that starts it waits for."""
+        thread, started = ThreadModel(is_new), simpy.Event(self.world.environment)
+        self.runnable += 1
+        self.world.environment.process(self.run(thread, started, steps))
+        return started
 
-    def held(self, steps: Steps) -> Steps:
-        """Run a thread, but while another one waits until the others have taken its messages."""
+    def run(self, thread: ThreadModel, started: simpy.Event, steps: Steps) -> Steps:
+        """Run a thread, but not while another one waits until the other processes have taken its messages."""
+        self.runnable -= 1
+        self.current = thread
+        started.succeed()
         for event in steps:
+            if event is not self.lets_others_go_on and event is not self.settling:
+                thread.is_new = False
             yield event
             while self.settling is not None and self.settling is not event:
                 yield self.settling
+            if event in self.woken:
+                self.runnable -= 1
+                thread.is_new = self.woken.pop(event)
+            self.current = thread
+
+    def wake_thread(self, event: simpy.Event) -> None:
+        """Let another thread go on that waits for this one."""
+        self.woken[event] = self.current is None or not self.current.is_new
+        self.runnable += 1
+        event.succeed()
+
+    def let_others_go_on(self) -> Steps:
+        """After the first text of a thread that another one has started or woken: let the others go on that can."""
+        assert self.current is not None
+        if self.current.is_new and self.runnable:
+            self.lets_others_go_on = event = simpy.Event(self.world.environment)
+            self.world.succeed(event, LAST)
+            yield event
+        self.current.is_new = False
 
     def guarded(self, steps: Steps) -> Steps:
         """Run the main thread until it ends, and note how."""
@@ -209,9 +255,9 @@ class ProcessModel:
         while self.alarms and self.alarms[0][0] <= self.world.now:
             event = heapq.heappop(self.alarms)[2]
             if not event.triggered:
-                event.succeed()
+                self.world.succeed(event, DUE)
         if news is not None and not news.triggered:
-            news.succeed()
+            self.world.succeed(news, LOOKING)
 
     news: simpy.Event | None = None
 
@@ -225,7 +271,7 @@ class ProcessModel:
     def wake(self) -> None:
         """Let an executor of another thread look for work again."""
         if self.news is not None and not self.news.triggered:
-            self.news.succeed()
+            self.world.succeed(self.news, LOOKING)
             self.news = None
 
     def look(self) -> int:
@@ -282,7 +328,7 @@ class ProcessModel:
                 yield from Executor(self, nodes).spin()
             case Spinning.MULTI:
                 yield from PoolExecutor(self, nodes).spin()
-        self.write("main 0")
+        yield from self.write("main 0")
 
     def in_turns(self, executor: Executor) -> Steps:
         """Call spin_once, which adds the node to the executor and removes it again, and so wakes the executor twice.
@@ -312,14 +358,14 @@ class ProcessModel:
                 yield from executor.spin_once(None, future)
             if not future.done:
                 raise AssertionError("a program that calls in turns has no other end")
-            self.write(f"until {future.value}")
+            yield from self.write(f"until {future.value}")
 
     def beside_a_thread(self, nodes: list[NodeModel]) -> Steps:
         loop, node = self.process.loop, nodes[0]
         assert loop is not None
         if loop.rate_ms:
             node.add_rate(loop.rate_ms)
-        self.start(Executor(self, nodes).spin())
+        yield self.start(Executor(self, nodes).spin())
         yield from self.pause(self.end_of(FIRST_NAP_MS * NS_PER_MS))
         scope = Scope(loop.name, loop.name)
         for turn in range(loop.turns):
@@ -366,13 +412,15 @@ class ProcessModel:
             node.runs[loop.name] = turn + 1
             yield from node.run(loop.body, scope)
 
-    def say(self, text: str) -> None:
+    def say(self, text: str) -> Steps:
         if not self.ended:
             self.world.expected.logs.setdefault(self.number, []).append((self.world.now, text))
+        yield from self.let_others_go_on()
 
-    def write(self, text: str) -> None:
+    def write(self, text: str) -> Steps:
         if not self.ended:
             self.world.expected.lines.setdefault(self.number, []).append((self.world.now, text))
+        yield from self.let_others_go_on()
 
 
 class NodeModel:
@@ -435,7 +483,7 @@ class NodeModel:
             rate.call()
             self.rate_set = True
             if self.waiting is not None:
-                self.waiting.succeed()
+                self.process.wake_thread(self.waiting)
                 self.waiting = None
             return nothing()
 
@@ -530,19 +578,19 @@ class NodeModel:
             case Feedback(value):
                 yield from self.action_servers[scope.name].feed(scope.goal, self.value(value, scope))
             case _:
-                self.do_at_once(one, scope)
+                yield from self.do_at_once(one, scope)
 
-    def do_at_once(self, one: Statement, scope: Scope) -> None:
-        """Do one statement that neither waits nor sends."""
+    def do_at_once(self, one: Statement, scope: Scope) -> Steps:
+        """Do one statement that takes no time and sends nothing."""
         match one:
             case Say(value):
-                self.process.say(f"{scope.label} {self.value(value, scope)}")
+                yield from self.process.say(f"{scope.label} {self.value(value, scope)}")
             case Write(value):
-                self.process.write(f"{scope.label} {self.value(value, scope)}")
+                yield from self.process.write(f"{scope.label} {self.value(value, scope)}")
             case Keep(slot, value, adds):
                 self.kept[slot] = self.value(value, scope) + (self.kept[slot] if adds else 0)
             case SetParameter(value):
-                self.set_parameter(self.value(value, scope))
+                yield from self.set_parameter(self.value(value, scope))
             case Cancel(timer):
                 self.timers[timer].cancelled = True
             case Reset(timer):
@@ -552,10 +600,10 @@ class NodeModel:
             case _:
                 raise AssertionError(one)
 
-    def set_parameter(self, number: int) -> None:
+    def set_parameter(self, number: int) -> Steps:
         """Ask the callback, and keep the number; rclpy stamps an event of each change."""
         if number >= 0:
-            self.process.say(f"parameter {number}")
+            yield from self.process.say(f"parameter {number}")
             self.parameter = number
             self.process.look()
 
@@ -594,7 +642,7 @@ class NodeModel:
             arrived = simpy.Event(self.world.environment)
 
             def unblock() -> Steps:
-                arrived.succeed()
+                self.process.wake_thread(arrived)
                 yield from nothing()
 
             future.callbacks.append(unblock)
@@ -727,11 +775,10 @@ class PoolExecutor(Executor):
     def execute(self, task: Task) -> Steps:
         self.submitted.append(task)
         if self.idle:
-            self.idle.pop().succeed()
+            self.process.wake_thread(self.idle.pop())
         elif self.started < self.process.process.threads:
             self.started += 1
-            self.process.start(self.work())
-        yield from nothing()
+            yield self.process.start(self.work())
 
     def left_by(self, task: Task) -> Generator[simpy.Event, Any, Leave | None]:
         """Run a task, and return how it would end the program; of a thread of a pool, sys.exit ends the task only."""
