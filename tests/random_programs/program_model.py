@@ -374,24 +374,37 @@ class ProcessModel:
         yield from self.pause(self.end_of(LAST_NAP_MS * NS_PER_MS))
 
     def in_coroutines(self, executor: Executor, node: NodeModel) -> Steps:
-        """Run the event loop of asyncio: coroutines in turn until all of them sleep, then the one that wakes first."""
+        """Run the event loop of asyncio: coroutines in turn until all of them sleep, then the one that wakes first.
+
+        An exception ends the loop three turns later, those of `gather`, of the coroutine that waits for it, and of the
+        loop itself. The coroutines that are ready go on until then.
+        """
         resting: list[tuple[int, int, Steps]] = []
         ready = deque([self.spin_and_rest(executor), self.work_and_rest(node)])
-        left = len(ready)
-        while left:
-            if not ready and resting[0][0] > max(self.world.now, self.shown):
+        left, failed, more = len(ready), None, 3
+        while left and more:
+            if failed is not None:
+                more -= 1
+            elif not ready and resting[0][0] > max(self.world.now, self.shown):
                 yield from self.pause(resting[0][0] + LATE_NS)
             while resting and resting[0][0] <= max(self.world.now, self.shown):
                 ready.append(heapq.heappop(resting)[2])
             for _ in range(len(ready)):
                 steps = ready.popleft()
-                for event in steps:
-                    if isinstance(event, Resting):
-                        heapq.heappush(resting, (event.until_ns, next(self.numbers), steps))
-                        break
-                    yield event
-                else:
-                    left -= 1
+                try:
+                    for event in steps:
+                        if isinstance(event, Resting):
+                            heapq.heappush(resting, (event.until_ns, next(self.numbers), steps))
+                            break
+                        yield event
+                    else:
+                        left -= 1
+                except Leave as leave:
+                    if leave.how is not Ending.RAISE:
+                        raise
+                    failed = leave
+        if failed is not None:
+            raise failed
 
     def rest(self, ms: int) -> Steps:
         """Let the event loop of asyncio go on for some time."""
