@@ -61,6 +61,7 @@ class RecordingSession:
         containment: What the self-test found the sandbox to prevent; empty without a sandbox.
         recorder: Runs jobs in its workers.
         folder: A temporary folder, removed at the end.
+        shared: Why own programs share the network of this machine, in words; empty if they do not.
     """
 
     ros: RosInstallation
@@ -68,6 +69,7 @@ class RecordingSession:
     containment: tuple[Property, ...]
     recorder: Recorder
     folder: Path
+    shared: str = ""
 
     def record(  # noqa: PLR0913  what to record, and who is told
         self,
@@ -217,7 +219,7 @@ def open_session(  # noqa: PLR0913  what to open, and who is told
     """Open a recording session, and close it at the end of the block.
 
     Args:
-        isolation: `auto`, `none` or the name of a tier.
+        isolation: As for `choose_isolation`.
         workers: How many scenarios to record in parallel; None to choose by the number of processors.
         progress: Called with a message when a sandbox has to be tested.
         warm: Whether to start a worker at once, not when something is recorded.
@@ -248,7 +250,7 @@ def open_session(  # noqa: PLR0913  what to open, and who is told
         with kept as recorder:
             if warm:
                 recorder.warm_up(workers)
-            yield RecordingSession(ros, tier, choice.containment, recorder, folder)
+            yield RecordingSession(ros, tier, choice.containment, recorder, folder, choice.lacks)
 
 
 def planned_clock(clock: str) -> str:
