@@ -14,6 +14,7 @@ from grader.execution.interfaces import interface_class, message_class, plain_fi
 from grader.student_host.quick_imports import import_without_needless
 
 import_without_needless("rosidl_generator_py")  # which takes as long as the rest, and warns of a deprecated module
+from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy  # noqa: E402
 from rclpy.qos import QoSProfile as QoSProfile  # noqa: E402, PLC0414 - whoever publishes may give one
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
@@ -77,6 +78,22 @@ def qos_words(profile: QoSProfile | None) -> tuple[str, str]:
     best_effort = profile is not None and profile.reliability == ReliabilityPolicy.BEST_EFFORT
     latched = profile is not None and profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
     return "best_effort" if best_effort else "reliable", "transient_local" if latched else "volatile"
+
+
+def action_type(interface: str) -> Any:
+    """Return the class of an action type; raises HarnessError if it is not installed."""
+    found = interface_class(interface, "action")
+    if found is None:
+        raise HarnessError(f"the action type {interface} is not installed here")
+    return found
+
+
+def parameter_message(name: str, value: Any) -> Any:
+    """Return a parameter as a message for a node's service; raises TypeError for a value that no parameter has."""
+    try:
+        return Parameter(name, value=list(value) if isinstance(value, tuple) else value).to_parameter_msg()
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"parameter {name}: expected a value of a ROS parameter, found {value!r}") from error
 
 
 def service_type(interface: str) -> Any:

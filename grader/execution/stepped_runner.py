@@ -46,8 +46,9 @@ from grader.execution.student_process import NodeProcess
 from grader.execution.virtual_runner import VirtualRunner, unfit
 from grader.simulation.participant import Moment, Output, Simulation
 
-#: Starts the processes of a plan; returns each with the time to wait before it runs, in nanoseconds.
-Starter = Callable[[Plan], Iterable[tuple[NodeProcess, int]]]
+#: Starts the processes of a plan; returns each with the time to wait before it runs, in nanoseconds. What a launch file
+#: asks for and nobody starts is added to the list, as sentences.
+Starter = Callable[[Plan, list[str]], Iterable[tuple[NodeProcess, int]]]
 #: Asks the other side, which answers with a value that fits the question.
 Question = Callable[[Mapping[str, Any]], Any]
 
@@ -217,15 +218,16 @@ class SteppedRunner(VirtualRunner):
 
     def _begin_processes(self, plan: Plan) -> dict[str, Any]:
         """Start processes; each runs until it waits for something."""
-        names = []
-        for student, delay_ns in self._start(plan):
+        names: list[str] = []
+        left_out: list[str] = []
+        for student, delay_ns in self._start(plan, left_out):
             self._students.append(student)
             student.wake_ns = self._now_ns + delay_ns
             if delay_ns:
                 self._starts_ns[student.name] = student.wake_ns
             names.append(student.name)
         self._advance(self._now_ns)
-        return {"started": names}
+        return {"started": names, "left_out": left_out}
 
     def _named(self, process: str) -> NodeProcess:
         return next(student for student in self._students if student.name == process)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import importlib
+import itertools
 import json
 import math
 import os
@@ -15,7 +16,7 @@ import socket
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, replace
 from pathlib import Path, PurePosixPath
@@ -139,8 +140,9 @@ class Worker:
         students: list[NodeProcess] = []
         failed = False
 
-        def start(added: Plan) -> Iterator[tuple[NodeProcess, int]]:
+        def start(added: Plan, left_out: list[str]) -> Iterator[tuple[NodeProcess, int]]:
             sys.path += [folder for folder in added.interfaces if folder not in sys.path]  # installed ones come first
+            added = self._with_launched(added, domain, {student.name for student in students}, left_out)
             for name, file in added.processes:
                 student = self._start(added, name, file, domain)
                 began.callback(stop_now, student)
@@ -179,6 +181,36 @@ class Worker:
                     break
                 tell({**answer, **common})
         return failed or usage([os.getpid()]).memory_bytes > WORN_BYTES
+
+    def _with_launched(self, plan: Plan, domain: int, used: Collection[str], left_out: list[str]) -> Plan:
+        """Return a plan with the nodes of its launch file, by names that no process has; the plan itself without one.
+
+        Raises HarnessError if the launch file describes nothing that can be started, and adds what it leaves out.
+        """
+        launch = next(((name, file) for name, file in plan.processes if is_launch_file(name)), None)
+        if launch is None:
+            return plan
+        name, file = launch
+        made = self._evaluate(plan, name, file, domain, Budget(plan.limits.wall_ns, ""))
+        left_out += [*made.left_out, *(text for text, _ in made.unstarted)]
+        if made.harness_problem or made.fault is not None or not made.processes:
+            fault = made.fault
+            place = name if fault is None or not fault.file else f"{fault.file}:{fault.line}"
+            why = made.harness_problem or (fault.text if fault is not None else "; ".join(left_out))
+            raise HarnessError(f"{place}: {why}")
+        names: dict[str, str] = {}
+        for process, _ in made.processes:
+            label = process.removeprefix(f"{name} ")
+            others = {*used, *names.values()}
+            numbered = (f"{label} ({number})" for number in itertools.count(2))
+            names[process] = label if label not in others else next(one for one in numbered if one not in others)
+        found = expanded(plan, {name: made})
+        return replace(
+            found,
+            processes=tuple((names.get(process, process), file) for process, file in found.processes),
+            starts=tuple(replace(start, process=names.get(start.process, start.process)) for start in found.starts),
+            starts_ns=tuple((names.get(process, process), delay_ns) for process, delay_ns in found.starts_ns),
+        )
 
     def _remembers_connections(self) -> bool:
         """Return whether nodes have left TCP connections in the worker's own network; the grader uses none."""

@@ -11,5 +11,9 @@ class StepTimeout(AssertionError):  # noqa: N818 - the same
     """What was waited for did not happen in time."""
 
 
+class ParameterRejected(AssertionError):  # noqa: N818 - the same
+    """A node did not accept the value of a parameter."""
+
+
 class NoMessage(IndexError):  # noqa: N818 - the same
     """A message was asked for that has not come, such as the last one of a silent topic."""

@@ -14,8 +14,9 @@ from grader.app.programs import package_of, workspace_of
 from grader.core.dataclass import dataclass
 from grader.core.errors import SubmissionError
 from grader.core.projects import Project
+from grader.core.scenario import is_launch_file
 from grader.core.trace import Fault, LogRecord, OutputLine
-from grader.execution.executables import executables, find_executables
+from grader.execution.executables import Executable, executables, find_executables
 from grader.judging.wording import listed, nearest
 from grader.submissions.projects import read_projects
 
@@ -108,6 +109,23 @@ def _surroundings(folder: Path) -> tuple[Path, tuple[Project, ...]]:
 @cache
 def _projects(root: Path) -> tuple[Project, ...]:
     return tuple(read_projects(root)[0])
+
+
+def find_launch_file(wanted: str | os.PathLike[str], near: Sequence[Path]) -> tuple[Found, tuple[tuple[str, str], ...]]:
+    """Find a launch file, and return it with the name of each program that it may start, by the program's file.
+
+    Raises SubmissionError if there is none.
+    """
+    found = find_program(wanted, near)
+    if not is_launch_file(found.name):
+        raise SubmissionError(f"{found.name}: expected a launch file", "its name ends with .launch.py, .xml or .yaml")
+    known = [(f"{one.file} {one.name}" if one.target else one.file, one.words) for one in _runnable(found)]
+    loose = () if found.projects else ((path.name, path.name) for path in sorted(found.root.glob("*.py")))
+    return found, (*((file, name) for file, name in known if file), *loose)
+
+
+def _runnable(found: Found) -> list[Executable]:
+    return [one for one in executables(found.root, found.projects) if one.file is not None]
 
 
 def parameter_values(parameters: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

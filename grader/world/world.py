@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -21,20 +22,33 @@ from grader.core.trace import (
     LogRecord,
     Message,
     Observation,
+    Offer,
     OutputLine,
     Response,
     Trace,
 )
+from grader.execution.exchanges import PlannedGoal
 from grader.execution.interfaces import built, plain_fields
 from grader.execution.plan import Plan, PlannedStart, derive, ros_arguments
 from grader.execution.recording_session import RecordingSession
-from grader.execution.serialization import QoSProfile, qos_words, read, serialized, service_type, type_name
+from grader.execution.serialization import (
+    QoSProfile,
+    action_type,
+    parameter_message,
+    qos_words,
+    read,
+    serialized,
+    service_type,
+    type_name,
+)
 from grader.execution.shares import install_shares
 from grader.execution.stepping import SteppedRun
-from grader.execution.steps import Advance, Call, Command, Interrupt, Kill, Publish, Serve, Start
+from grader.execution.steps import Advance, Call, Command, Interrupt, Kill, Publish, SendGoal, Serve, Simulate, Start
+from grader.simulation.loading import made
+from grader.simulation.participant import Moment, Simulation
 from grader.world import telling
-from grader.world.errors import NoMessage, ProgramFailed, StepTimeout
-from grader.world.programs import Found, Program, Runnable, find_program, parameter_values
+from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout
+from grader.world.programs import Found, Program, Runnable, find_launch_file, find_program, parameter_values
 
 Value = TypeVar("Value")
 
@@ -85,6 +99,24 @@ class Messages(list[Value]):
             return super().__getitem__(index)
         except IndexError:
             raise NoMessage(self._why() if not self else f"only {len(self)} messages so far") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Launched:
+    """What was started of a launch file."""
+
+    programs: list[Program]
+    left_out: list[str]  # sentences about what was not started, such as programs that are not written in Python
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a goal of an action ended."""
+
+    accepted: bool
+    status: int  # as in action_msgs/msg/GoalStatus, 0 if it was not accepted
+    result: Any  # the result, an object of its class; None if it was not accepted
+    feedback: list[Received]  # the feedback to this goal
 
 
 class Failure:
@@ -160,6 +192,8 @@ class World:
         self._offers: dict[str, Endpoint] = {}
         self._expected: list[Failure] = []
         self._failing: list[tuple[Program, Fault]] = []
+        self._simulations: list[Simulation] = []
+        self._goals = 0
         self._notes: list[str] = []
         self._unsuitable = ""
         self._run = SteppedRun(session.recorder, self._plan, self._answered)
@@ -207,6 +241,24 @@ class World:
         self._programs[label] = started = Program(label, found.root, self._signal)
         self._perform(Start(self._plan_of(found, start, env or {})))
         return started
+
+    def launch(self, file: str | Path, *, arguments: Mapping[str, Any] | None = None) -> Launched:
+        """Start the nodes that a launch file describes.
+
+        Args:
+            file: The launch file, looked for like a program.
+            arguments: Values of its arguments.
+
+        Raises:
+            SubmissionError: There is no such file.
+            HarnessError: It raises an exception, or describes nothing that can be started.
+        """
+        __tracebackhide__ = True
+        found, known = find_launch_file(file, self._near)
+        given = tuple((name, str(value)) for name, value in (arguments or {}).items())
+        start = PlannedStart(found.name, launch_arguments=given, known=known)
+        told = self._perform(Start(self._plan_of(found, start, {})))
+        return Launched([self._programs[name] for name in told["started"]], told["left_out"])
 
     def _plan_of(self, found: Found, start: PlannedStart, env: Mapping[str, str]) -> Plan:
         prefixes: tuple[str, ...] = ()
@@ -384,12 +436,7 @@ class World:
         since_ns, seen = self._run.now_ns, len(self._observations)
         told = self._perform(Call(name, interface, plain_fields(request)))
 
-        def response() -> Response | None:
-            wanted = (name, "student", told["client"])
-            found = (o for o in self._observations[seen:] if isinstance(o, Response))
-            return next((o for o in found if (o.service, o.sender, o.client) == wanted), None)
-
-        found = self._until(response, since_ns + round(timeout * NS_PER_S))
+        found = self._until(lambda: self._response(seen, name, told["client"]), since_ns + round(timeout * NS_PER_S))
         if found is not None:
             return built(kind.Response, found.value, name)
         offered = any((e.service, e.type) == (name, interface) for e in telling.service_ends(self._graph, "service"))
@@ -399,6 +446,98 @@ class World:
             else telling.no_server(self.trace(), name, interface)
         )
         raise StepTimeout(self._timeout(f"{name} did not answer", since_ns, {"the service": [why]}))
+
+    def send_goal(self, name: str, goal: Any, *, cancel_after: float | None = None, timeout: float = 60.0) -> Outcome:
+        """Send a goal to an action, let time pass until its result is there, and return it.
+
+        Args:
+            name: Name of the action.
+            goal: The goal, such as `Fibonacci.Goal(order=5)`.
+            cancel_after: Seconds after its acceptance at which the goal is cancelled; None to let it go on.
+            timeout: Seconds of virtual time to wait at most.
+
+        Raises:
+            StepTimeout: There was no result in time.
+        """
+        __tracebackhide__ = True
+        name = _absolute(name)
+        interface = type_name(type(goal))
+        kind = action_type(interface)
+        self._goals += 1
+        uuid = tuple(bytes.fromhex(derive(self._seed, "goal", str(self._goals))[:32]))
+        after_ns = 0 if cancel_after is None else max(1, round(cancel_after * NS_PER_S))
+        since_ns, seen = self._run.now_ns, len(self._observations)
+        told = self._perform(SendGoal(PlannedGoal(name, interface, since_ns, after_ns, plain_fields(goal), uuid)))
+        sent, asked = told["clients"][:2]
+
+        def ended() -> Outcome | None:
+            accepted = self._response(seen, f"{name}/_action/send_goal", sent)
+            result = self._response(seen, f"{name}/_action/get_result", asked)
+            if accepted is None or (accepted.value["accepted"] and result is None):
+                return None
+            if result is None:
+                return Outcome(accepted=False, status=0, result=None, feedback=[])
+            feedback = [
+                Received(one.t, one.message.feedback)
+                for one in self.received(f"{name}/_action/feedback")
+                if tuple(one.message.goal_id.uuid) == uuid
+            ]
+            ending = built(kind.Result, result.value["result"], name)
+            return Outcome(accepted=True, status=result.value["status"], result=ending, feedback=feedback)
+
+        found = self._until(ended, since_ns + round(timeout * NS_PER_S))
+        if found is not None:
+            return found
+        accepted = self._response(seen, f"{name}/_action/send_goal", sent)
+        why = "it has accepted the goal" if accepted is not None else "it has not answered the goal"
+        offered = any(f"{name}/_action/send_goal" == offer.name for offer in self.trace().of(Offer))
+        first = {"the action": [why if offered else f"nobody offers the action {name}"]}
+        raise StepTimeout(self._timeout(f"{name} gave no result", since_ns, first))
+
+    def _response(self, seen: int, service: str, client: int) -> Response | None:
+        """Return the response of a program to a client of the test, among the observations from a number on."""
+        found = (o for o in self._observations[seen:] if isinstance(o, Response))
+        return next((o for o in found if (o.service, o.sender, o.client) == (service, "student", client)), None)
+
+    def set_parameter(self, node: str, name: str, value: Any, *, timeout: float = 10.0) -> None:
+        """Set a parameter of a node while it is running, as `ros2 param set` does.
+
+        Args:
+            node: Full name of the node.
+            name: Name of the parameter.
+            value: Its value.
+            timeout: Seconds of virtual time to wait at most.
+
+        Raises:
+            ParameterRejected: The node does not accept the value, or has not declared the parameter.
+            StepTimeout: There is no such node, or it does not answer.
+        """
+        __tracebackhide__ = True
+        kind = service_type("rcl_interfaces/srv/SetParameters")
+        request = kind.Request(parameters=[parameter_message(name, value)])
+        result = self.call(f"{_absolute(node)}/set_parameters", request, timeout=timeout).results[0]
+        if not result.successful:
+            raise ParameterRejected(f"{_absolute(node)}: {name} = {value!r} was not accepted: {result.reason}")
+
+    def simulate(self, simulation: Simulation | str, **parameters: Any) -> Simulation:
+        """Let a simulation take part from now on; its methods run in the test's process, while time stands still.
+
+        Args:
+            simulation: An object of a class that derives from `grader.api.Simulation`, or the name of a built-in one.
+            **parameters: Of a built-in one.
+
+        Returns:
+            The simulation, whose state the test may look at.
+        """
+        __tracebackhide__ = True
+        if isinstance(simulation, str):
+            simulation = made(simulation, "", b"", parameters)
+        number = len(self._simulations)
+        self._simulations.append(simulation)
+        simulation.begin(random.Random(derive(self._seed, "simulation", str(number))))  # noqa: S311 - it has to repeat
+        offers = simulation.publishes(), simulation.hears(), simulation.serves()
+        self._perform(Simulate(number, simulation.period, *map(dict, offers)))
+        return simulation
 
     # --------------------------------------------------------------- looking
 
@@ -511,6 +650,9 @@ class World:
         if self._run.is_busy:
             raise RuntimeError("a function that answers for the test cannot let time pass or act on the programs")
         told, observations = self._run.perform(command)
+        if isinstance(command, Start):
+            for name in told["started"]:
+                self._programs.setdefault(name, Program(name, Path(command.plan.root), self._signal))
         self._adopt(observations)
         if self._run.full:
             raise GraderError(f"the test was ended: {self._run.full}")
@@ -544,7 +686,11 @@ class World:
                 innermost.program, innermost.fault = program, fault
 
     def _answered(self, question: Mapping[str, Any]) -> Any:
-        """Answer a question of the worker: what a served function responds."""
+        """Answer a question of the worker: what a simulation does, or what a served function responds."""
+        if question["ask"] == "simulation":
+            now = Moment(question["now_ns"], question["clock_ns"])
+            answer = getattr(self._simulations[question["number"]], question["method"])(now, *question["arguments"])
+            return dict(answer) if isinstance(answer, Mapping) else [*answer]
         name = question["service"]
         kind, function = self._functions[name]
         response = function(built(kind.Request, question["request"], name))
