@@ -5,8 +5,9 @@ It is loaded wherever the package is installed, and imports nothing of ROS befor
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -79,8 +80,14 @@ def _ros_seed(request: pytest.FixtureRequest) -> int | None:
 
 
 @pytest.fixture
-def ros(request: pytest.FixtureRequest, ros_session: Worlds, _ros_seed: int | None) -> Iterator[World]:
+def ros(
+    request: pytest.FixtureRequest,
+    ros_session: Worlds,
+    _ros_seed: int | None,
+    tmp_path: Path,
+) -> Iterator[World]:
     """A world of its own for a test: real nodes, real messages, virtual time."""
+    del tmp_path  # what a failing test leaves lies there
     options = _options(request.node)
     opened = ros_session.open(
         request.path.parent,
@@ -94,6 +101,31 @@ def ros(request: pytest.FixtureRequest, ros_session: Worlds, _ros_seed: int | No
         yield world
     if world.problem:
         pytest.fail(world.problem, pytrace=False)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Keep the recording of a test that has failed, and the page that plays it, and name them in the failure."""
+    report = yield
+    world = item.stash.get(_WORLD, None)
+    if world is not None and call.when == "call" and report.failed and call.excinfo is not None:
+        lines = [f"seed {world.seed}: repeat it with --ros-seed {world.seed}"] if world.is_drawn else []
+        report.sections.append(("ros", "\n".join([*lines, *_kept(item, world, call.excinfo)])))
+    return report
+
+
+def _kept(item: Any, world: World, failure: pytest.ExceptionInfo[BaseException]) -> Iterator[str]:
+    """Close the world of a failed test, and yield what is kept of it."""
+    why = failure.exconly(tryshort=True).splitlines()[0]
+    try:
+        from grader.world.keeping import keep  # noqa: PLC0415 - only a failure needs it
+
+        world.close()
+        yield from map(str, keep(world, item.funcargs["tmp_path"], why))
+    except Exception as error:  # the failure of the test is what counts
+        yield f"the recording was not kept: {type(error).__name__}: {error}"
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:

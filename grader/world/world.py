@@ -150,6 +150,9 @@ class World:
         drawn_order: Whether the seed decides which of several ready programs runs first.
         delay: For topics that the test publishes on, the least and the most seconds that a message is on its way.
         lose: For such topics, the share of messages that are lost.
+
+    Attributes:
+        session: What the programs run in.
     """
 
     def __init__(  # noqa: PLR0913 - the options of the marker
@@ -163,7 +166,7 @@ class World:
         delay: Mapping[str, tuple[float, float]] | None = None,
         lose: Mapping[str, float] | None = None,
     ) -> None:
-        self._session = session
+        self.session = session
         self._near = tuple(near)
         self._seed = seed
         self._delay = {_absolute(topic): between for topic, between in (delay or {}).items()}
@@ -263,8 +266,8 @@ class World:
     def _plan_of(self, found: Found, start: PlannedStart, env: Mapping[str, str]) -> Plan:
         prefixes: tuple[str, ...] = ()
         if found.projects:
-            installed = self._session.folder / f"installed_{derive(0, str(found.root))[:16]}"
-            prefixes, _ = install_shares(found.root, found.projects, installed, self._session.ros)
+            installed = self.session.folder / f"installed_{derive(0, str(found.root))[:16]}"
+            prefixes, _ = install_shares(found.root, found.projects, installed, self.session.ros)
         return replace(
             self._plan,
             processes=((start.process, found.file),),
@@ -630,6 +633,11 @@ class World:
     def seed(self) -> int:
         """What everything drawn in this run follows from."""
         return self._seed
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether anything in this run was drawn from its seed."""
+        return self._plan.drawn_order or bool(self._delay or self._lose)
 
     @property
     def problem(self) -> str:
