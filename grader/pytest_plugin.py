@@ -111,8 +111,10 @@ def pytest_runtest_makereport(
     report = yield
     world = item.stash.get(_WORLD, None)
     if world is not None and call.when == "call" and report.failed and call.excinfo is not None:
-        lines = [f"seed {world.seed}: repeat it with --ros-seed {world.seed}"] if world.is_drawn else []
-        report.sections.append(("ros", "\n".join([*lines, *_kept(item, world, call.excinfo)])))
+        drawn = [f"seed {world.seed}: repeat it with --ros-seed {world.seed}"] if world.is_drawn else []
+        lines = [*drawn, *_kept(item, world, call.excinfo)]
+        report.sections.append(("ros", "\n".join(lines)))
+        item.user_properties += [("ros", line) for line in lines]  # which files for JUnit hold
     return report
 
 
