@@ -122,10 +122,8 @@ def _kept(item: Any, world: World, failure: pytest.ExceptionInfo[BaseException])
     """Close the world of a failed test, and yield what is kept of it."""
     why = failure.exconly(tryshort=True).splitlines()[0]
     try:
-        from grader.world.keeping import keep  # noqa: PLC0415 - only a failure needs it
-
         world.close()
-        yield from map(str, keep(world, item.funcargs["tmp_path"], why))
+        yield from map(str, world.keep(item.funcargs["tmp_path"], why))
     except Exception as error:  # the failure of the test is what counts
         yield f"the recording was not kept: {type(error).__name__}: {error}"
 

@@ -3,28 +3,59 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import asdict, replace
-from fractions import Fraction
 from pathlib import Path
 
 from grader.app.grade import environment_of
-from grader.core.exercise import Outcome
-from grader.core.report import ExerciseReport, Report, Verdict
-from grader.core.trace import ClockKind, Delivery, Message, Observation, Trace
+from grader.core.trace import Delivery, Fault, LogRecord, Message, Observation, OutputLine, Trace
 from grader.execution.evidence.recording_file import recording_bytes
+from grader.execution.recording_session import RecordingSession
 from grader.execution.serialization import fields_of
 from grader.files import write_whole
 from grader.judging.figures import playback
-from grader.reporting.html.render import render_html
-from grader.world.world import World
+from grader.reporting.html.render import render_run
 
+#: Who published on a topic, in the words of a test.
+SENDERS = {"grader": "test", "student": "program"}
 RECORDING, PAGE = "recording.mcap", "run.html"
 
 
-def whole_trace(world: World) -> Trace:
-    """Return what was observed in a world, with the fields of its messages."""
-    trace = world.trace()
+def keep(session: RecordingSession, trace: Trace, seed: int | None, folder: Path, why: str) -> list[Path]:
+    """Write the recording and the page of a run into a folder, and return their paths.
+
+    Args:
+        session: What it ran in.
+        trace: What was observed.
+        seed: What was drawn follows from it; None if nothing was.
+        folder: Exists.
+        why: Why the test failed, in one line; empty if it did not.
+    """
+    trace = _whole(trace)
+    facts = {
+        "format": "grader/test/v1",
+        "seed": "" if seed is None else str(seed),
+        "environment": json.dumps(asdict(environment_of(session))),
+    }
+    recording, _ = recording_bytes(trace, facts, RECORDING)
+    page = page_of(session, trace, seed, why)
+    for name, data in ((RECORDING, recording), (PAGE, page.encode())):
+        write_whole(folder / name, data)
+    return [folder / RECORDING, folder / PAGE]
+
+
+def page_of(session: RecordingSession, trace: Trace, seed: int | None, why: str = "") -> str:
+    """Return the page that plays a run, in one file; the arguments are those of `keep`."""
+    environment = environment_of(session)
+    facts = {} if seed is None else {"seed": str(seed)}
+    facts |= {"ROS": f"rclpy {environment.rclpy} ({environment.ros_distro})", "Python": environment.python}
+    processes = {o.process: None for o in trace.observations if isinstance(o, (LogRecord, OutputLine, Fault))}
+    run = playback(_whole(trace), "run", [*processes])
+    topics = tuple(replace(topic, sender=SENDERS[topic.sender]) for topic in run.topics)
+    return render_run(trace.scenario, why, replace(run, topics=topics), facts)
+
+
+def _whole(trace: Trace) -> Trace:
+    """Return a trace with the fields of its messages."""
     return replace(trace, observations=tuple(map(_with_fields, trace.observations)))
 
 
@@ -32,50 +63,3 @@ def _with_fields(observation: Observation) -> Observation:
     if isinstance(observation, (Message, Delivery)):
         return replace(observation, value=fields_of(observation))
     return observation
-
-
-def keep(world: World, folder: Path, why: str) -> Iterator[Path]:
-    """Write the recording and the page of a world into a folder, and yield their paths.
-
-    Args:
-        world: The world; it is closed.
-        folder: Exists.
-        why: Why the test failed, in one line; empty if it did not.
-    """
-    trace = whole_trace(world)
-    environment = environment_of(world.session)
-    facts = {"format": "grader/test/v1", "seed": str(world.seed), "environment": json.dumps(asdict(environment))}
-    recording, _ = recording_bytes(trace, facts, RECORDING)
-    for name, data in ((RECORDING, recording), (PAGE, page_of(world, trace, why).encode())):
-        write_whole(folder / name, data)
-        yield folder / name
-
-
-def page_of(world: World, trace: Trace, why: str) -> str:
-    """Return the page that plays a run, in one file."""
-    name = trace.scenario
-    outcome, earned = (Outcome.NOT_MET, Fraction(0)) if why else (Outcome.MET, Fraction(1))
-    verdict = Verdict("test", name, outcome, earned, Fraction(1), why or "the test has passed")
-    played = replace(playback(trace, name, [program.name for program in world.programs]), criteria=("test",))
-    exercise = ExerciseReport(
-        id="test",
-        number="",
-        title=name,
-        required=False,
-        clock=ClockKind.VIRTUAL,
-        clock_reason="",
-        verdicts=(verdict,),
-        notes=trace.notes,
-        graph=world.graph(),
-        figures=(played,),
-    )
-    report = Report(
-        name=name,
-        path="",
-        digest="",
-        environment=environment_of(world.session),
-        seed=world.seed,
-        exercises=(exercise,),
-        duration_s=0.0,
-    )
-    return render_html(report)

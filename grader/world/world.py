@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -110,7 +111,7 @@ class Launched:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class GoalResult:
     """How a goal of an action ended."""
 
     accepted: bool
@@ -450,7 +451,9 @@ class World:
         )
         raise StepTimeout(self._timeout(f"{name} did not answer", since_ns, {"the service": [why]}))
 
-    def send_goal(self, name: str, goal: Any, *, cancel_after: float | None = None, timeout: float = 60.0) -> Outcome:
+    def send_goal(
+        self, name: str, goal: Any, *, cancel_after: float | None = None, timeout: float = 60.0
+    ) -> GoalResult:
         """Send a goal to an action, let time pass until its result is there, and return it.
 
         Args:
@@ -473,20 +476,20 @@ class World:
         told = self._perform(SendGoal(PlannedGoal(name, interface, since_ns, after_ns, plain_fields(goal), uuid)))
         sent, asked = told["clients"][:2]
 
-        def ended() -> Outcome | None:
+        def ended() -> GoalResult | None:
             accepted = self._response(seen, f"{name}/_action/send_goal", sent)
             result = self._response(seen, f"{name}/_action/get_result", asked)
             if accepted is None or (accepted.value["accepted"] and result is None):
                 return None
             if result is None:
-                return Outcome(accepted=False, status=0, result=None, feedback=[])
+                return GoalResult(accepted=False, status=0, result=None, feedback=[])
             feedback = [
                 Received(one.t, one.message.feedback)
                 for one in self.received(f"{name}/_action/feedback")
                 if tuple(one.message.goal_id.uuid) == uuid
             ]
             ending = built(kind.Result, result.value["result"], name)
-            return Outcome(accepted=True, status=result.value["status"], result=ending, feedback=feedback)
+            return GoalResult(accepted=True, status=result.value["status"], result=ending, feedback=feedback)
 
         found = self._until(ended, since_ns + round(timeout * NS_PER_S))
         if found is not None:
@@ -628,6 +631,30 @@ class World:
             clock_reason=self._unsuitable,
             notes=tuple(self._notes),
         )
+
+    def keep(self, folder: Path | str, why: str = "") -> list[Path]:
+        """Write what happened so far into a folder, and return the paths: an MCAP file, and a page that plays the run.
+
+        Args:
+            folder: Where; it is created if it is not there.
+            why: What the page says above the run.
+        """
+        from grader.world.keeping import keep  # noqa: PLC0415 - takes long, and most tests pass
+
+        place = Path(folder)
+        place.mkdir(parents=True, exist_ok=True)
+        return keep(self.session, self.trace(), self._drawn, place, why)
+
+    def _repr_html_(self) -> str:
+        """Return the run so far as a notebook shows it: a page in the page that plays it."""
+        from grader.world.keeping import page_of  # noqa: PLC0415 - as above
+
+        page = html.escape(page_of(self.session, self.trace(), self._drawn))
+        return f'<iframe sandbox="allow-scripts" style="width:100%;height:60em;border:0" srcdoc="{page}"></iframe>'
+
+    @property
+    def _drawn(self) -> int | None:
+        return self._seed if self.is_drawn else None
 
     @property
     def seed(self) -> int:
