@@ -59,17 +59,17 @@ class RecordingSession:
         ros: The ROS installation that nodes run on.
         isolation: The sandbox tier.
         containment: What the self-test found the sandbox to prevent; empty without a sandbox.
+        shared: Why own programs share the network of this machine, in words; empty if they do not.
         recorder: Runs jobs in its workers.
         folder: A temporary folder, removed at the end.
-        shared: Why own programs share the network of this machine, in words; empty if they do not.
     """
 
     ros: RosInstallation
     isolation: Isolation
     containment: tuple[Property, ...]
+    shared: str
     recorder: Recorder
     folder: Path
-    shared: str = ""
 
     def record(  # noqa: PLR0913  what to record, and who is told
         self,
@@ -250,7 +250,7 @@ def open_session(  # noqa: PLR0913  what to open, and who is told
         with kept as recorder:
             if warm:
                 recorder.warm_up(workers)
-            yield RecordingSession(ros, tier, choice.containment, recorder, folder, choice.lacks)
+            yield RecordingSession(ros, tier, choice.containment, choice.lacks, recorder, folder)
 
 
 def planned_clock(clock: str) -> str:
