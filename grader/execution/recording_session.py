@@ -18,7 +18,7 @@ from grader.execution.domains import private_domains, shared_domains
 from grader.execution.pace import keeps_pace
 from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.ros_installation import RosInstallation, find_ros
-from grader.execution.sandbox.choose import choose_isolation
+from grader.execution.sandbox.choose import OWN_PROGRAMS, choose_isolation
 from grader.execution.sandbox.protocol import Isolation
 from grader.execution.supervisor import Job, Recorder
 from grader.execution.temp_dirs import scratch_folder
@@ -229,7 +229,7 @@ def open_session(  # noqa: PLR0913  what to open, and who is told
     Raises:
         EnvironmentFault: This machine lacks ROS or the requested tier.
     """
-    ros = find_ros()
+    ros = find_ros(workspaces=isolation == OWN_PROGRAMS)
     choice = choose_isolation(isolation, ros, progress)
     tier = choice.isolation
     domains = shared_domains() if tier.shares_network else private_domains()
