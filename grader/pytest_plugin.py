@@ -99,7 +99,7 @@ def ros(
     with opened as world:
         request.node.stash[_WORLD] = world
         yield world
-    if world.problem:
+    if world.problem and _WORLD in request.node.stash:
         pytest.fail(world.problem, pytrace=False)
 
 
@@ -111,6 +111,7 @@ def pytest_runtest_makereport(
     report = yield
     world = item.stash.get(_WORLD, None)
     if world is not None and call.when == "call" and report.failed and call.excinfo is not None:
+        del item.stash[_WORLD]  # the fixture has nothing to add
         drawn = [f"seed {world.seed}: repeat it with --ros-seed {world.seed}"] if world.is_drawn else []
         lines = [*drawn, *_kept(item, world, call.excinfo)]
         report.sections.append(("ros", "\n".join(lines)))

@@ -30,7 +30,7 @@ MOST_LINES, LINE_CHARACTERS = 8, 160
 _HAPPENED = {
     FaultKind.SYNTAX_ERROR: "could not be compiled",
     FaultKind.EXCEPTION: "raised an exception",
-    FaultKind.HUNG: "does not let time pass",
+    FaultKind.HUNG: "was stopped",
     FaultKind.KILLED: "was ended",
     FaultKind.EXITED: "ended",
 }

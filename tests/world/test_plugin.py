@@ -170,6 +170,35 @@ def test_a_wider_scope_and_several_processes(suite: pytest.Pytester) -> None:
     run(suite, FAILS, "-n", "2").assert_outcomes(passed=1, failed=2)
 
 
+UNSUITABLE = """
+import pytest
+
+def test_it(ros):
+    with open("sub.py", "w") as program:
+        program.write("import subprocess\\nsubprocess.run(['true'])\\n")
+    ros.run("sub.py")
+
+def test_although_it_expects_a_failure(ros):
+    with ros.expects_failure():
+        ros.run("sub.py")
+"""
+
+
+def test_what_virtual_time_does_not_suit_fails_once(suite: pytest.Pytester) -> None:
+    """A program that starts another process is told with its line; no test passes with it."""
+    result = run(suite, UNSUITABLE)
+    result.assert_outcomes(failed=1, passed=1, errors=1)
+    result.stdout.fnmatch_lines(
+        [
+            "E *ProgramFailed: sub.py was stopped at t = 0.000 s",
+            "E *sub.py?, line 2, in <module>",
+            "E * starts another process, which runs in real time",
+        ]
+    )
+    text = "virtual time does not suit these programs: *: sub.py:2 starts another process, which runs in real time"
+    result.stdout.fnmatch_lines([text])
+
+
 def test_a_wrong_option_of_the_marker_is_told(suite: pytest.Pytester) -> None:
     """It names what there is."""
     text = "import pytest\n@pytest.mark.ros(sede=1)\ndef test_it(ros): pass\n"
