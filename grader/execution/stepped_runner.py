@@ -138,7 +138,7 @@ class SteppedRunner(VirtualRunner):
             case Advance():
                 self._advance(command.to_ns, until_news=command.until_news)
             case Start():
-                return self._begin_processes(command.plan)
+                return self._begin_processes(command)
             case Publish():
                 self._publish(command)
             case Serve():
@@ -216,17 +216,17 @@ class SteppedRunner(VirtualRunner):
 
     # ------------------------------------------------------------- processes
 
-    def _begin_processes(self, plan: Plan) -> dict[str, Any]:
-        """Start processes; each runs until it waits for something."""
+    def _begin_processes(self, command: Start) -> dict[str, Any]:
         names: list[str] = []
         left_out: list[str] = []
-        for student, delay_ns in self._start(plan, left_out):
+        for student, delay_ns in self._start(command.plan, left_out):
             self._students.append(student)
             student.wake_ns = self._now_ns + delay_ns
             if delay_ns:
                 self._starts_ns[student.name] = student.wake_ns
             names.append(student.name)
-        self._advance(self._now_ns)
+        if command.settle:
+            self._advance(self._now_ns)
         return {"started": names, "left_out": left_out}
 
     def _named(self, process: str) -> NodeProcess:

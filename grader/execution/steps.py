@@ -12,9 +12,15 @@ from grader.execution.plan import Plan
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Start the processes of a plan, and let each run until it waits for something."""
+    """Start the processes of a plan.
+
+    Attributes:
+        plan: Names the processes.
+        settle: Whether to let each run until it waits for something; otherwise they run with the next step, together.
+    """
 
     plan: Plan
+    settle: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,11 +81,9 @@ def open_world(
     delay: Mapping[str, tuple[float, float]] | None = None,
     lose: Mapping[str, float] | None = None,
 ) -> Iterator[World]:
-    """Run programs in virtual time without pytest, in a script or a notebook.
+    """Run programs in virtual time without pytest: in a script, or in the cells of a notebook.
 
-        with open_world() as ros:
-            robot = ros.run("obstacle_stop.py")
-            ros.advance(5.0)
+    A notebook shows the world, as the last value of a cell, as a page that plays the run so far.
 
     Args:
         near: Where programs are looked for first.

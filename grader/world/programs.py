@@ -155,10 +155,13 @@ class Program:
         root: The folder that places in its code are relative to.
     """
 
-    def __init__(self, name: str, root: Path, signal: Callable[[Program, str], None]) -> None:
+    def __init__(
+        self, name: str, root: Path, signal: Callable[[Program, str], None], await_start: Callable[[], None]
+    ) -> None:
         self.name = name
         self.root = root
         self._signal = signal
+        self._await_start = await_start
         self._logs: list[LogRecord] = []
         self._lines: list[OutputLine] = []
         self._ended = False
@@ -167,27 +170,35 @@ class Program:
 
     def __repr__(self) -> str:
         """Return name and state."""
-        state = "running" if self.running else f"exited with code {self.exit_code}"
+        state = f"exited with code {self._exit_code}" if self._ended else "running"
         return f"<Program {self.name}: {state}>"
 
     @property
     def logs(self) -> list[LogRecord]:
         """What it has logged through rclpy: `t_ns`, `severity`, `logger`, `text`, `file` and `line`."""
+        __tracebackhide__ = True
+        self._await_start()
         return [*self._logs]
 
     @property
     def output(self) -> str:
         """What it has written to standard output and standard error, without log records."""
+        __tracebackhide__ = True
+        self._await_start()
         return "".join(f"{line.text}\n" for line in self._lines)
 
     @property
     def running(self) -> bool:
         """Whether it has not ended."""
+        __tracebackhide__ = True
+        self._await_start()
         return not self._ended
 
     @property
     def exit_code(self) -> int | None:
         """Its exit code as a shell shows it, so 128 and the number of a signal that ended it; None while it runs."""
+        __tracebackhide__ = True
+        self._await_start()
         return self._exit_code
 
     def interrupt(self) -> None:

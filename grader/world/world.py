@@ -198,6 +198,7 @@ class World:
         self._failing: list[tuple[Program, Fault]] = []
         self._simulations: list[Simulation] = []
         self._goals = 0
+        self._starting = False
         self._notes: list[str] = []
         self._unsuitable = ""
         self._run = SteppedRun(session.recorder, self._plan, self._answered)
@@ -216,6 +217,9 @@ class World:
         env: Mapping[str, str] | None = None,
     ) -> Program:
         """Start a program, which runs until it waits for a message, a timer or a service.
+
+        Where a seed draws the order of programs, those that are started one right after the other start together, with
+        whatever the test does next.
 
         Args:
             program: A Python file, looked for beside the test and in the working directory; `PACKAGE/EXECUTABLE` of a
@@ -242,8 +246,8 @@ class World:
                 name, namespace, (remappings or {}).items(), parameter_values(parameters or {})
             ),
         )
-        self._programs[label] = started = Program(label, found.root, self._signal)
-        self._perform(Start(self._plan_of(found, start, env or {})))
+        self._programs[label] = started = Program(label, found.root, self._signal, self._await_start)
+        self._perform(Start(self._plan_of(found, start, env or {}), settle=not self._plan.drawn_order))
         return started
 
     def launch(self, file: str | Path, *, arguments: Mapping[str, Any] | None = None) -> Launched:
@@ -261,7 +265,7 @@ class World:
         found, known = find_launch_file(file, self._near)
         given = tuple((name, str(value)) for name, value in (arguments or {}).items())
         start = PlannedStart(found.name, launch_arguments=given, known=known)
-        told = self._perform(Start(self._plan_of(found, start, {})))
+        told = self._perform(Start(self._plan_of(found, start, {}), settle=not self._plan.drawn_order))
         return Launched([self._programs[name] for name in told["started"]], told["left_out"])
 
     def _plan_of(self, found: Found, start: PlannedStart, env: Mapping[str, str]) -> Plan:
@@ -549,6 +553,8 @@ class World:
 
     def received(self, topic: str) -> list[Received]:
         """Return the messages that programs have published on a topic so far, with their times."""
+        __tracebackhide__ = True
+        self._await_start()
         topic = _absolute(topic)
         known = self._read.setdefault(topic, [])
         for one in self._messages.get(topic, ())[len(known) :]:
@@ -570,6 +576,8 @@ class World:
         Returns:
             The rate, 0 for fewer than two messages.
         """
+        __tracebackhide__ = True
+        self._await_start()
         since_ns = 0 if last is None else self._run.now_ns - round(last * NS_PER_S)
         times = [one.t_ns for one in self._messages.get(_absolute(topic), ()) if one.t_ns >= since_ns]
         # n - 1 gaps, not n: counting messages overstates a short time
@@ -577,18 +585,26 @@ class World:
 
     def nodes(self) -> list[str]:
         """Return the full names of the programs' nodes, sorted."""
+        __tracebackhide__ = True
+        self._await_start()
         return sorted(self._graph.nodes)
 
     def topics(self) -> dict[str, str]:
         """Return the topics that programs publish on or subscribe to, with their types."""
+        __tracebackhide__ = True
+        self._await_start()
         return {e.topic: e.type for e in sorted(self._graph.endpoints, key=lambda e: e.topic)}
 
     def services(self) -> dict[str, str]:
         """Return the services that programs offer, with their types; without those that every node has."""
+        __tracebackhide__ = True
+        self._await_start()
         return {e.service: e.type for e in telling.service_ends(self._graph, "service")}
 
     def graph(self) -> GraphSnapshot:
         """Return nodes, publishers, subscriptions, servers and clients of the programs as they are now."""
+        __tracebackhide__ = True
+        self._await_start()
         return self._graph
 
     @property
@@ -684,15 +700,24 @@ class World:
         __tracebackhide__ = True
         if self._run.is_busy:
             raise RuntimeError("a function that answers for the test cannot let time pass or act on the programs")
+        if not isinstance(command, (Start, Advance)):
+            self._await_start()
+        self._starting = isinstance(command, Start) and not command.settle
         told, observations = self._run.perform(command)
         if isinstance(command, Start):
             for name in told["started"]:
-                self._programs.setdefault(name, Program(name, Path(command.plan.root), self._signal))
+                self._programs.setdefault(name, Program(name, Path(command.plan.root), self._signal, self._await_start))
         self._adopt(observations)
         if self._run.full:
             raise GraderError(f"the test was ended: {self._run.full}")
         self._raise_failure()
         return told
+
+    def _await_start(self) -> None:
+        """Let the programs come up that were started last: where a seed draws their order, they start together."""
+        __tracebackhide__ = True
+        if self._starting and not (self._run.is_busy or self._run.is_closed):
+            self._perform(Advance(self._run.now_ns))
 
     def _adopt(self, observations: Sequence[Observation]) -> None:
         for one in observations:

@@ -115,6 +115,51 @@ def test_a_race_is_found_under_several_seeds_and_repeated_by_its_own(suite: pyte
     run(suite, RACE, "--ros-seed", passed).assert_outcomes(passed=1)
 
 
+HASTY = """
+import rclpy
+from std_srvs.srv import Trigger
+
+rclpy.init()
+node = rclpy.create_node("hasty")
+client = node.create_client(Trigger, "/ready")
+node.get_logger().info("asked" if client.service_is_ready() else "nobody there")
+rclpy.spin(node)
+"""
+SERVER = """
+import rclpy
+from std_srvs.srv import Trigger
+
+rclpy.init()
+node = rclpy.create_node("server")
+node.create_service(Trigger, "/ready", lambda request, response: response)
+rclpy.spin(node)
+"""
+TOGETHER = """
+import pytest
+
+@pytest.mark.ros(seeds=8)
+def test_the_service_is_there(ros):
+    ros.run("server.py")
+    hasty = ros.run("hasty.py")
+    assert ros.nodes() == ["/hasty", "/server"]
+    assert [log.text for log in hasty.logs] == ["asked"]
+
+def test_without_a_seed(ros):
+    ros.run("server.py")
+    assert [log.text for log in ros.run("hasty.py").logs] == ["asked"]
+"""
+
+
+def test_programs_start_together_where_their_order_is_drawn(suite: pytest.Pytester) -> None:
+    """A client that asks before the server is up is found under some seeds, and repeated by each of them."""
+    suite.makepyfile(hasty=HASTY, server=SERVER)
+    result = run(suite, TOGETHER, "-q", "-rf")
+    failed = re.findall(r"^FAILED test_it.py::test_the_service_is_there\[seed(\d)\]", result.stdout.str(), re.MULTILINE)
+    result.assert_outcomes(passed=9 - len(failed), failed=len(failed))
+    assert 0 < len(failed) < 8
+    run(suite, TOGETHER, "--ros-seed", failed[0], "-k", "is_there").assert_outcomes(failed=1, deselected=1)
+
+
 DISTURBED = """
 import pytest
 from std_msgs.msg import String
