@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _OPTIONS = ("seed", "seeds", "delay", "lose")
 _WORLD: pytest.StashKey[World] = pytest.StashKey()
 _SHARED: pytest.StashKey[str] = pytest.StashKey()
+_OF_WORKER = "ros_shared"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -68,6 +69,8 @@ def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
         except EnvironmentFault as fault:
             pytest.fail(f"{fault.message}\nhint: {fault.hint}" if fault.hint else fault.message, pytrace=False)
         pytestconfig.stash[_SHARED] = worlds.shared
+        if hasattr(pytestconfig, "workeroutput"):  # a process of pytest-xdist, which prints nothing itself
+            pytestconfig.workeroutput[_OF_WORKER] = worlds.shared
         yield worlds
 
 
@@ -127,6 +130,13 @@ def _kept(item: Any, world: World, failure: pytest.ExceptionInfo[BaseException])
         yield from map(str, world.keep(item.funcargs["tmp_path"], why))
     except Exception as error:  # the failure of the test is what counts
         yield f"the recording was not kept: {type(error).__name__}: {error}"
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """Note whether the programs of a process of pytest-xdist had a network of their own."""
+    if shared := getattr(node, "workeroutput", {}).get(_OF_WORKER, ""):
+        node.config.stash[_SHARED] = shared
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:

@@ -215,6 +215,45 @@ def test_a_wider_scope_and_several_processes(suite: pytest.Pytester) -> None:
     run(suite, FAILS, "-n", "2").assert_outcomes(passed=1, failed=2)
 
 
+WITHOUT_BUBBLEWRAP = """
+import pytest
+from grader.core.errors import EnvironmentFault
+from grader.execution.sandbox import choose
+
+known = choose.isolation_from_name
+
+def only_plain(name):
+    if name == "own-network":
+        raise EnvironmentFault("no bubblewrap here")
+    return known(name)
+
+choose.isolation_from_name = only_plain
+"""
+SHARED = """
+import os
+from pathlib import Path
+from std_msgs.msg import String
+
+def test_it(ros):
+    where = ros.run("where.py")
+    assert where.output == f"{Path(__file__).parent}/where.py {os.getcwd()}\\n"
+    ros.run("echo.py")
+    ros.publish("/in", String(data="a"), rate=10)
+    ros.advance(2.0)
+    assert len(ros.messages("/out")) == 21
+"""
+
+
+def test_without_bubblewrap_the_network_is_shared_and_that_is_said(suite: pytest.Pytester) -> None:
+    """The nodes run all the same, where they lie."""
+    suite.makeconftest(WITHOUT_BUBBLEWRAP)
+    (suite.path / "where.py").write_text("import os\nprint(__file__, os.getcwd())\n", encoding="utf-8")
+    for arguments in ((), ("-n", "1")):
+        result = run(suite, SHARED, *arguments)
+        result.assert_outcomes(passed=1)
+        result.stdout.fnmatch_lines(["ros: the nodes shared the network of this machine (no bubblewrap here)"])
+
+
 UNSUITABLE = """
 import pytest
 
