@@ -11,7 +11,7 @@ from grader.execution.codec import to_json
 from grader.execution.evidence.packed import observations_from_json
 from grader.execution.plan import Plan
 from grader.execution.steps import Command, Finish
-from grader.execution.supervisor import Recorder
+from grader.execution.supervisor import TRIES, Recorder, Worker, WorkerLostError
 
 #: Answers a question of the worker, while virtual time stands still.
 Answer = Callable[[Mapping[str, Any]], Any]
@@ -46,12 +46,19 @@ class SteppedRun:
         self.ended: dict[str, int | None] = {}
         self.full = self.unsuitable = ""
         self.notes: list[str] = []
-        self._worker = recorder.lend()
+        self._worker = self._lent(plan, TRIES)
+
+    def _lent(self, plan: Plan, tries: int) -> Worker:
+        """Return a worker that has begun the run; one that has died while it was idle is replaced."""
+        worker = self._recorder.lend()
         try:
-            self._worker.step(plan)
-        except BaseException:
-            self._give_up()
+            worker.step(plan)
+        except BaseException as error:
+            self._recorder.take_back(worker, usable=False)
+            if isinstance(error, WorkerLostError) and tries > 1:
+                return self._lent(plan, tries - 1)
             raise
+        return worker
 
     @property
     def is_busy(self) -> bool:

@@ -1,6 +1,8 @@
 """What a test sees of programs that it steps through virtual time, with real nodes."""
 
+import os
 import re
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from grader.core.errors import HarnessError, SubmissionError
 from grader.world.errors import NoMessage, ProgramFailed, StepTimeout
+from grader.world.opening import Worlds
 from grader.world.world import World
 
 pytestmark = pytest.mark.ros
@@ -68,11 +71,11 @@ def test_a_step_includes_what_happens_at_its_end(ros: World, write: Write) -> No
     assert [one.t for one in ros.received("/ticks")] == [1.0, 2.0, 3.0, 4.0]
 
 
-def test_many_small_steps_are_one_large_step(ros_session: object, write: Write) -> None:
+def test_many_small_steps_are_one_large_step(ros_session: Worlds, write: Write) -> None:
     """How a test divides time changes nothing that the programs do."""
     seen = []
     for step in (10.0, 0.5, 0.07):
-        with ros_session.open() as ros:  # type: ignore[attr-defined]
+        with ros_session.open() as ros:
             ros.run(write(TICKER, "ticker.py"))
             ros.run(Path(__file__).parent / "nodes" / "obstacle_stop.py")
             while ros.now < 10.0:
@@ -350,9 +353,9 @@ def test_the_graph_is_that_of_the_programs(ros: World) -> None:
     assert ros.nodes() == ["/echo"]
 
 
-def test_two_worlds_do_not_hear_each_other(ros_session: object) -> None:
+def test_two_worlds_do_not_hear_each_other(ros_session: Worlds) -> None:
     """Two may be open at the same time, each with its own nodes and its own time."""
-    with ros_session.open(Path(__file__).parent) as one, ros_session.open(Path(__file__).parent) as other:  # type: ignore[attr-defined]
+    with ros_session.open(Path(__file__).parent) as one, ros_session.open(Path(__file__).parent) as other:
         one.run("nodes/echo.py")
         other.run("nodes/echo.py")
         one.publish("/in", String(data="one"))
@@ -360,6 +363,52 @@ def test_two_worlds_do_not_hear_each_other(ros_session: object) -> None:
         other.advance(2.0)
         assert [m.data for m in one.messages("/out")] == ["one"]
         assert (other.messages("/out"), one.now, other.now) == ([], 1.0, 2.0)
+
+
+def hears(ros: World) -> bool:
+    """Return whether a program in a world answers."""
+    ros.run("nodes/echo.py")
+    ros.publish("/in", String(data="still here"))
+    ros.settle()
+    return [m.data for m in ros.messages("/out")] == ["still here"]
+
+
+def kill_worker(ros: World) -> None:
+    """Kill the worker of a world, with all that it has started."""
+    os.killpg(ros._run._worker._process.pid, signal.SIGKILL)  # type: ignore[attr-defined]
+
+
+def test_a_lost_worker_costs_one_world(ros_session: Worlds) -> None:
+    """The next one has another worker, also if that was lost before."""
+    here = Path(__file__).parent
+    with ros_session.open(here) as ros:
+        assert hears(ros)
+        kill_worker(ros)
+        with pytest.raises(HarnessError, match="worker: expected an answer, found none"):
+            ros.advance(1.0)
+        with pytest.raises(RuntimeError, match="the run has ended"):
+            ros.advance(1.0)
+    with ros_session.open(here) as ros:
+        assert hears(ros)
+    kill_worker(ros)
+    with ros_session.open(here) as ros:
+        assert hears(ros)
+
+
+def test_control_c_in_the_middle_of_a_step_leaves_nothing_behind(ros_session: Worlds) -> None:
+    """Nobody knows where the worker is then: it is ended, and the next world has another one."""
+
+    def interrupted(request: Trigger.Request) -> Trigger.Response:
+        raise KeyboardInterrupt
+
+    here = Path(__file__).parent
+    with ros_session.open(here) as ros:
+        ros.run("nodes/switch.py")
+        ros.serve("/allowed", Trigger, interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            ros.call("/enable", SetBool.Request(data=True))
+    with ros_session.open(here) as ros:
+        assert hears(ros)
 
 
 def test_rates_count_gaps(ros: World) -> None:
