@@ -332,6 +332,7 @@ class Worker:
             "seed": plan.seed_of(name),
             "clock": plan.clock,
             "charged": plan.charged,
+            "in_place": bool(plan.working),
             "steady_ns": plan.epoch_ns - plan.uptime_ns,
             "log_format": LOG_FORMAT,
             "python_paths": [str(p) for p in self._runtime.python_paths],

@@ -269,10 +269,8 @@ class World:
         return Launched([self._programs[name] for name in told["started"]], told["left_out"])
 
     def _plan_of(self, found: Found, start: PlannedStart, env: Mapping[str, str]) -> Plan:
-        prefixes: tuple[str, ...] = ()
-        if found.projects:
-            installed = self.session.folder / f"installed_{derive(0, str(found.root))[:16]}"
-            prefixes, _ = install_shares(found.root, found.projects, installed, self.session.ros)
+        installed = self.session.folder / f"installed_{derive(0, str(found.root))[:16]}"
+        prefixes, _ = install_shares(found.root, found.projects, installed, self.session.ros)
         return replace(
             self._plan,
             processes=((start.process, found.file),),

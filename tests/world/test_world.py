@@ -2,6 +2,7 @@
 
 import os
 import re
+import select
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -374,8 +375,10 @@ def hears(ros: World) -> bool:
 
 
 def kill_worker(ros: World) -> None:
-    """Kill the worker of a world, with all that it has started."""
-    os.killpg(ros._run._worker._process.pid, signal.SIGKILL)  # type: ignore[attr-defined]
+    """Kill the worker of a world, with all that it has started, and wait until its end can be seen."""
+    worker = ros._run._worker
+    os.killpg(worker._process.pid, signal.SIGKILL)  # type: ignore[attr-defined]
+    select.select([worker._line], [], [])
 
 
 def test_a_lost_worker_costs_one_world(ros_session: Worlds) -> None:
