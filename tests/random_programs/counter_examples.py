@@ -168,4 +168,28 @@ COUNTER_EXAMPLES: dict[str, Program] = {
         ),
         2000,
     ),
+    # rclpy's looks at the locks of a coroutine that waits made time pass before a busy loop had taken the response.
+    "coroutine_in_a_busy_loop": Program(
+        (
+            Process(
+                (Node("n0", 1, (), (), servers=(Server("v00", "p", (), Fixed(0), 1),), groups=(Group.REENTRANT,)),),
+                Spinning.MULTI,
+                threads=3,
+            ),
+            Process(
+                (
+                    Node(
+                        "n1",
+                        1,
+                        (Timer("t10", 100, (Await("c10", Fixed(4)), Ask("c10", Runs(), SAYS)), group=2),),
+                        (),
+                        clients=(Client("c10", "p", 1),),
+                        groups=(Group.EXCLUSIVE, Group.EXCLUSIVE),
+                    ),
+                ),
+                Spinning.ONCE,
+            ),
+        ),
+        2000,
+    ),
 }
