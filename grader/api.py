@@ -214,6 +214,18 @@ if TYPE_CHECKING:
     from grader.testing import builtin_check as builtin_check
     from grader.testing import explain as explain
     from grader.testing import judge as judge
+    from grader.world.errors import NoMessage as NoMessage
+    from grader.world.errors import ParameterRejected as ParameterRejected
+    from grader.world.errors import ProgramFailed as ProgramFailed
+    from grader.world.errors import StepTimeout as StepTimeout
+    from grader.world.opening import Worlds as Worlds
+    from grader.world.opening import open_world as open_world
+    from grader.world.programs import Program as Program
+    from grader.world.world import Failure as Failure
+    from grader.world.world import GoalResult as GoalResult
+    from grader.world.world import Launched as Launched
+    from grader.world.world import Received as Received
+    from grader.world.world import World as World
 
 #: The public names by topic and by the module that they are in.
 CONTENTS: dict[str, dict[str, str]] = {
@@ -288,6 +300,12 @@ CONTENTS: dict[str, dict[str, str]] = {
     },
     "Simulations": {
         "grader.simulation": "Simulation Moment Output DifferentialDrive Turtle Unicycle",
+    },
+    "Own nodes, step by step": {
+        "grader.world.opening": "open_world Worlds",
+        "grader.world.world": "World Received GoalResult Launched Failure",
+        "grader.world.programs": "Program",
+        "grader.world.errors": "ProgramFailed StepTimeout NoMessage ParameterRejected",
     },
     "Tests": {
         "grader.testing": "TraceBuilder judge explain builtin_check",

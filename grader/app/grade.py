@@ -155,7 +155,7 @@ def prepared(
         recordings = read_recordings(request, exercises)
         played = recordings_digest(read_given(request, recordings))
         seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
-        environment = _environment(session)
+        environment = environment_of(session)
         provided = provide(session, exercises, request.interfaces, submission, request.time_budget_s)
         submission = replace(submission, notes=(*submission.notes, *provided.problems))
         kept = _kept(request, exercises, submission, played, seed, environment, provided.offered)
@@ -358,7 +358,8 @@ def _notes(request: GradeRequest, session: RecordingSession) -> Iterator[str]:
         yield f"sandbox {session.isolation.name}: {'; '.join(lacking)}"
 
 
-def _environment(session: RecordingSession) -> Environment:
+def environment_of(session: RecordingSession) -> Environment:
+    """Return the software that a session records with."""
     return Environment(
         grader=grader.__version__,
         ros_distro=session.ros.distro,

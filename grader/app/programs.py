@@ -142,8 +142,8 @@ def stage(targets: Sequence[Target], into: Path) -> Submission:
     """Stage what the programs may import: their workspace or package, or else their common folder; one may be alone."""
     names, files = [target.name for target in targets], [target.file for target in targets]
     folder = Path(os.path.commonpath([target.folder for target in targets]))
-    package = _package_of(folder)
-    for place, root in enumerate(dict.fromkeys((_workspace_of(package), package, folder))):
+    package = package_of(folder)
+    for place, root in enumerate(dict.fromkeys((workspace_of(package), package, folder))):
         staged = into / f"submission_{place}"
         staged.mkdir()
         meant = {
@@ -168,7 +168,7 @@ def stage(targets: Sequence[Target], into: Path) -> Submission:
 
 def _stage_apart(targets: Sequence[Target], into: Path) -> Submission:
     """Stage programs whose common folder holds too much: beside each other, each with its own workspace or folder."""
-    roots = {target.name: _workspace_of(_package_of(target.folder)) for target in targets}
+    roots = {target.name: workspace_of(package_of(target.folder)) for target in targets}
     places = {root: f"{place}_{root.name}" for place, root in enumerate(dict.fromkeys(roots.values()), 1)}
     names = [target.name for target in targets]
     collected = {root: collect_submission(str(root), names, into) for root in places}
@@ -187,12 +187,12 @@ def _stage_apart(targets: Sequence[Target], into: Path) -> Submission:
     return submission
 
 
-def _package_of(folder: Path) -> Path:
+def package_of(folder: Path) -> Path:
     """Return the package that a folder is in; the folder itself if it is in none."""
     return next((up for up in (folder, *folder.parents) if (up / "package.xml").is_file()), folder)
 
 
-def _workspace_of(package: Path) -> Path:
+def workspace_of(package: Path) -> Path:
     """Return the folder with the packages that one may need: the `src` above it, or the next if it holds others."""
     source = next((up for up in package.parents[:MOST_LEVELS] if up.name == "src"), package.parent)
     found = (manifest for level in ("*", "*/*") for manifest in source.glob(f"{level}/package.xml"))

@@ -166,6 +166,11 @@ class Plan:
         prefixes: The AMENT_PREFIX_PATH of the nodes, first the folder of what the submission's packages share; empty if
             it has none.
         projects: The ROS packages of the submission, outermost first.
+        drawn_order: Whether the order in which processes run that are ready at one instant follows from the seed;
+            otherwise it is that of the plan.
+        working: The absolute folder in which the processes start, which then run their files where these lie; empty to
+            give each copies and a folder of its own.
+        environment: Further variables of the processes.
     """
 
     scenario: str
@@ -199,6 +204,9 @@ class Plan:
     starts: tuple[PlannedStart, ...] = ()
     projects: tuple[Project, ...] = ()
     charged: float = 0.0
+    drawn_order: bool = False
+    working: str = ""
+    environment: tuple[tuple[str, str], ...] = ()
 
     def start_of(self, process: str) -> PlannedStart:
         """Return what a process is started with."""

@@ -18,7 +18,7 @@ from grader.execution.domains import private_domains, shared_domains
 from grader.execution.pace import keeps_pace
 from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.ros_installation import RosInstallation, find_ros
-from grader.execution.sandbox.choose import choose_isolation
+from grader.execution.sandbox.choose import OWN_PROGRAMS, choose_isolation
 from grader.execution.sandbox.protocol import Isolation
 from grader.execution.supervisor import Job, Recorder
 from grader.execution.temp_dirs import scratch_folder
@@ -59,6 +59,7 @@ class RecordingSession:
         ros: The ROS installation that nodes run on.
         isolation: The sandbox tier.
         containment: What the self-test found the sandbox to prevent; empty without a sandbox.
+        shared: Why own programs share the network of this machine, in words; empty if they do not.
         recorder: Runs jobs in its workers.
         folder: A temporary folder, removed at the end.
     """
@@ -66,6 +67,7 @@ class RecordingSession:
     ros: RosInstallation
     isolation: Isolation
     containment: tuple[Property, ...]
+    shared: str
     recorder: Recorder
     folder: Path
 
@@ -217,7 +219,7 @@ def open_session(  # noqa: PLR0913  what to open, and who is told
     """Open a recording session, and close it at the end of the block.
 
     Args:
-        isolation: `auto`, `none` or the name of a tier.
+        isolation: As for `choose_isolation`.
         workers: How many scenarios to record in parallel; None to choose by the number of processors.
         progress: Called with a message when a sandbox has to be tested.
         warm: Whether to start a worker at once, not when something is recorded.
@@ -227,7 +229,7 @@ def open_session(  # noqa: PLR0913  what to open, and who is told
     Raises:
         EnvironmentFault: This machine lacks ROS or the requested tier.
     """
-    ros = find_ros()
+    ros = find_ros(workspaces=isolation == OWN_PROGRAMS)
     choice = choose_isolation(isolation, ros, progress)
     tier = choice.isolation
     domains = shared_domains() if tier.shares_network else private_domains()
@@ -248,7 +250,7 @@ def open_session(  # noqa: PLR0913  what to open, and who is told
         with kept as recorder:
             if warm:
                 recorder.warm_up(workers)
-            yield RecordingSession(ros, tier, choice.containment, recorder, folder)
+            yield RecordingSession(ros, tier, choice.containment, choice.lacks, recorder, folder)
 
 
 def planned_clock(clock: str) -> str:

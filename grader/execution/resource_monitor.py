@@ -175,8 +175,9 @@ class ResourceMonitor:
         """Find the families of processes; they are as before if nothing has been started since."""
         last = last_pid()  # before the search, which may miss what is started meanwhile
         if not last or last != self._last_pid:
-            found = families([root for s in self._students for root in s.roots])
-            self._families = {s.process.pid: set().union(*(found[root] for root in s.roots)) for s in self._students}
+            students = [*self._students]  # the runner's thread may add one meanwhile
+            found = families([root for s in students for root in s.roots])
+            self._families = {s.process.pid: set().union(*(found[root] for root in s.roots)) for s in students}
             self._last_pid = last
 
     def _look(self) -> int:

@@ -74,26 +74,27 @@ class RosInstallation:
     share: tuple[Path, ...]
 
 
-def find_ros(environment: Mapping[str, str] | None = None) -> RosInstallation:
+def find_ros(environment: Mapping[str, str] | None = None, *, workspaces: bool = False) -> RosInstallation:
     """Find the ROS installation to use: the sourced one if there is one, else the wheels of this interpreter.
 
     The two are never mixed: with a sourced installation, child processes get no libraries of the wheels.
 
     Args:
         environment: Variables of the shell; those of this process if None.
+        workspaces: Whether sourced workspaces belong to it, for programs of whoever sourced them.
 
     Raises:
         EnvironmentFault: There is no usable ROS; the hint is the command that fixes it.
     """
     environment = os.environ if environment is None else environment
-    found = _find_sourced(environment) or _find_wheels()
+    found = _find_sourced(environment, workspaces=workspaces) or _find_wheels()
     if found is None:
         raise EnvironmentFault("ROS 2: expected rclpy, found none in this environment", _install_hint())
     _require_parts(found)
     return found
 
 
-def _find_sourced(environment: Mapping[str, str]) -> RosInstallation | None:
+def _find_sourced(environment: Mapping[str, str], *, workspaces: bool) -> RosInstallation | None:
     prefixes = _paths(environment.get("AMENT_PREFIX_PATH", ""))
     distro = environment.get("ROS_DISTRO", "")
     searched = _paths(environment.get("PYTHONPATH", ""))
@@ -112,12 +113,14 @@ def _find_sourced(environment: Mapping[str, str]) -> RosInstallation | None:
     _require_this_python(prefix, folder)
     # A source build has one prefix for each package, all in one folder. Other prefixes are workspaces: they may contain
     # solutions, and no exercise needs them.
-    siblings = tuple(other for other in prefixes if other.parent == prefix.parent)
+    siblings = tuple(other for other in prefixes if workspaces or other.parent == prefix.parent)
     libraries = _below(siblings, _paths(environment.get("LD_LIBRARY_PATH", ""))) or tuple(
         other / "lib" for other in siblings
     )
     share = tuple(other / "share" for other in siblings)
     python_paths = tuple(path for other in siblings for path in _python_folders(other, searched))
+    if workspaces:  # `colcon build --symlink-install` leaves modules in its build folder
+        python_paths = _existing((*searched, *python_paths))
     runtime = PythonRuntime(
         executable=EXECUTABLE,
         read_paths=_existing((*_interpreter_paths(), *SYSTEM_PATHS, *siblings)),

@@ -64,7 +64,7 @@ class Runner(ABC):
             self._recorder,
             nodes=lambda: self._recorder.graph.nodes,
             later=self._later,
-            simulated=lambda now_ns, service, value: self._simulations.answer(service, value, self._moment(now_ns)),
+            simulated=self._simulated,
         )
 
     def run(self) -> Trace:
@@ -166,9 +166,13 @@ class Runner(ABC):
         if first and not self._stop_ns:
             self._end_ns = now_ns + self._plan.duration_ns
         self._recorder.message(now_ns, taken, early=early)
-        if self._plan.simulations and not (self._recorder.full or self._stop_ns):
+        if self._simulations.exist and not (self._recorder.full or self._stop_ns):
             for event in self._simulations.hear(taken, self._moment(now_ns)):
                 self._later(event)
+
+    def _simulated(self, now_ns: int, service: str, request: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        """Return the response to a request at a time; None if nothing but the plan says what it is."""
+        return self._simulations.answer(service, request, self._moment(now_ns))
 
     def _moment(self, now_ns: int) -> Moment:
         return Moment(now_ns, self._clock_ns(now_ns))

@@ -9,7 +9,7 @@ from typing import Any
 
 from grader.core.dataclass import dataclass
 from grader.core.trace import Mark, Request, Response
-from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedServer
+from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedGoal, PlannedServer
 from grader.execution.interfaces import built, plain_fields, wanted_class
 from grader.execution.observer import size_of
 from grader.execution.plan import Plan
@@ -85,6 +85,10 @@ class ServicePeers:
         if kind == "service":
             return int(service in self._servers)
         return sum(asked == service for asked, _, _ in self._clients)
+
+    def clients_of(self, service: str) -> int:
+        """Return the number of the client of a service that was created last."""
+        return max((number for (asked, _, _), number in self._clients.items() if asked == service), default=0)
 
     def calls(self) -> dict[str, str]:
         """Return the services that the grader has clients for, with their types."""
@@ -257,9 +261,17 @@ def check_types(plan: Plan) -> None:
         for value in ({}, *server.responses):
             built(wanted_class(server.type, "srv", where).Response, value, where)
     for calls in plan.calls:
-        where = f"scenario {plan.scenario}, calls of {calls.service}"
-        for value in calls.requests:
-            built(wanted_class(calls.type, "srv", where).Request, value, where)
+        check_calls(calls, f"scenario {plan.scenario}, calls of {calls.service}")
     for goal in plan.goals:
-        where = f"scenario {plan.scenario}, goal of {goal.action}"
-        built(wanted_class(goal.type, "action", where).Goal, goal.goal, where)
+        check_goal(goal, f"scenario {plan.scenario}, goal of {goal.action}")
+
+
+def check_calls(calls: PlannedCalls, where: str) -> None:
+    """Check that this machine has the type and the fields of some calls; raises HarnessError otherwise."""
+    for value in calls.requests:
+        built(wanted_class(calls.type, "srv", where).Request, value, where)
+
+
+def check_goal(goal: PlannedGoal, where: str) -> None:
+    """Check that this machine has the type and the fields of a goal; raises HarnessError otherwise."""
+    built(wanted_class(goal.type, "action", where).Goal, goal.goal, where)

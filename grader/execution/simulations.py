@@ -20,7 +20,7 @@ from grader.execution.observer import Taken
 from grader.execution.plan import Plan
 from grader.execution.stimuli import AddServer, Advertise, Event, PublishFields, Step
 from grader.simulation.loading import SimulationError, begin_of, guarded, made
-from grader.simulation.participant import Moment, Output
+from grader.simulation.participant import Moment, Output, Simulation
 
 Result = TypeVar("Result")
 
@@ -45,9 +45,26 @@ class Simulations:
         self._all = [_Running(planned, BEYOND * plan.limits.messages) for planned in plan.simulations]
         self._last_ns = 0
 
+    @property
+    def exist(self) -> bool:
+        """Whether there is any."""
+        return bool(self._all)
+
     def events(self) -> list[Event]:
         """Return the events that create what the simulations offer, and their first steps."""
-        return [e for number, one in enumerate(self._all) for e in (*one.appearances(), Step(0, number))]
+        return [e for number, one in enumerate(self._all) for e in (*one.appearances(0), Step(0, number))]
+
+    def add(self, name: str, simulation: Simulation, most: int, now_ns: int) -> list[Event]:
+        """Let a simulation take part from now on; return the events that create what it offers, and its first step.
+
+        Args:
+            name: Its name in messages.
+            simulation: It has begun.
+            most: How many messages it may publish.
+            now_ns: The time of the run.
+        """
+        self._all.append(one := _Running(PlannedSimulation(name, "", b"", {}, 0), most, simulation))
+        return [*one.appearances(now_ns), Step(now_ns, len(self._all) - 1)]
 
     def step(self, step: Step, now: Moment) -> tuple[Event, ...]:
         """Let time pass for one simulation; return what it publishes, and its next step."""
@@ -76,10 +93,10 @@ class Simulations:
 class _Running:
     """One simulation, with what it publishes, hears and offers."""
 
-    def __init__(self, planned: PlannedSimulation, most: int) -> None:
+    def __init__(self, planned: PlannedSimulation, most: int, begun: Simulation | None = None) -> None:
         self._planned = planned
         self._left = most
-        self.simulation = made(planned.name, planned.path, planned.content, planned.parameters)
+        self.simulation = begun or made(planned.name, planned.path, planned.content, planned.parameters)
         self.period_ns = max(SHORTEST_NS, self.simulation.period)
         self.hears = self._call(lambda: dict(self.simulation.hears()), "hears")
         self.serves = self._call(lambda: dict(self.simulation.serves()), "serves")
@@ -93,15 +110,16 @@ class _Running:
         with self._blamed("serves"):
             for service, type_ in self.serves.items():
                 wanted_class(type_, "srv", service)
-        # reproducible, and nobody can know it who does not know the seed
-        self._call(partial(self.simulation.begin, random.Random(planned.seed)), "begin")  # noqa: S311
+        if begun is None:
+            # reproducible, and nobody can know it who does not know the seed
+            self._call(partial(self.simulation.begin, random.Random(planned.seed)), "begin")  # noqa: S311
 
-    def appearances(self) -> Iterator[Event]:
+    def appearances(self, now_ns: int) -> Iterator[Event]:
         for stream in self._streams.values():
-            yield Advertise(0, stream.topic, stream)
+            yield Advertise(now_ns, stream.topic, stream)
         for service, type_ in self.serves.items():
-            server = PlannedServer(service, type_, 0, 0, 0, cycle=False, answers=0, responses=())
-            yield AddServer(0, server)
+            server = PlannedServer(service, type_, now_ns, 0, 0, cycle=False, answers=0, responses=())
+            yield AddServer(now_ns, server)
 
     def publish(self, method: str, work: Callable[[Moment], Iterable[Output]], now: Moment) -> list[Event]:
         outputs = self._call(lambda: list(islice(work(now), OUTPUTS + 1)), method)

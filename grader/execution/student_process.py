@@ -84,6 +84,8 @@ class NodeProcess:
         nudged: Whether it has to run again at this instant, because its endpoints were matched.
         leaving: Whether it waits until what it has sent has arrived, before it tells which endpoints it removes.
         ended: Whether it has ended.
+        exit_code: Its exit code as a shell shows it, 128 and the number of the signal that ended it; None until it has
+            ended, or if it is not known.
         limits: Its limits.
         workload: Measures the cost of its steps; None until its program starts.
         most_bytes: Peak memory of the process and its children.
@@ -99,6 +101,7 @@ class NodeProcess:
         launched_by: The launch file that it comes from, with its line; empty if it comes from none.
         places: The files of the submission.
         prefix: The folder below which its packages are installed; empty if it has none.
+        keeps_paths: Whether paths stay in what it writes, because it runs where its files lie.
         own_folder: The folder of its home and its temporary files; empty if it has none.
         start_told: How its file is started, as it reported before it ran any of the student's code.
         grader_failed: What failed in the grader's own code in the process, as it reports; empty if nothing did.
@@ -122,6 +125,7 @@ class NodeProcess:
     nudged: bool = False
     leaving: bool = False
     ended: bool = False
+    exit_code: int | None = None
     workload: Workload | None = None
     most_bytes: int = 0
     most_threads: int = 0
@@ -137,6 +141,7 @@ class NodeProcess:
     launched_by: str = ""
     places: Places = field(default_factory=lambda: Places(None))
     prefix: str = ""
+    keeps_paths: bool = False
     own_folder: str = ""
     start_told: Start | None = None
     grader_failed: str = ""
@@ -406,6 +411,8 @@ class NodeProcess:
 
         The process's own folder becomes that of the strongest tiers.
         """
+        if self.keeps_paths:
+            return text
         text = text.replace(f"{self.prefix}/", "") if self.prefix else text
         text = text.replace(f"{self.root}/", "")
         if not self.own_folder:
@@ -418,6 +425,7 @@ class NodeProcess:
         ended = self._ends(CLOSED_S if self._closed else GRACE_S)
         self._end_now()
         code = self.process.wait()
+        self.exit_code = code if code >= 0 else 128 - code
         if self.stopped:
             return Fault(t_ns, self.name, FaultKind.KILLED, self.stopped)
         if not ended:

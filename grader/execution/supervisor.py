@@ -119,6 +119,7 @@ class Worker(ABC):
         self._line = line
         self._domains = domains
         self._interfaces: tuple[str, ...] = ()
+        self._received = bytearray()
         self._pid = 0
         self._group: MemoryGroup | None = None
         self._most_ns = 0
@@ -187,6 +188,40 @@ class Worker(ABC):
         if isinstance(real_ns, int) and isinstance(starved_ns, int):
             budget.charge(real_ns, starved_ns)
         return trace_from_json(answer["trace"])
+
+    def step(self, plan: Plan) -> None:
+        """Begin a run that is stepped by `exchange`; raises HarnessError if the worker fails."""
+        self._interfaces = plan.interfaces
+        try:
+            self._line.settimeout(None)
+            self._await_start()
+        except (OSError, EOFError) as error:
+            raise WorkerLostError(f"worker: expected one that starts, found none (ended by {self._end()})") from error
+        self.exchange({"stepped": to_json(plan), "domain": next(self._domains)})
+
+    def exchange(self, told: Mapping[str, Any] | None) -> dict[str, Any]:
+        """Tell a worker something in a stepped run, and return what it says next; None only listens.
+
+        Raises:
+            WorkerFailedError: Its own code failed.
+            WorkerLostError: It has ended.
+        """
+        try:
+            self._line.settimeout(None)
+            if told is not None:
+                self._line.sendall(json.dumps(told).encode() + b"\n")
+            while b"\n" not in self._received:  # two messages may come at once
+                found = self._line.recv(1 << 20)
+                if not found:
+                    raise EOFError
+                self._received += found
+            line, _, self._received = self._received.partition(b"\n")
+            answer: dict[str, Any] = json.loads(line)
+        except (OSError, EOFError) as error:
+            raise WorkerLostError(f"worker: expected an answer, found none (ended by {self._end()})") from error
+        if "failed" in answer:
+            raise WorkerFailedError(f"worker: {answer['failed']}", has_started=True)
+        return answer
 
     def _await_start(self) -> None:
         """Wait until the worker can be used; raises EOFError if it has ended."""
@@ -486,6 +521,22 @@ class Recorder:
         for worker in alive:
             self._close(worker)
         self._fill(self._count)
+
+    def lend(self) -> Worker:
+        """Return a worker for one user, who gives it back; one more is started if all are in use."""
+        with contextlib.suppress(queue.Empty):
+            while True:
+                worker = self._idle.get_nowait()
+                if worker is not None and not worker.gone:
+                    return worker
+        return self._pool.submit(self._start).result()
+
+    def take_back(self, worker: Worker, *, usable: bool) -> None:
+        """Keep a worker for the next user, or end it."""
+        if usable:
+            self._idle.put(worker)
+        else:
+            self._discard(worker)
 
     def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
         """Record every job and return the traces in the same order."""

@@ -59,7 +59,7 @@ class TraceRecorder:
         for observation in observations:
             kind = type(observation)
             self._counts[kind] += 1
-            if self._counts[kind] <= {Fault: FAULTS, Offer: OFFERS}.get(kind, len(self.observations) + 1):
+            if self._counts[kind] <= {Fault: FAULTS, Offer: OFFERS}.get(kind, self._counts[kind]):
                 self.observations.append(observation)
 
     def message(self, t_ns: int, taken: Taken, *, early: bool = False) -> None:

@@ -7,7 +7,7 @@ until nothing is left to do. Then time jumps to the next moment at which a stimu
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -98,11 +98,15 @@ class VirtualRunner(Runner):
         """Step through time until the end, or until nothing more can happen."""
         while not self._finished():
             self._settle()
-            if self._now_ns >= self._end_ns:
+            if self._now_ns >= self._end_ns or self._is_interrupted():
                 break
             self._discovery.retry()
             if self._next_student() is None:  # a match is an event that wakes a process
                 self._now_ns = self._next_ns()
+
+    def _is_interrupted(self) -> bool:
+        """Return whether to stop at an instant at which nothing is left to do."""
+        return False
 
     def _shut_down(self) -> None:
         self._now_ns = self._stop_ns
@@ -131,14 +135,13 @@ class VirtualRunner(Runner):
                 return
 
     def _next_student(self) -> NodeProcess | None:
-        return next(
-            (
-                s
-                for s in self._students
-                if not s.ended and (s.arrivals or s.nudged or (s.wake_ns is not None and s.wake_ns <= self._now_ns))
-            ),
-            None,
-        )
+        return next(self._ready_students(), None)
+
+    def _ready_students(self) -> Iterator[NodeProcess]:
+        """Yield the processes that have something to do at this instant, in the order of the plan."""
+        for s in self._students:
+            if not s.ended and (s.arrivals or s.nudged or (s.wake_ns is not None and s.wake_ns <= self._now_ns)):
+                yield s
 
     def _step(self, student: NodeProcess) -> None:
         """Let one process run: send it the time and the messages on their way, and handle its reports."""
@@ -218,6 +221,7 @@ class VirtualRunner(Runner):
             self._account(student, report)
             if kind == "exited":
                 student.unsettled = str(report.get("unsettled", ""))
+                student.exit_code = code if type(code := report.get("code")) is int else None
                 stopped, places = student.stop_signalled, student.places
                 self._end(student, ending(student.name, self._now_ns, report, self._plan, places, stopped=stopped))
                 if report.get("left"):

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import gc
 import importlib
+import itertools
 import json
 import math
 import os
 import re
 import resource
 import secrets
+import signal
 import socket
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, replace
 from pathlib import Path, PurePosixPath
@@ -24,7 +26,7 @@ from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.core.quantities import GIB, MIB, NS_PER_S
 from grader.core.scenario import is_launch_file
-from grader.core.trace import ClockKind, FaultKind, Mark, Trace
+from grader.core.trace import ClockKind, Delivery, FaultKind, Mark, Message, Observation, Trace
 from grader.execution import late_numpy
 from grader.execution.bare_start import BareProcess, bare_arguments
 from grader.execution.beside import files_beside, is_loose, whole_submission
@@ -43,6 +45,7 @@ from grader.execution.sandbox.start import die_with
 from grader.execution.sandbox.starter import HASH_SEED, Starter
 from grader.execution.sandbox.starter_process import StarterProcess
 from grader.execution.sandbox.tiers import IN_PLACE, isolation_from_name
+from grader.execution.steps import COMMANDS, Finish
 from grader.execution.student_process import LOG_FORMAT, NodeProcess
 from grader.execution.usage import usage, worker_processor_s
 from grader.simulation.loading import SimulationError
@@ -60,6 +63,8 @@ WALL_TRIES = 3
 #: The kernel's limits for the worker, if its resource monitor is too slow: mapped memory, and processor time beyond the
 #: monitor's limit. An ordinary worker maps 0.6 GiB.
 ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 5
+#: The processor time of a worker for one stepped run, in seconds, so that no test waits for a broken one forever.
+STEPPED_CPU_S = 600
 #: A worker that uses more memory after a scenario is replaced; ordinary scenarios leave 30 to 50 MiB.
 WORN_BYTES = 128 * MIB
 #: What a bare process sees of the grader: the module that makes the machine look the same.
@@ -119,6 +124,93 @@ class Worker:
                 break
         cost = {"real_ns": self._real_ns, "starved_ns": self._starved_ns}
         return {"trace": trace, **cost, "worn": is_worn(trace) or self._remembers_connections()}
+
+    def step(self, plan: Plan, domain: int, commands: Iterator[Any], tell: Callable[[Mapping[str, Any]], None]) -> bool:
+        """Carry out commands until one ends the run; return whether this worker should be replaced.
+
+        Args:
+            plan: Limits, seed and clock of the run; what runs in it, commands say.
+            domain: The ROS domain to use.
+            commands: What the other side sends: commands, and answers to questions.
+            tell: Sends an answer to a command, or a question.
+        """
+        from grader.execution.observer import Observer  # noqa: PLC0415 - imports rclpy, which takes long
+        from grader.execution.stepped_runner import SteppedRunner  # noqa: PLC0415 - the same
+
+        students: list[NodeProcess] = []
+        failed = False
+
+        def start(added: Plan, left_out: list[str]) -> Iterator[tuple[NodeProcess, int]]:
+            sys.path += [folder for folder in added.interfaces if folder not in sys.path]  # installed ones come first
+            added = self._with_launched(added, domain, {student.name for student in students}, left_out)
+            for name, file in added.processes:
+                student = self._start(added, name, file, domain)
+                began.callback(stop_now, student)
+                _await_ready(student)
+                yield student, dict(added.starts_ns).get(name, 0)
+
+        def ask(question: Mapping[str, Any]) -> Any:
+            tell(question)
+            return next(commands)["answer"]
+
+        with ExitStack() as began:
+            limit_processor_time(STEPPED_CPU_S)
+            observer = Observer(domain, plan.limits)
+            began.callback(observer.close)
+            shares_network = self._isolation.shares_network
+            began.enter_context(
+                ResourceMonitor(students, plan.limits, shares_network=shares_network, own_s=STEPPED_CPU_S)
+            )
+            runner = SteppedRunner(plan, students, observer, start, ask)
+            tell({"now_ns": 0, "news": []})
+            for data in commands:
+                command = from_json(COMMANDS[data["do"]], data["with"])
+                if isinstance(command, Finish):
+                    runner.look()
+                answer: dict[str, Any] = {"problem": ""}
+                try:
+                    answer = runner.perform(command)
+                except HarnessError as error:
+                    answer = {"problem": error.message}
+                news = [_compact(o) for o in runner.news()]
+                common = {"now_ns": runner.now_ns, "ended": runner.programs(), "full": runner.full(), "news": news}
+                if isinstance(command, Finish):
+                    failed = bool(runner.full())
+                    last = {"notes": runner.notes(), "unsuitable": runner.unsuitable()}
+                    tell({**answer, **common, **last})
+                    break
+                tell({**answer, **common})
+        return failed or usage([os.getpid()]).memory_bytes > WORN_BYTES
+
+    def _with_launched(self, plan: Plan, domain: int, used: Collection[str], left_out: list[str]) -> Plan:
+        """Return a plan with the nodes of its launch file, by names that no process has; the plan itself without one.
+
+        Raises HarnessError if the launch file describes nothing that can be started, and adds what it leaves out.
+        """
+        launch = next(((name, file) for name, file in plan.processes if is_launch_file(name)), None)
+        if launch is None:
+            return plan
+        name, file = launch
+        made = self._evaluate(plan, name, file, domain, Budget(plan.limits.wall_ns, ""))
+        left_out += [*made.left_out, *(text for text, _ in made.unstarted)]
+        if made.harness_problem or made.fault is not None or not made.processes:
+            fault = made.fault
+            place = name if fault is None or not fault.file else f"{fault.file}:{fault.line}"
+            why = made.harness_problem or (fault.text if fault is not None else "; ".join(left_out))
+            raise HarnessError(f"{place}: {why}")
+        names: dict[str, str] = {}
+        for process, _ in made.processes:
+            label = process.removeprefix(f"{name} ")
+            others = {*used, *names.values()}
+            numbered = (f"{label} ({number})" for number in itertools.count(2))
+            names[process] = label if label not in others else next(one for one in numbered if one not in others)
+        found = expanded(plan, {name: made})
+        return replace(
+            found,
+            processes=tuple((names.get(process, process), file) for process, file in found.processes),
+            starts=tuple(replace(start, process=names.get(start.process, start.process)) for start in found.starts),
+            starts_ns=tuple((names.get(process, process), delay_ns) for process, delay_ns in found.starts_ns),
+        )
 
     def _remembers_connections(self) -> bool:
         """Return whether nodes have left TCP connections in the worker's own network; the grader uses none."""
@@ -219,10 +311,12 @@ class Worker:
                 "RCUTILS_COLORIZED_OUTPUT": "0",
                 **quick_discovery(self._isolation.host_seen_at, self._runtime),
                 "PYTHONHASHSEED": str(plan.hash_seed),
+                **dict(plan.environment),
             },
             pass_fds=(theirs.fileno(),),
+            working=plan.working or None,
         )
-        process = process if told else with_copies(process, file, plan.limits)
+        process = process if told or plan.working else with_copies(process, file, plan.limits)
         root = self._isolation.submission_of(process)
         start = plan.start_of(name)
         request = {
@@ -238,6 +332,7 @@ class Worker:
             "seed": plan.seed_of(name),
             "clock": plan.clock,
             "charged": plan.charged,
+            "in_place": bool(plan.working),
             "steady_ns": plan.epoch_ns - plan.uptime_ns,
             "log_format": LOG_FORMAT,
             "python_paths": [str(p) for p in self._runtime.python_paths],
@@ -266,7 +361,7 @@ class Worker:
         finally:
             theirs.close()
         student.file, student.places, student.arguments = file, Places(Path(plan.root)), start.words
-        student.own_folder = _own_folder(environment)
+        student.own_folder, student.keeps_paths = _own_folder(environment), bool(plan.working)
         student.launched_by, student.prefix = start.launched_by, next(iter(plan.prefixes), "")
         return student
 
@@ -419,6 +514,21 @@ def end_in_order(students: list[NodeProcess]) -> None:
         student.last_report(LAST_REPORT_S * load_per_processor())
 
 
+def stop_now(student: NodeProcess) -> None:
+    """Kill a process that nobody will ask anything any more."""
+    with suppress(OSError):
+        os.killpg(student.process.pid, signal.SIGKILL)
+    student.process.wait()
+    student.close()
+
+
+def _compact(observation: Observation) -> list[Any]:
+    """Convert an observation for the other side of a stepped run, which reads messages from their bytes."""
+    if isinstance(observation, (Message, Delivery)) and observation.cdr:
+        return observation_to_json(replace(observation, value={}))
+    return observation_to_json(observation)
+
+
 def stop(students: list[NodeProcess]) -> None:
     """Send the stop signal to every running process, wait briefly, then kill it."""
     for student in students:
@@ -445,9 +555,22 @@ def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
         _import_runners()
         _import_interfaces()
     line = _own_line([request["line"], *request["lines_of_forks"]])
-    commands, answers = line.makefile("r"), line.makefile("w")
-    for command in commands:
-        data = json.loads(command)
+    answers = line.makefile("w")
+    commands = map(json.loads, line.makefile("r"))
+
+    def tell(answer: Mapping[str, Any]) -> None:
+        answers.write(json.dumps(answer) + "\n")
+        answers.flush()
+
+    for data in commands:
+        if "stepped" in data:
+            try:
+                worn = worker.step(from_json(Plan, data["stepped"]), data["domain"], commands, tell)
+            except Exception:
+                tell({"failed": traceback.format_exc()[-4000:]})
+                return  # the other side takes another worker
+            tell({"worn": worn})
+            continue
         try:
             plan: Plan = from_json(Plan, data["plan"])
             answer: dict[str, Any] = worker.run(plan, data["domain"], data["left_ns"], data["budget"])

@@ -140,20 +140,35 @@ def _playbacks(exercise: Exercise, traces: Mapping[str, Trace], told: Set[str]) 
     """Return each recording, with the criteria about it that no other figure shows."""
     recorded = [s for s in exercise.scenarios if s.id in traces]
     for scenario in recorded:
-        trace = traces[scenario.id]
-        timeline = replace(timeline_chart(trace, scenario.processes), scenario=scenario.id)
-        graphs = _changes(trace)
-        connected = f" {_said(graphs[-1][1])}." if graphs and graphs[-1][1].nodes else ""
         title = f"The run: {scenario.id.replace('_', ' ')}" if len(recorded) > 1 else "The run"
-        yield Playback(
-            id="run",
-            title=title,
-            about=f"{timeline.about}{connected}",
-            criteria=tuple(c.id for c in exercise.criteria if c.scenario == scenario.id and _is_recorded(c, told)),
-            timeline=timeline,
-            topics=recorded_values(trace),
-            graphs=graphs,
-        )
+        criteria = tuple(c.id for c in exercise.criteria if c.scenario == scenario.id and _is_recorded(c, told))
+        yield playback(traces[scenario.id], scenario.id, scenario.processes, title, criteria)
+
+
+def playback(
+    trace: Trace, scenario: str, processes: Sequence[str], title: str = "The run", criteria: tuple[str, ...] = ()
+) -> Playback:
+    """Return a recording to play.
+
+    Args:
+        trace: The recording.
+        scenario: Id of its scenario.
+        processes: Names of its processes.
+        title: Title of the figure.
+        criteria: The criteria that are shown with it.
+    """
+    timeline = replace(timeline_chart(trace, processes), scenario=scenario)
+    graphs = _changes(trace)
+    connected = f" {_said(graphs[-1][1])}." if graphs and graphs[-1][1].nodes else ""
+    return Playback(
+        id="run",
+        title=title,
+        about=f"{timeline.about}{connected}",
+        criteria=criteria,
+        timeline=timeline,
+        topics=recorded_values(trace),
+        graphs=graphs,
+    )
 
 
 def _is_recorded(criterion: Criterion, told: Set[str]) -> bool:

@@ -106,6 +106,11 @@ def test_workspaces_beside_a_sourced_installation_stay_out_of_sight(tmp_path: Pa
     everything = [*runtime.read_paths, *runtime.library_paths, *runtime.python_paths]
     assert not [path for path in everything if overlay in (path, *path.parents)]
     assert str(overlay) not in "".join(runtime.environment.values())
+    own = find_ros(variables, workspaces=True).runtime  # for programs of whoever sourced it
+    assert own.environment["AMENT_PREFIX_PATH"] == variables["AMENT_PREFIX_PATH"]
+    assert own.python_paths[0] == overlay / "lib" / HERE / "site-packages"
+    assert own.library_paths[0] == overlay / "lib"
+    assert overlay in own.read_paths
 
 
 def test_an_empty_entry_of_a_search_path_is_not_the_working_directory(

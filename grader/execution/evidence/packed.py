@@ -206,6 +206,14 @@ def trace_from_json(data: Any) -> Trace:
         raise HarnessError(f"trace: expected {FORMAT}, found something else ({type(error).__name__})") from error
 
 
+def observations_from_json(rows: Any) -> list[Observation]:
+    """Build observations from their JSON values; raises HarnessError if they are not valid."""
+    try:
+        return [_EXACT_MAKERS[type(row)](row) for row in msgspec.convert(rows, _OBSERVATIONS)]
+    except (KeyError, TypeError, ValueError) as error:
+        raise HarnessError(f"trace: expected observations, found something else ({type(error).__name__})") from error
+
+
 def _same(kind: Callable[..., Any], row: Any) -> Any:
     return kind(*msgspec.structs.astuple(row))
 
@@ -274,6 +282,7 @@ _EXACT_MAKERS: Mapping[type, Callable[[Any], Observation]] = {
     _EXACT_ROWS[Fault]: _fault,
 }
 _TRACE = _trace_row(_EXACT_ROWS.values())
+_OBSERVATIONS = list[Union[tuple(_EXACT_ROWS.values())]]  # type: ignore[misc, valid-type]  # noqa: UP007
 #: The fast variant keeps the fields of messages as JSON text.
 _ROWS: Mapping[type, Any] = {
     **_EXACT_ROWS,

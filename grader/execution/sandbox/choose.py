@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -17,6 +18,10 @@ from grader.execution.sandbox.protocol import Isolation
 from grader.execution.sandbox.tiers import ISOLATING, isolation_from_name
 
 AUTO = "auto"
+#: For programs of one's own: no sandbox, but a network of their own if bubblewrap can make one.
+OWN_PROGRAMS = "own-programs"
+#: Seconds that the trial of it may take; it takes 10 ms.
+TRIED_S = 20.0
 #: How much of the reason against each tier is shown if all tiers are refused.
 MOST_CHARACTERS = 100
 
@@ -27,6 +32,7 @@ class TierChoice:
 
     isolation: Isolation
     containment: tuple[Property, ...] = ()  # what the self-test found it to prevent; empty without a sandbox
+    lacks: str = ""  # why own programs get no network of their own, in words; empty if they do
 
 
 def _silent(step: str) -> None:
@@ -36,11 +42,14 @@ def _silent(step: str) -> None:
 def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str], None] = _silent) -> TierChoice:
     """Choose the tier to record in; raises EnvironmentFault, with a fix as its hint, if it does not work here.
 
-    Wanted is `auto` for the strongest tier that has all required properties, `none` for no sandbox, or the name of a
-    tier, which must have the properties that it promises. When a sandbox is tested, `progress` is told why.
+    Wanted is `auto` for the strongest tier that has all required properties, `none` for no sandbox, `own-programs` for
+    a network of their own where that is possible, or the name of a tier, which must have the properties that it
+    promises. When a sandbox is tested, `progress` is told why.
     """
     if wanted == NO_SANDBOX:
         return TierChoice(isolation_from_name(wanted))
+    if wanted == OWN_PROGRAMS:
+        return for_own_programs()
     if wanted != AUTO:
         return _named(wanted, ros, progress)
     tried: list[TierReport] = []
@@ -49,6 +58,23 @@ def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str]
         if tried[-1].usable:
             return TierChoice(isolation_from_name(name), tried[-1].properties)
     raise _refusal(tried)
+
+
+def for_own_programs() -> TierChoice:
+    """Return what isolates the network of programs that need no sandbox, or nothing and why."""
+    try:
+        isolation = isolation_from_name(tiers.OWN_NETWORK_NAME)
+    except EnvironmentFault as fault:
+        return TierChoice(isolation_from_name(NO_SANDBOX), lacks=fault.message)
+    command = isolation.worker_command(("/bin/true",), {}, ())
+    try:
+        done = subprocess.run(
+            command.argv, env=dict(command.environment), capture_output=True, text=True, timeout=TRIED_S, check=False
+        )
+        why = "" if done.returncode == 0 else done.stderr.strip()[:MOST_CHARACTERS] or f"code {done.returncode}"
+    except (OSError, subprocess.SubprocessError) as error:
+        why = str(error)[:MOST_CHARACTERS]
+    return TierChoice(isolation) if not why else TierChoice(isolation_from_name(NO_SANDBOX), lacks=f"bubblewrap: {why}")
 
 
 def inspect_tiers(ros: RosInstallation) -> tuple[TierReport, ...]:

@@ -30,7 +30,8 @@ class StudentProcess:
     copied: tuple[str, ...] = ()
     # Whether the copies stand in for the submission; otherwise they are in the working directory
     writable: bool = False
-    # The working directory, relative to a submission that may be written to; None for an empty folder of its own
+    # The working directory, relative to a submission that may be written to, or absolute in tiers without a view of
+    # files for each process; None for an empty folder of its own
     working: str | None = None
     # Where the process sees `host_folder` in tiers with a view of files for each; None for the usual place
     host_at: Path | None = None

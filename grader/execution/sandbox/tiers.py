@@ -44,6 +44,7 @@ from grader.execution.sandbox.protocol import (
 from grader.execution.sandbox.seccomp import flat_filter
 from grader.execution.sandbox.start import landlock_version
 
+OWN_NETWORK_NAME = "own-network"
 FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME = "bubblewrap-flat", "landlock", "none"
 #: The tiers that isolate anything, strongest first.
 ISOLATING = (ROOT_NAME, USER_NAME, FLAT_NAME, LANDLOCK_NAME)
@@ -68,6 +69,8 @@ def isolation_from_name(name: str) -> Isolation:
 
     Raises EnvironmentFault if there is no such tier, it is for another user, or a part of it is missing.
     """
+    if name == OWN_NETWORK_NAME:
+        return OwnNetwork(Bubblewrap.here())
     if name not in TIERS:
         raise EnvironmentFault(f"isolation: expected one of {', '.join(TIERS)}, found {name}")
     if name == LANDLOCK_NAME:
@@ -222,6 +225,39 @@ class Plain(_OnSharedNetwork):
 
 
 @dataclass(frozen=True, slots=True)
+class OwnNetwork(InPlace):
+    """A network of one's own, and no sandbox: for the programs of whoever starts them.
+
+    Processes see and change the same files as the caller, and start in the caller's working directory. Nodes outside
+    neither hear nor disturb them.
+    """
+
+    name: ClassVar[str] = OWN_NETWORK_NAME
+    shares_network: ClassVar[bool] = False
+    submission_seen_at: ClassVar[str] = IN_PLACE
+    host_seen_at: ClassVar[str] = str(HOST)
+    scratch: ClassVar[Path] = SCRATCH
+    outer: Bubblewrap  # the bubblewrap around the worker
+
+    def worker_command(
+        self,
+        argv: Sequence[str],
+        environment: Mapping[str, str],
+        pass_fds: tuple[int, ...],
+        view: WorkerView | None = None,
+    ) -> Command:
+        """Return the command that starts the worker; it sees all files."""
+        del view
+        return self.outer.worker_command(argv, environment, pass_fds)
+
+    def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
+        """Return the limits of a process."""
+        folder = own_folder(self.scratch, process)
+        request = start_request(str(folder), made=True, limits=by_resource(limits), **copies(process))
+        return PreparedSandbox(request, environment_in(process, folder))
+
+
+@dataclass(frozen=True, slots=True)
 class Ground:
     """The surroundings of a sandboxed process."""
 
@@ -238,7 +274,8 @@ def start_command(request: Mapping[str, object]) -> tuple[str, ...]:
 def copies(process: StudentProcess) -> dict[str, object]:
     """Return what a request says about the files that the working directory gets copies of."""
     into = COPY if process.writable else "work"
-    working = "work" if process.working is None else f"{into}/{process.working}".rstrip("/")
+    within = f"{into}/{process.working}".rstrip("/")
+    working = "work" if process.working is None else process.working if process.working.startswith("/") else within
     return {"beside": str(process.beside), "copied": process.copied, "into": into, "working": working}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -216,6 +216,31 @@ def render_html(report: Report, *, assets: str | None = None, recordings: str = 
     )
 
 
+def render_run(title: str, why: str, run: Playback, facts: Mapping[str, str]) -> str:
+    """Return a page that plays one run, in one file that makes no network requests; all its text is hostile.
+
+    Args:
+        title: What was run.
+        why: What is to be told about it; may be empty.
+        run: The run.
+        facts: Names and values of what it was made with.
+    """
+    columns = Columns()
+    return (
+        _templates()
+        .get_template("run.html")
+        .render(
+            title=title,
+            why=why,
+            run_figure=run,
+            facts=facts,
+            bundle=bundle(),
+            embedded=Markup,
+            figures=Markup(script_json({"figures": {run.id: figure_values(run, columns)}, "columns": columns.lists})),  # noqa: S704  as above
+        )
+    )
+
+
 def score_shown(report: Report) -> ScoreShown:
     """Return the score of a report as its page shows it."""
     outcomes = tuple(verdict.outcome for exercise in report.exercises for verdict in exercise.verdicts)
@@ -239,9 +264,16 @@ def _templates() -> Environment:
         "line_id": _line_id,
         "placed_in": _placed_in,
         "open_run": _open_run,
+        "kept_at": _kept_at,
         "segments": _segments,
     }
     return templates
+
+
+def _kept_at(recordings: str, exercise: ExerciseReport, run: Playback) -> str:
+    """Return where the evidence of a run is, relative to the page; empty if its readers have none."""
+    name = f"{exercise.id}.{run.timeline.scenario}"
+    return f"{recordings}/{name}/{name}_0.mcap" if recordings else ""
 
 
 def _open_at_first(verdict: Verdict) -> bool:

@@ -1,0 +1,104 @@
+"""Converts between ordinary ROS messages and what passes to and from a worker: types by name, and serialized bytes.
+
+It runs in the process that steps a run, and needs no rclpy context, no node and no ROS domain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from grader.core.errors import HarnessError
+from grader.core.trace import Delivery, Message
+from grader.execution.interfaces import interface_class, message_class, plain_fields
+from grader.student_host.quick_imports import import_without_needless
+
+import_without_needless("rosidl_generator_py")  # which takes as long as the rest, and warns of a deprecated module
+from rclpy.parameter import Parameter  # noqa: E402
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy  # noqa: E402
+from rclpy.qos import QoSProfile as QoSProfile  # noqa: E402, PLC0414 - whoever publishes may give one
+from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
+
+
+def type_name(kind: Any) -> str:
+    """Return the name of a message, service or action type, such as `std_msgs/msg/String`.
+
+    Args:
+        kind: Its class, or that of a request, a response, a goal or a result.
+
+    Raises:
+        TypeError: It is the class of no interface.
+    """
+    parts = getattr(kind, "__module__", "").split(".")
+    name = getattr(kind, "__name__", "")
+    if not isinstance(kind, type) or len(parts) < 2 or parts[1] not in ("msg", "srv", "action"):
+        shown = name or type(kind).__name__
+        raise TypeError(f"expected the class of a ROS message, service or action, found {shown}")
+    return f"{parts[0]}/{parts[1]}/{name if parts[1] == 'msg' else name.partition('_')[0]}"
+
+
+def serialized(message: Any, where: str) -> tuple[str, bytes]:
+    """Return type and bytes of a message; raises TypeError if it is none."""
+    if isinstance(message, type):
+        raise TypeError(f"{where}: expected a message, found the class {message.__name__}; write {message.__name__}()")
+    try:
+        interface = type_name(type(message))
+    except TypeError as error:
+        raise TypeError(f"{where}: expected a ROS message, found {type(message).__name__}") from error
+    return interface, bytes(serialize_message(message))
+
+
+def read(carried: Message | Delivery) -> Any:
+    """Return a message that was observed as an object of its class.
+
+    Raises:
+        HarnessError: Its type is not installed, or its content was not kept because it is too large or malformed.
+    """
+    kind = message_class(carried.type)
+    if kind is None:
+        raise HarnessError(f"{carried.topic}: the type {carried.type} is not installed here")
+    if not carried.cdr:
+        raise HarnessError(f"{carried.topic}: the content of this message was not kept, because it is too large")
+    return deserialize_message(carried.cdr, kind)
+
+
+def fields_of(carried: Message | Delivery) -> Mapping[str, Any]:
+    """Return the fields of a message as plain values, for recordings; none if they cannot be read."""
+    if carried.value or not carried.cdr:
+        return carried.value
+    try:
+        fields: Mapping[str, Any] = plain_fields(read(carried))
+    except Exception:  # whatever bytes a program sends
+        return {}
+    return fields
+
+
+def qos_words(profile: QoSProfile | None) -> tuple[str, str]:
+    """Return reliability and durability of a QoS profile, as traces name them; None stands for the usual ones."""
+    best_effort = profile is not None and profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    latched = profile is not None and profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    return "best_effort" if best_effort else "reliable", "transient_local" if latched else "volatile"
+
+
+def action_type(interface: str) -> Any:
+    """Return the class of an action type; raises HarnessError if it is not installed."""
+    found = interface_class(interface, "action")
+    if found is None:
+        raise HarnessError(f"the action type {interface} is not installed here")
+    return found
+
+
+def parameter_message(name: str, value: Any) -> Any:
+    """Return a parameter as a message for a node's service; raises TypeError for a value that no parameter has."""
+    try:
+        return Parameter(name, value=list(value) if isinstance(value, tuple) else value).to_parameter_msg()
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"parameter {name}: expected a value of a ROS parameter, found {value!r}") from error
+
+
+def service_type(interface: str) -> Any:
+    """Return the class of a service type; raises HarnessError if it is not installed."""
+    found = interface_class(interface, "srv")
+    if found is None:
+        raise HarnessError(f"the service type {interface} is not installed here")
+    return found

@@ -1,0 +1,371 @@
+"""Runs what commands from outside ask for, on the virtual clock: the same loop as for a plan, up to a moment each time.
+
+Between two commands virtual time stands still. A question of this side, such as what a service answers, is asked in the
+middle of a command, and time stands still until it is answered.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from typing import Any
+
+from grader.core.dataclass import dataclass
+from grader.core.quantities import NS_PER_S
+from grader.core.trace import Fault, Mark, Observation
+from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedMessages, PlannedServer, goal_call
+from grader.execution.observer import Observer
+from grader.execution.plan import Plan, derive
+from grader.execution.service_peers import check_calls, check_goal
+from grader.execution.steps import (
+    Advance,
+    Call,
+    Command,
+    Interrupt,
+    Kill,
+    Publish,
+    SendGoal,
+    Serve,
+    Simulate,
+    Start,
+)
+from grader.execution.stimuli import (
+    AddClients,
+    AddServer,
+    Advertise,
+    Ask,
+    Disappear,
+    Event,
+    PublishRecorded,
+    TopicEvent,
+)
+from grader.execution.student_process import NodeProcess
+from grader.execution.virtual_runner import VirtualRunner, unfit
+from grader.simulation.participant import Moment, Output, Simulation
+
+#: Starts the processes of a plan; returns each with the time to wait before it runs, in nanoseconds. What a launch file
+#: asks for and nobody starts is added to the list, as sentences.
+Starter = Callable[[Plan, list[str]], Iterable[tuple[NodeProcess, int]]]
+#: Asks the other side, which answers with a value that fits the question.
+Question = Callable[[Mapping[str, Any]], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class PublishNext(TopicEvent):
+    """Publish the next message of a stream, unless another one has replaced it."""
+
+    stream: Stream
+    number: int
+
+
+class Stream:
+    """Messages that a command publishes on a topic, one after the other.
+
+    Args:
+        command: What to publish.
+        begin_ns: When the first message is sent.
+        draw: Draws what is lost and how long the rest is on its way.
+    """
+
+    def __init__(self, command: Publish, begin_ns: int, draw: random.Random) -> None:
+        self.command = command
+        self._begin_ns = begin_ns
+        self._draw = draw
+        self._arrived_ns = begin_ns
+
+    def event(self, number: int) -> PublishNext | None:
+        """Return the event that sends a message; None if there is none of this number."""
+        period_ns = self.command.period_ns
+        if not self.command.messages or (number and not period_ns):
+            return None
+        return PublishNext(self._begin_ns + number * period_ns, self.command.topic, self, number)
+
+    def arrives_ns(self, sent_ns: int) -> int | None:
+        """Draw when a message arrives, never before the one sent before it; None if it is lost."""
+        command = self.command
+        if command.loss and self._draw.random() < command.loss:
+            return None
+        delay_ns = self._draw.randint(*command.delay_ns) if command.delay_ns != (0, 0) else 0
+        self._arrived_ns = max(self._arrived_ns, sent_ns + delay_ns)
+        return self._arrived_ns
+
+    def message(self, number: int) -> bytes:
+        """Return the message of a number; the last one is repeated."""
+        return self.command.messages[min(number, len(self.command.messages) - 1)]
+
+
+class SteppedRunner(VirtualRunner):
+    """Runs commands on the virtual clock.
+
+    Args:
+        plan: The limits, the clock and the seed; it has no processes and no stimuli.
+        students: Receives the processes that are started.
+        observer: The grader's node.
+        start: Starts processes.
+        ask: Asks the other side.
+    """
+
+    def __init__(
+        self, plan: Plan, students: list[NodeProcess], observer: Observer, start: Starter, ask: Question
+    ) -> None:
+        super().__init__(plan, students, observer)
+        self._start = start
+        self._ask = ask
+        self._to_ns = 0
+        self._until_news = False
+        self._on_topics: dict[str, Stream] = {}
+        self._offered: dict[str, PlannedMessages] = {}
+        self._served: set[str] = set()
+        self._faults: list[Observation] = []
+        self._draws: dict[str, random.Random] = {}
+        self._order = random.Random(derive(int(plan.host_seed, 16), "order")) if plan.drawn_order else None  # noqa: S311
+
+    @property
+    def now_ns(self) -> int:
+        """The time of the run."""
+        return self._now_ns
+
+    def perform(self, command: Command) -> dict[str, Any]:
+        """Carry out a command, and return what its sender has to know besides the observations.
+
+        Raises:
+            HarnessError: A type or a field is not known on this machine.
+        """
+        match command:
+            case Advance():
+                self._advance(command.to_ns, until_news=command.until_news)
+            case Start():
+                return self._begin_processes(command)
+            case Publish():
+                self._publish(command)
+            case Serve():
+                self._serve(command.service, command.type)
+            case Call():
+                return self._call(command)
+            case SendGoal():
+                return self._send_goal(command)
+            case Simulate():
+                self._simulate(command)
+            case Interrupt():
+                self._interrupt_now(self._named(command.process))
+            case Kill():
+                self._kill(self._named(command.process))
+        return {}
+
+    def news(self) -> list[Observation]:
+        """Return what was observed since the last call, and forget it."""
+        found = self._recorder.observations
+        self._recorder.observations = []
+        self._faults += [o for o in found if isinstance(o, Fault)]
+        return found
+
+    def programs(self) -> dict[str, int | None]:
+        """Return the exit code of each process that has ended."""
+        return {s.name: s.exit_code for s in self._students if s.ended}
+
+    def full(self) -> str:
+        """Return the limit that ended the recording, as a sentence; empty if none did."""
+        return self._recorder.full
+
+    def unsuitable(self) -> str:
+        """Return why virtual time does not suit the nodes; empty if it does."""
+        return self._graders_fault() or unfit(self._students, self._faults, full=bool(self._recorder.full))
+
+    def notes(self) -> list[str]:
+        """Return the notes of the run."""
+        others = [*self._observer.notes(), *(note for s in self._students for note in s.notes)]
+        return list(self._recorder.notes(others))
+
+    def look(self) -> None:
+        """Record the graph as it is."""
+        self._last_look()
+
+    # ------------------------------------------------------------------ time
+
+    def _advance(self, to_ns: int, *, until_news: bool = False) -> None:
+        """Let time pass until a moment, with everything that happens at it.
+
+        A plan ends before what happens at its end. A step includes it: whoever waits for a second expects the timer of
+        that second. The loop therefore ends a nanosecond later, and no process is told of that nanosecond.
+        """
+        self._to_ns, self._until_news = max(self._now_ns, to_ns), until_news
+        self._end_ns = self._to_ns + 1
+        self._run_on()
+        self._until_news = False
+        if not self._recorder.full and not (until_news and self._recorder.observations):
+            self._now_ns = self._to_ns
+        self._now_ns = min(self._now_ns, self._to_ns)
+
+    def _is_interrupted(self) -> bool:
+        return self._until_news and bool(self._recorder.observations)
+
+    def _quiet_until(self, student: NodeProcess) -> int:
+        return max(self._now_ns, min(super()._quiet_until(student), self._to_ns))
+
+    def _ready_students(self) -> Iterator[NodeProcess]:
+        """Yield the processes that have something to do; with a drawn order, in an order that follows from the seed."""
+        ready = super()._ready_students()
+        if self._order is None:
+            return ready
+        found = list(ready)
+        self._order.shuffle(found)
+        return iter(found)
+
+    # ------------------------------------------------------------- processes
+
+    def _begin_processes(self, command: Start) -> dict[str, Any]:
+        names: list[str] = []
+        left_out: list[str] = []
+        for student, delay_ns in self._start(command.plan, left_out):
+            self._students.append(student)
+            student.wake_ns = self._now_ns + delay_ns
+            if delay_ns:
+                self._starts_ns[student.name] = student.wake_ns
+            names.append(student.name)
+        if command.settle:
+            self._advance(self._now_ns)
+        return {"started": names, "left_out": left_out}
+
+    def _named(self, process: str) -> NodeProcess:
+        return next(student for student in self._students if student.name == process)
+
+    def _interrupt_now(self, student: NodeProcess) -> None:
+        if student.ended or student.stop_signalled:
+            return
+        student.stop_signalled = True
+        self._recorder.add(Mark(self._now_ns, "stop_signal", student.name))
+        self._to_ns = self._now_ns
+        self._end_ns = self._now_ns + 1
+        self._interrupt(student)
+        self._advance(self._now_ns)
+
+    def _kill(self, student: NodeProcess) -> None:
+        if student.ended:
+            return
+        with suppress(OSError):
+            os.killpg(student.process.pid, signal.SIGKILL)
+        student.death(self._now_ns)
+        student.drain()
+        self._write_output(student, final=True)
+        self._discovery.lose(student)
+        self._end(student, Mark(self._now_ns, "stopped", student.name))
+
+    # -------------------------------------------------------------- stimuli
+
+    def _publish(self, command: Publish) -> None:
+        """Begin to publish on a topic; what was published there until now ends."""
+        topic = command.topic
+        stream = self._on_topics[topic] = Stream(command, self._now_ns, self._draw("topic", topic))
+        if not command.messages:
+            return
+        qos = {"best_effort": command.best_effort, "latched": command.latched}
+        offer = PlannedMessages(topic, command.type, 0, 0, 1, 0, values=(), **qos)
+        if self._offered.get(topic) != offer:
+            if topic in self._offered:
+                self._do(Disappear(self._now_ns, topic), self._now_ns)
+            self._do(Advertise(self._now_ns, topic, offer), self._now_ns)
+            self._offered[topic] = offer
+        first = stream.event(0)
+        assert first is not None
+        self._later(first)
+
+    def _draw(self, *purpose: str) -> random.Random:
+        key = "/".join(purpose)
+        if key not in self._draws:
+            self._draws[key] = random.Random(derive(int(self._plan.host_seed, 16), *purpose))  # noqa: S311 - it has to repeat
+        return self._draws[key]
+
+    def _do(self, event: Event, now_ns: int) -> None:
+        if not isinstance(event, PublishNext):
+            super()._do(event, now_ns)
+            return
+        stream = event.stream
+        if self._on_topics.get(event.topic) is not stream:
+            return
+        if (following := stream.event(event.number + 1)) is not None:
+            self._later(following)
+        arrives_ns = stream.arrives_ns(event.t_ns)
+        if arrives_ns is None:
+            return
+        sent = PublishRecorded(arrives_ns, event.topic, stream.message(event.number), {})
+        if arrives_ns > now_ns:
+            self._later(sent)
+        else:
+            super()._do(sent, now_ns)
+
+    def _serve(self, service: str, interface: str) -> None:
+        server = PlannedServer(service, interface, 0, 0, 0, cycle=False, answers=0, responses=())
+        if service not in self._served:
+            self._served.add(service)
+            self._do(AddServer(self._now_ns, server), self._now_ns)
+
+    def _simulated(self, now_ns: int, service: str, request: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        if service not in self._served:
+            return super()._simulated(now_ns, service, request)
+        answer = self._ask({"ask": "service", "service": service, "request": request, "now_ns": now_ns})
+        return answer if isinstance(answer, dict) else None
+
+    def _call(self, command: Call) -> dict[str, Any]:
+        calls = PlannedCalls(command.service, command.type, self._now_ns, NS_PER_S, 1, (command.request,))
+        check_calls(calls, command.service)
+        self._do(AddClients(self._now_ns, calls), self._now_ns)
+        self._later(Ask(self._now_ns, PlannedCall(calls, 0)))
+        return {"client": self._services.clients_of(command.service)}
+
+    def _send_goal(self, command: SendGoal) -> dict[str, Any]:
+        check_goal(command.goal, command.goal.action)
+        call = goal_call(command.goal)
+        clients = []
+        for part in (call, *(following for _, following in call.then)):
+            self._do(AddClients(self._now_ns, part.calls), self._now_ns)
+            clients.append(self._services.clients_of(part.calls.service))
+        self._later(Ask(self._now_ns, call))
+        return {"clients": clients}
+
+    def _simulate(self, command: Simulate) -> None:
+        simulation = _Elsewhere(command, self._ask)
+        most = self._plan.limits.messages
+        for event in self._simulations.add(f"number {command.number}", simulation, most, self._now_ns):
+            if isinstance(event, (Advertise, AddServer)):
+                self._do(event, self._now_ns)
+            else:
+                self._later(event)
+
+
+class _Elsewhere(Simulation):
+    """A simulation whose methods run on the other side."""
+
+    def __init__(self, command: Simulate, ask: Question) -> None:
+        self._command = command
+        self._ask = ask
+        self.period = command.period_ns
+
+    def publishes(self) -> Mapping[str, str]:
+        return self._command.publishes
+
+    def hears(self) -> Mapping[str, str]:
+        return self._command.hears
+
+    def serves(self) -> Mapping[str, str]:
+        return self._command.serves
+
+    def step(self, now: Moment) -> Iterable[Output]:
+        return self._outputs(now, "step")
+
+    def on_message(self, now: Moment, topic: str, message: Mapping[str, Any]) -> Iterable[Output]:
+        return self._outputs(now, "on_message", topic, message)
+
+    def on_request(self, now: Moment, service: str, request: Mapping[str, Any]) -> Mapping[str, Any]:
+        answer = self._asked(now, "on_request", service, request)
+        return answer if isinstance(answer, dict) else {}
+
+    def _outputs(self, now: Moment, method: str, *arguments: Any) -> Iterable[Output]:
+        answer = self._asked(now, method, *arguments)
+        return [(topic, fields) for topic, fields in answer] if isinstance(answer, list) else []
+
+    def _asked(self, now: Moment, method: str, *arguments: Any) -> Any:
+        question = {"ask": "simulation", "number": self._command.number, "method": method, "arguments": arguments}
+        return self._ask({**question, "now_ns": now.t_ns, "clock_ns": now.clock_ns})

@@ -1,0 +1,157 @@
+"""The plugin for pytest: the fixture `ros`, with which a test runs real nodes in virtual time.
+
+It is loaded wherever the package is installed, and imports nothing of ROS before a test asks for the fixture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from grader.world.opening import Worlds
+    from grader.world.world import World
+
+#: What `@pytest.mark.ros` takes.
+_OPTIONS = ("seed", "seeds", "delay", "lose")
+_WORLD: pytest.StashKey[World] = pytest.StashKey()
+_SHARED: pytest.StashKey[str] = pytest.StashKey()
+_OF_WORKER = "ros_shared"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options of the command line."""
+    group = parser.getgroup("ros", "nodes in virtual time")
+    group.addoption(
+        "--ros-seed",
+        type=int,
+        metavar="N",
+        help="draw the order of programs that are ready at the same time, delays and losses from this seed",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Describe the marker."""
+    config.addinivalue_line(
+        "markers",
+        "ros(seed=N, seeds=COUNT, delay={topic: (least, most)}, lose={topic: share}): "
+        "options of the fixture `ros`: the seed of everything drawn, the number of seeds to run the test with, "
+        "seconds that messages of the test are on their way, and the share of them that is lost",
+    )
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run a test that is marked with `seeds` once for each of them."""
+    if "_ros_seed" not in metafunc.fixturenames:
+        return
+    seeds = _options(metafunc.definition).get("seeds")
+    chosen = metafunc.config.getoption("--ros-seed")
+    if seeds is not None and chosen is None:
+        metafunc.parametrize("_ros_seed", range(seeds), ids=[f"seed{number}" for number in range(seeds)])
+
+
+@pytest.fixture(scope="session")
+def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
+    """What the programs of all tests run in; it starts with the first test that needs it.
+
+    For a fixture of a wider scope than a test: `with ros_session.open() as ros: ...`.
+    """
+    from grader.core.errors import EnvironmentFault  # noqa: PLC0415 - no other test waits for it
+    from grader.world.opening import open_worlds  # noqa: PLC0415 - the same
+
+    with ExitStack() as stack:
+        try:
+            worlds = stack.enter_context(open_worlds(pytestconfig.rootpath))
+        except EnvironmentFault as fault:
+            pytest.fail(f"{fault.message}\nhint: {fault.hint}" if fault.hint else fault.message, pytrace=False)
+        pytestconfig.stash[_SHARED] = worlds.shared
+        if hasattr(pytestconfig, "workeroutput"):  # a process of pytest-xdist, which prints nothing itself
+            pytestconfig.workeroutput[_OF_WORKER] = worlds.shared
+        yield worlds
+
+
+@pytest.fixture
+def _ros_seed(request: pytest.FixtureRequest) -> int | None:
+    """The seed of a test; None for the order in which the programs were started, without chance."""
+    chosen: int | None = request.config.getoption("--ros-seed")
+    seed: int | None = _options(request.node).get("seed")
+    return seed if chosen is None else chosen
+
+
+@pytest.fixture
+def ros(
+    request: pytest.FixtureRequest,
+    ros_session: Worlds,
+    _ros_seed: int | None,
+    tmp_path: Path,
+) -> Iterator[World]:
+    """A world of its own for a test: real nodes, real messages, virtual time."""
+    del tmp_path  # what a failing test leaves lies there
+    options = _options(request.node)
+    opened = ros_session.open(
+        request.path.parent,
+        seed=_ros_seed,
+        name=request.node.name,
+        delay=options.get("delay"),
+        lose=options.get("lose"),
+    )
+    with opened as world:
+        request.node.stash[_WORLD] = world
+        yield world
+    if world.problem and _WORLD in request.node.stash:
+        pytest.fail(world.problem, pytrace=False)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Keep the recording of a test that has failed, and the page that plays it, and name them in the failure."""
+    report = yield
+    world = item.stash.get(_WORLD, None)
+    if world is not None and call.when == "call" and report.failed and call.excinfo is not None:
+        del item.stash[_WORLD]  # the fixture has nothing to add
+        drawn = [f"seed {world.seed}: repeat it with --ros-seed {world.seed}"] if world.is_drawn else []
+        lines = [*drawn, *_kept(item, world, call.excinfo)]
+        report.sections.append(("ros", "\n".join(lines)))
+        item.user_properties += [("ros", line) for line in lines]  # which files for JUnit hold
+    return report
+
+
+def _kept(item: Any, world: World, failure: pytest.ExceptionInfo[BaseException]) -> Iterator[str]:
+    """Close the world of a failed test, and yield what is kept of it."""
+    why = failure.exconly(tryshort=True).splitlines()[0]
+    try:
+        world.close()
+        yield from map(str, world.keep(item.funcargs["tmp_path"], why))
+    except Exception as error:  # the failure of the test is what counts
+        yield f"the recording was not kept: {type(error).__name__}: {error}"
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """Note whether the programs of a process of pytest-xdist had a network of their own."""
+    if shared := getattr(node, "workeroutput", {}).get(_OF_WORKER, ""):
+        node.config.stash[_SHARED] = shared
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Say so if the programs had no network of their own."""
+    if shared := config.stash.get(_SHARED, ""):
+        terminalreporter.write_line(f"ros: the nodes shared the network of this machine ({shared})")
+
+
+def _options(item: Any) -> dict[str, Any]:
+    """Return the options of the marker that is nearest to a test."""
+    options: dict[str, Any] = {}
+    for marker in reversed(list(item.iter_markers("ros"))):
+        options |= marker.kwargs
+        unknown = [name for name in marker.kwargs if name not in _OPTIONS]
+        if unknown or marker.args:
+            found = unknown[0] if unknown else repr(marker.args[0])
+            raise pytest.UsageError(f"@pytest.mark.ros: expected {', '.join(_OPTIONS)} by name, found {found}")
+    return options

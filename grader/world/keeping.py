@@ -1,0 +1,65 @@
+"""Keeps what happened in a stepped run: a recording that Foxglove opens, and a page that plays it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from grader.app.grade import environment_of
+from grader.core.trace import Delivery, Fault, LogRecord, Message, Observation, OutputLine, Trace
+from grader.execution.evidence.recording_file import recording_bytes
+from grader.execution.recording_session import RecordingSession
+from grader.execution.serialization import fields_of
+from grader.files import write_whole
+from grader.judging.figures import playback
+from grader.reporting.html.render import render_run
+
+#: Who published on a topic, in the words of a test.
+SENDERS = {"grader": "test", "student": "program"}
+RECORDING, PAGE = "recording.mcap", "run.html"
+
+
+def keep(session: RecordingSession, trace: Trace, seed: int | None, folder: Path, why: str) -> list[Path]:
+    """Write the recording and the page of a run into a folder, and return their paths.
+
+    Args:
+        session: What it ran in.
+        trace: What was observed.
+        seed: What was drawn follows from it; None if nothing was.
+        folder: Exists.
+        why: Why the test failed, in one line; empty if it did not.
+    """
+    trace = _whole(trace)
+    facts = {
+        "format": "grader/test/v1",
+        "seed": "" if seed is None else str(seed),
+        "environment": json.dumps(asdict(environment_of(session))),
+    }
+    recording, _ = recording_bytes(trace, facts, RECORDING)
+    page = page_of(session, trace, seed, why)
+    for name, data in ((RECORDING, recording), (PAGE, page.encode())):
+        write_whole(folder / name, data)
+    return [folder / RECORDING, folder / PAGE]
+
+
+def page_of(session: RecordingSession, trace: Trace, seed: int | None, why: str = "") -> str:
+    """Return the page that plays a run, in one file; the arguments are those of `keep`."""
+    environment = environment_of(session)
+    facts = {} if seed is None else {"seed": str(seed)}
+    facts |= {"ROS": f"rclpy {environment.rclpy} ({environment.ros_distro})", "Python": environment.python}
+    processes = {o.process: None for o in trace.observations if isinstance(o, (LogRecord, OutputLine, Fault))}
+    run = playback(_whole(trace), "run", [*processes])
+    topics = tuple(replace(topic, sender=SENDERS[topic.sender]) for topic in run.topics)
+    return render_run(trace.scenario, why, replace(run, topics=topics), facts)
+
+
+def _whole(trace: Trace) -> Trace:
+    """Return a trace with the fields of its messages."""
+    return replace(trace, observations=tuple(map(_with_fields, trace.observations)))
+
+
+def _with_fields(observation: Observation) -> Observation:
+    if isinstance(observation, (Message, Delivery)):
+        return replace(observation, value=fields_of(observation))
+    return observation

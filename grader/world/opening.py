@@ -1,0 +1,99 @@
+"""Opens worlds: what all of them run in is started once, and each has a network domain of its own in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from grader.core.dataclass import dataclass
+from grader.execution.recording_session import RecordingSession, open_session
+from grader.execution.sandbox.choose import OWN_PROGRAMS
+from grader.world.world import World
+
+
+@dataclass(frozen=True, slots=True)
+class Worlds:
+    """What worlds run in, one after the other or at the same time.
+
+    Attributes:
+        session: The workers.
+        folder: Where programs are looked for last.
+    """
+
+    session: RecordingSession
+    folder: Path
+
+    @property
+    def shared(self) -> str:
+        """Why the nodes use the network of this machine, in words; empty if they have a network of their own."""
+        return self.session.shared
+
+    @contextmanager
+    def open(
+        self,
+        near: Path | None = None,
+        *,
+        seed: int | None = None,
+        name: str = "test",
+        delay: Mapping[str, tuple[float, float]] | None = None,
+        lose: Mapping[str, float] | None = None,
+    ) -> Iterator[World]:
+        """Open a world, and end all of its programs at the end of the block.
+
+        Args:
+            near: Where programs are looked for first; then in the folder of these worlds, and in the working directory.
+            seed: What the order of ready programs, delays and losses are drawn from; None for the order in which they
+                were started.
+            name: Name of its recording.
+            delay: For topics that are published on from outside, the least and the most seconds that a message is on
+                its way.
+            lose: For such topics, the share of messages that are lost, from 0 to 1.
+        """
+        folders = tuple(dict.fromkeys(path.resolve() for path in (near, self.folder, Path()) if path is not None))
+        drawn = {"drawn_order": seed is not None, "delay": delay, "lose": lose}
+        world = World(self.session, folders, seed=seed or 0, name=name, **drawn)  # type: ignore[arg-type]
+        try:
+            yield world
+        finally:
+            world.close()
+
+
+@contextmanager
+def open_worlds(folder: Path) -> Iterator[Worlds]:
+    """Start what worlds run in, and end it at the end of the block.
+
+    Args:
+        folder: Where programs are looked for last.
+
+    Raises:
+        EnvironmentFault: This machine lacks ROS.
+    """
+    with open_session(OWN_PROGRAMS, workers=1) as session:
+        yield Worlds(session, folder)
+
+
+@contextmanager
+def open_world(
+    near: Path | str = "",
+    *,
+    seed: int | None = None,
+    delay: Mapping[str, tuple[float, float]] | None = None,
+    lose: Mapping[str, float] | None = None,
+) -> Iterator[World]:
+    """Run programs in virtual time without pytest: in a script, or in the cells of a notebook.
+
+    A notebook shows the world, as the last value of a cell, as a page that plays the run so far.
+
+    Args:
+        near: Where programs are looked for first.
+        seed: What the order of ready programs, delays and losses are drawn from; None for the order in which they were
+            started.
+        delay: As for the marker `ros` of pytest.
+        lose: As for the marker `ros` of pytest.
+
+    Raises:
+        EnvironmentFault: This machine lacks ROS.
+    """
+    with open_worlds(Path()) as worlds, worlds.open(Path(near), seed=seed, delay=delay, lose=lose) as world:
+        yield world

@@ -1,0 +1,226 @@
+"""Finds the programs that a test names, where they lie: files, executables of packages, functions, launch files."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from grader.app.programs import package_of, workspace_of
+from grader.core.dataclass import dataclass
+from grader.core.errors import SubmissionError
+from grader.core.projects import Project
+from grader.core.scenario import is_launch_file
+from grader.core.trace import Fault, LogRecord, OutputLine
+from grader.execution.executables import Executable, executables, find_executables
+from grader.judging.wording import listed, nearest
+from grader.submissions.projects import read_projects
+
+#: What `ros.run` starts: a path, `PACKAGE/EXECUTABLE`, or the function to call, such as a module's `main`.
+Runnable = str | os.PathLike[str] | Callable[..., Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A program to run where it lies."""
+
+    name: str  # what it is called in messages
+    root: Path  # the folder of its workspace or package, or its own folder
+    file: str  # relative to `root`
+    executable: str = ""  # the entry point to run; empty for the one that suits the file
+    projects: tuple[Project, ...] = ()
+
+
+def find_program(wanted: Runnable, near: Sequence[Path]) -> Found:
+    """Find a program; raises SubmissionError if there is none.
+
+    Args:
+        wanted: What to run.
+        near: Folders in which a relative path is looked for, and in whose workspace a package is, in this order.
+    """
+    if callable(wanted):
+        return _of_function(wanted)
+    text = os.fspath(wanted)
+    for folder in near:
+        path = (folder / text).resolve()
+        if path.is_file():
+            return _of_file(path)
+    package, slash, name = text.partition("/")
+    if slash and "/" not in name and not name.endswith(".py"):
+        return _of_package(package, name, near)
+    beside = [path.name for folder in near for path in sorted(folder.glob("*.py"))]
+    close = nearest(Path(text).name, beside)
+    hint = f"did you mean {close}?" if close else f"looked in {', '.join(map(str, near))}"
+    raise SubmissionError(f"{text}: expected a file, found none", hint)
+
+
+def _of_file(path: Path) -> Found:
+    root, projects = _surroundings(path.parent)
+    return Found(path.name, root, path.relative_to(root).as_posix(), projects=projects)
+
+
+def _of_function(function: Callable[..., Any]) -> Found:
+    source = inspect.getsourcefile(function)
+    name = getattr(function, "__qualname__", "")
+    if source is None or not name.isidentifier():
+        raise SubmissionError(f"{name or function}: expected a function of a module, found none", "name its file")
+    path = Path(source).resolve()
+    root, projects = _surroundings(path.parent)
+    file = path.relative_to(root).as_posix()
+    module = getattr(function, "__module__", path.stem)
+    package = next((one for one in projects if file.startswith(f"{one.folder}/") or not one.folder), None)
+    known = () if package is None else tuple(script for script in package.scripts if script[1:] == (module, name))
+    if package is not None and known:
+        return Found(f"{package.name}/{known[0][0]}", root, file, known[0][0], projects)
+    if name != "main":
+        hint = "name its file, or give the package an entry point that calls it"
+        raise SubmissionError(f"{module}.{name}: expected main() of a module, or an entry point", hint)
+    return Found(path.name, root, file, projects=projects)
+
+
+def _of_package(package: str, name: str, near: Sequence[Path]) -> Found:
+    known: list[str] = []
+    for root, projects in dict.fromkeys(map(_surroundings, near)):
+        for one in find_executables(root, projects, package, name):
+            if one.file is not None:
+                return Found(one.words, root, one.file, one.name if one.target else "", projects)
+            raise SubmissionError(f"{package}/{name}: {one.problem}", "write the file, or correct the name")
+        known += [one.words for one in executables(root, projects)]
+    close = nearest(f"{package}/{name}", known)
+    hint = (
+        f"did you mean {close}?" if close else f"there are {listed(known)}" if known else "no package is near the test"
+    )
+    raise SubmissionError(f"{package}/{name}: expected an executable of a package, found none", hint)
+
+
+def _surroundings(folder: Path) -> tuple[Path, tuple[Project, ...]]:
+    """Return the folder of the workspace, the package or the file alone, with the packages in it."""
+    package = package_of(folder)
+    if not (package / "package.xml").is_file():
+        return folder, ()
+    root = workspace_of(package)
+    return root, _projects(root)
+
+
+@cache
+def _projects(root: Path) -> tuple[Project, ...]:
+    return tuple(read_projects(root)[0])
+
+
+def find_launch_file(wanted: str | os.PathLike[str], near: Sequence[Path]) -> tuple[Found, tuple[tuple[str, str], ...]]:
+    """Find a launch file, and return it with the name of each program that it may start, by the program's file.
+
+    Raises SubmissionError if there is none.
+    """
+    found = find_program(wanted, near)
+    if not is_launch_file(found.name):
+        raise SubmissionError(f"{found.name}: expected a launch file", "its name ends with .launch.py, .xml or .yaml")
+    known = [(f"{one.file} {one.name}" if one.target else one.file, one.words) for one in _runnable(found)]
+    loose = () if found.projects else ((path.name, path.name) for path in sorted(found.root.glob("*.py")))
+    return found, (*((file, name) for file, name in known if file), *loose)
+
+
+def _runnable(found: Found) -> list[Executable]:
+    return [one for one in executables(found.root, found.projects) if one.file is not None]
+
+
+def parameter_values(parameters: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield parameters with their values in YAML, as they are given on the command line."""
+    for name, value in parameters.items():
+        plain = list(value) if isinstance(value, tuple) else value
+        try:
+            yield name, json.dumps(plain, allow_nan=False) if not isinstance(plain, float) else _float(plain)
+        except (TypeError, ValueError) as error:
+            raise TypeError(f"parameter {name}: expected a value of a ROS parameter, found {value!r}") from error
+
+
+def _float(value: float) -> str:
+    """Return a number as YAML reads it as a float: rcl takes `1` for an integer, and `1e-06` for a string."""
+    text = repr(value)
+    if text in ("inf", "-inf", "nan"):
+        return text.replace("inf", ".inf").replace("nan", ".nan")
+    mantissa, e, exponent = text.partition("e")
+    return f"{mantissa if '.' in mantissa else f'{mantissa}.0'}{e}{exponent}"
+
+
+class Program:
+    """A program that was started, in its own process.
+
+    Attributes:
+        name: What it is called in messages.
+        root: The folder that places in its code are relative to.
+    """
+
+    def __init__(
+        self, name: str, root: Path, signal: Callable[[Program, str], None], await_start: Callable[[], None]
+    ) -> None:
+        self.name = name
+        self.root = root
+        self._signal = signal
+        self._await_start = await_start
+        self._logs: list[LogRecord] = []
+        self._lines: list[OutputLine] = []
+        self._ended = False
+        self._exit_code: int | None = None
+        self.fault: Fault | None = None
+
+    def __repr__(self) -> str:
+        """Return name and state."""
+        state = f"exited with code {self._exit_code}" if self._ended else "running"
+        return f"<Program {self.name}: {state}>"
+
+    @property
+    def logs(self) -> list[LogRecord]:
+        """What it has logged through rclpy: `t_ns`, `severity`, `logger`, `text`, `file` and `line`."""
+        __tracebackhide__ = True
+        self._await_start()
+        return [*self._logs]
+
+    @property
+    def output(self) -> str:
+        """What it has written to standard output and standard error, without log records."""
+        __tracebackhide__ = True
+        self._await_start()
+        return "".join(f"{line.text}\n" for line in self._lines)
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        __tracebackhide__ = True
+        self._await_start()
+        return not self._ended
+
+    @property
+    def exit_code(self) -> int | None:
+        """Its exit code as a shell shows it, so 128 and the number of a signal that ended it; None while it runs."""
+        __tracebackhide__ = True
+        self._await_start()
+        return self._exit_code
+
+    def interrupt(self) -> None:
+        """Send it the stop signal, as Ctrl-C does, and let it do what it does at once.
+
+        A program that takes time to stop, in virtual time, goes on with the next step.
+        """
+        __tracebackhide__ = True
+        self._signal(self, "interrupt")
+
+    def kill(self) -> None:
+        """End it at once; its nodes vanish without a farewell."""
+        __tracebackhide__ = True
+        self._signal(self, "kill")
+
+    def _note(self, observation: LogRecord | OutputLine | Fault) -> None:
+        if isinstance(observation, LogRecord):
+            self._logs.append(observation)
+        elif isinstance(observation, OutputLine):
+            self._lines.append(observation)
+        else:
+            self.fault = self.fault or observation
+
+    def _end(self, exit_code: int | None) -> None:
+        self._ended, self._exit_code = True, exit_code

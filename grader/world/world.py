@@ -1,0 +1,762 @@
+"""The world of a stepped test: programs run in it, and time passes in it only when the test says so."""
+
+from __future__ import annotations
+
+import html
+import random
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar, overload
+
+from grader.core.dataclass import dataclass
+from grader.core.errors import GraderError
+from grader.core.limits import Limits
+from grader.core.quantities import GIB, MIB, NS_PER_S, seconds
+from grader.core.trace import (
+    ClockKind,
+    Endpoint,
+    Fault,
+    FaultKind,
+    GraphSnapshot,
+    LogRecord,
+    Message,
+    Observation,
+    Offer,
+    OutputLine,
+    Response,
+    Trace,
+)
+from grader.execution.exchanges import PlannedGoal
+from grader.execution.interfaces import built, plain_fields
+from grader.execution.plan import Plan, PlannedStart, derive, ros_arguments
+from grader.execution.recording_session import RecordingSession
+from grader.execution.serialization import (
+    QoSProfile,
+    action_type,
+    parameter_message,
+    qos_words,
+    read,
+    serialized,
+    service_type,
+    type_name,
+)
+from grader.execution.shares import install_shares
+from grader.execution.stepping import SteppedRun
+from grader.execution.steps import Advance, Call, Command, Interrupt, Kill, Publish, SendGoal, Serve, Simulate, Start
+from grader.simulation.loading import made
+from grader.simulation.participant import Moment, Simulation
+from grader.world import telling
+from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout
+from grader.world.programs import Found, Program, Runnable, find_launch_file, find_program, parameter_values
+
+Value = TypeVar("Value")
+
+#: How much the programs of a test may use, and how much of it is kept: they are trusted, so these are only to end what
+#: runs away. Images of some megabytes have to fit.
+OWN_LIMITS = Limits(
+    memory_bytes=16 * GIB,
+    processor_ns=3600 * NS_PER_S,
+    processes=4096,
+    output_bytes=64 * MIB,
+    lines=1_000_000,
+    open_files=4096,
+    file_bytes=64 * GIB,
+    scratch_bytes=64 * GIB,
+    wall_ns=24 * 3600 * NS_PER_S,
+    messages=1_000_000,
+    message_bytes=64 * MIB,
+    traffic_bytes=1 * GIB,
+    participants=200,
+)
+#: What fails a test. A program that ends by itself does not: the test can look at its exit code.
+FAILING = (FaultKind.SYNTAX_ERROR, FaultKind.EXCEPTION, FaultKind.HUNG, FaultKind.KILLED)
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A message that a program published."""
+
+    t: float  # when, in seconds since the test began
+    message: Any  # the message, an object of its class
+
+
+class Messages(list[Value]):
+    """The messages of a topic so far; asking for one that has not come says why there is none."""
+
+    def __init__(self, found: Sequence[Value], why: Callable[[], str]) -> None:
+        super().__init__(found)
+        self._why = why
+
+    @overload  # type: ignore[override]
+    def __getitem__(self, index: int) -> Value: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Value]: ...
+    def __getitem__(self, index: int | slice) -> Value | list[Value]:
+        """Return a message or some of them; raises NoMessage for one that has not come."""
+        __tracebackhide__ = True
+        try:
+            return super().__getitem__(index)
+        except IndexError:
+            raise NoMessage(self._why() if not self else f"only {len(self)} messages so far") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Launched:
+    """What was started of a launch file."""
+
+    programs: list[Program]
+    left_out: list[str]  # sentences about what was not started, such as programs that are not written in Python
+
+
+@dataclass(frozen=True, slots=True)
+class GoalResult:
+    """How a goal of an action ended."""
+
+    accepted: bool
+    status: int  # as in action_msgs/msg/GoalStatus, 0 if it was not accepted
+    result: Any  # the result, an object of its class; None if it was not accepted
+    feedback: list[Received]  # the feedback to this goal
+
+
+class Failure:
+    """What `expects_failure` waits for.
+
+    Attributes:
+        program: The program that failed; None until one has.
+        fault: What happened to it; None until it has.
+    """
+
+    def __init__(self) -> None:
+        self.program: Program | None = None
+        self.fault: Fault | None = None
+
+    @property
+    def text(self) -> str:
+        """What it failed of, such as `ValueError: too fast`; empty until it has."""
+        return "" if self.fault is None else self.fault.text
+
+
+class World:
+    """Runs programs in virtual time, and lets a test act on them and look at what they do.
+
+    Virtual time stands still between two calls. Use `grader.api.open_world` or the fixture `ros`, not the constructor.
+
+    Args:
+        session: What the programs run in.
+        near: Folders in which programs are looked for.
+        seed: What everything drawn follows from.
+        name: The name of the test in its recording.
+        drawn_order: Whether the seed decides which of several ready programs runs first.
+        delay: For topics that the test publishes on, the least and the most seconds that a message is on its way.
+        lose: For such topics, the share of messages that are lost.
+
+    Attributes:
+        session: What the programs run in.
+    """
+
+    def __init__(  # noqa: PLR0913 - the options of the marker
+        self,
+        session: RecordingSession,
+        near: Sequence[Path],
+        *,
+        seed: int = 0,
+        name: str = "test",
+        drawn_order: bool = False,
+        delay: Mapping[str, tuple[float, float]] | None = None,
+        lose: Mapping[str, float] | None = None,
+    ) -> None:
+        self.session = session
+        self._near = tuple(near)
+        self._seed = seed
+        self._delay = {_absolute(topic): between for topic, between in (delay or {}).items()}
+        self._lose = {_absolute(topic): share for topic, share in (lose or {}).items()}
+        self._plan = Plan(
+            scenario=name,
+            processes=(),
+            root="/",
+            host_seed=derive(seed, "world"),
+            duration_ns=0,
+            first_message_on="",
+            wait_at_most_ns=0,
+            numbers=(),
+            recordings=(),
+            clock=ClockKind.VIRTUAL.value,
+            limits=OWN_LIMITS,
+            drawn_order=drawn_order,
+            working=str(Path.cwd()),
+        )
+        self._observations: list[Observation] = []
+        self._messages: dict[str, list[Message]] = {}
+        self._read: dict[str, list[Received]] = {}
+        self._graph = GraphSnapshot(0, (), ())
+        self._programs: dict[str, Program] = {}
+        self._functions: dict[str, tuple[Any, Callable[[Any], Any]]] = {}
+        self._offers: dict[str, Endpoint] = {}
+        self._expected: list[Failure] = []
+        self._failing: list[tuple[Program, Fault]] = []
+        self._simulations: list[Simulation] = []
+        self._goals = 0
+        self._starting = False
+        self._notes: list[str] = []
+        self._unsuitable = ""
+        self._run = SteppedRun(session.recorder, self._plan, self._answered)
+
+    # ------------------------------------------------------------- programs
+
+    def run(  # noqa: PLR0913 - what a launch file may say of a node
+        self,
+        program: Runnable,
+        *,
+        name: str = "",
+        namespace: str = "",
+        parameters: Mapping[str, Any] | None = None,
+        remappings: Mapping[str, str] | None = None,
+        arguments: Sequence[str] = (),
+        env: Mapping[str, str] | None = None,
+    ) -> Program:
+        """Start a program, which runs until it waits for a message, a timer or a service.
+
+        Where a seed draws the order of programs, those that are started one right after the other start together, with
+        whatever the test does next.
+
+        Args:
+            program: A Python file, looked for beside the test and in the working directory; `PACKAGE/EXECUTABLE` of a
+                package in the same workspace; or `main` of a module, or the function of an entry point.
+            name: Name of its node, instead of its own.
+            namespace: Namespace of its node.
+            parameters: Values of its parameters.
+            remappings: New names of topics and services by their old ones.
+            arguments: Arguments before the ROS arguments.
+            env: Further environment variables.
+
+        Raises:
+            SubmissionError: There is no such program.
+            ProgramFailed: It has failed at once.
+        """
+        __tracebackhide__ = True
+        found = find_program(program, self._near)
+        label = self._unused(found.name)
+        start = PlannedStart(
+            label,
+            executable=found.executable,
+            arguments=tuple(map(str, arguments)),
+            ros_arguments=ros_arguments(
+                name, namespace, (remappings or {}).items(), parameter_values(parameters or {})
+            ),
+        )
+        self._programs[label] = started = Program(label, found.root, self._signal, self._await_start)
+        self._perform(Start(self._plan_of(found, start, env or {}), settle=not self._plan.drawn_order))
+        return started
+
+    def launch(self, file: str | Path, *, arguments: Mapping[str, Any] | None = None) -> Launched:
+        """Start the nodes that a launch file describes.
+
+        Args:
+            file: The launch file, looked for like a program.
+            arguments: Values of its arguments.
+
+        Raises:
+            SubmissionError: There is no such file.
+            HarnessError: It raises an exception, or describes nothing that can be started.
+        """
+        __tracebackhide__ = True
+        found, known = find_launch_file(file, self._near)
+        given = tuple((name, str(value)) for name, value in (arguments or {}).items())
+        start = PlannedStart(found.name, launch_arguments=given, known=known)
+        told = self._perform(Start(self._plan_of(found, start, {}), settle=not self._plan.drawn_order))
+        return Launched([self._programs[name] for name in told["started"]], told["left_out"])
+
+    def _plan_of(self, found: Found, start: PlannedStart, env: Mapping[str, str]) -> Plan:
+        installed = self.session.folder / f"installed_{derive(0, str(found.root))[:16]}"
+        prefixes, _ = install_shares(found.root, found.projects, installed, self.session.ros)
+        return replace(
+            self._plan,
+            processes=((start.process, found.file),),
+            root=str(found.root),
+            host_seed=derive(self._seed, "program", start.process),
+            starts=(start,),
+            projects=found.projects,
+            prefixes=prefixes,
+            environment=tuple((name, str(value)) for name, value in env.items()),
+        )
+
+    def _unused(self, name: str) -> str:
+        number = 1 + sum(known == name or known.startswith(f"{name} (") for known in self._programs)
+        return name if number == 1 else f"{name} ({number})"
+
+    def _signal(self, program: Program, how: str) -> None:
+        __tracebackhide__ = True
+        self._perform(Interrupt(program.name) if how == "interrupt" else Kill(program.name))
+
+    # ------------------------------------------------------------------ time
+
+    @property
+    def now(self) -> float:
+        """Seconds of virtual time since the test began."""
+        return seconds(self._run.now_ns)
+
+    def advance(self, seconds: float) -> None:
+        """Let so much virtual time pass, with everything that happens at its end; 0 is as good as `settle`.
+
+        Raises:
+            ProgramFailed: A program has failed meanwhile.
+        """
+        __tracebackhide__ = True
+        if seconds < 0:
+            raise ValueError(f"expected seconds to advance, found {seconds:g}: time does not go back")
+        self._perform(Advance(self._run.now_ns + round(seconds * NS_PER_S)))
+
+    def settle(self) -> None:
+        """Let everything happen that happens now, such as the reaction to a message; no time passes."""
+        __tracebackhide__ = True
+        self._perform(Advance(self._run.now_ns))
+
+    def wait_until(self, condition: Callable[[], Value], timeout: float) -> Value:
+        """Let time pass until a condition holds, and return its value.
+
+        It is looked at whenever something was observed. A message that has not come makes it false.
+
+        Args:
+            condition: Called without arguments.
+            timeout: Seconds of virtual time to wait at most.
+
+        Raises:
+            StepTimeout: It does not hold in time; the message says what happened meanwhile.
+            ProgramFailed: A program has failed meanwhile.
+        """
+        __tracebackhide__ = True
+        since_ns = self._run.now_ns
+        lacking: list[str] = []
+
+        def holds() -> Value | None:
+            lacking.clear()
+            try:
+                return condition()
+            except NoMessage as error:
+                lacking.append(str(error))
+                return None
+
+        found = self._until(holds, since_ns + round(timeout * NS_PER_S))
+        if found:
+            return found
+        raise StepTimeout(self._timeout("the condition did not hold", since_ns, {"it asks for": lacking}))
+
+    def _until(self, look: Callable[[], Value | None], deadline_ns: int) -> Value | None:
+        """Let time pass until a function returns something true, and return that; what it returns last otherwise."""
+        __tracebackhide__ = True
+        self._perform(Advance(self._run.now_ns))
+        while not (found := look()) and self._run.now_ns < deadline_ns:
+            self._perform(Advance(deadline_ns, until_news=True))
+        return found
+
+    def _timeout(self, what: str, since_ns: int, first: Mapping[str, Sequence[str]]) -> str:
+        trace, programs = self.trace(), [*self._programs.values()]
+        apart = [*telling.unheard(trace, self._offers.values()), *telling.apart(self._graph)]
+        sections = {
+            **first,
+            "meanwhile": [*telling.meanwhile(self._observations, programs, since_ns)],
+            "does not fit": apart,
+            "waiting": [*telling.waiting(self._graph, self._offers, self._functions)],
+        }
+        return telling.timeout(what, since_ns, self._run.now_ns, sections)
+
+    # --------------------------------------------------------------- acting
+
+    def publish(self, topic: str, message: Any, *, rate: float | None = None, qos: QoSProfile | None = None) -> None:
+        """Publish a message now, or from now on with a rate; that replaces what the test published on the topic before.
+
+        The programs react with the next step.
+
+        Args:
+            topic: Its name.
+            message: The message. With a rate also a list: one after the other, and the last one goes on.
+            rate: Messages per second; None to publish once.
+            qos: Reliability and durability of the publisher; reliable and volatile by default.
+        """
+        __tracebackhide__ = True
+        topic = _absolute(topic)
+        if rate is not None and rate <= 0:
+            raise ValueError(f"{topic}: expected a rate above 0, found {rate:g}; None publishes once")
+        several = [*message] if isinstance(message, (list, tuple)) else [message]
+        if not several or (rate is None and len(several) > 1):
+            raise ValueError(f"{topic}: expected one message without a rate, found {len(several)}")
+        packed = [serialized(one, topic) for one in several]
+        types = {interface for interface, _ in packed}
+        if len(types) > 1:
+            raise TypeError(f"{topic}: expected messages of one type, found {', '.join(sorted(types))}")
+        low, high = self._delay.get(topic, (0.0, 0.0))
+        reliability, durability = qos_words(qos)
+        command = Publish(
+            topic,
+            packed[0][0],
+            tuple(data for _, data in packed),
+            period_ns=0 if rate is None else round(NS_PER_S / rate),
+            best_effort=reliability == "best_effort",
+            latched=durability == "transient_local",
+            delay_ns=(round(low * NS_PER_S), round(high * NS_PER_S)),
+            loss=self._lose.get(topic, 0.0),
+        )
+        self._offers[topic] = Endpoint("publisher", topic, command.type, "the test", -1, reliability, durability)
+        self._perform(command)
+
+    def stop_publishing(self, topic: str) -> None:
+        """End what the test publishes on a topic; its publisher stays."""
+        __tracebackhide__ = True
+        topic = _absolute(topic)
+        if topic not in self._offers:
+            raise ValueError(f"{topic}: expected a topic that the test publishes on, found none")
+        self._perform(Publish(topic, self._offers[topic].type, ()))
+
+    def serve(self, name: str, type: Any, function: Callable[[Any], Any]) -> None:  # noqa: A002 - as in rclpy
+        """Offer a service; serving it again replaces the function.
+
+        Args:
+            name: Its name.
+            type: The class of the service, such as `std_srvs.srv.Trigger`.
+            function: Called with each request while virtual time stands still; returns the response. It may look at
+                everything, but not let time pass.
+        """
+        __tracebackhide__ = True
+        name = _absolute(name)
+        interface = type_name(type)
+        self._functions[name] = (service_type(interface), function)
+        self._perform(Serve(name, interface))
+
+    def call(self, name: str, request: Any, *, timeout: float = 10.0) -> Any:
+        """Call a service, let time pass until the response is there, and return it.
+
+        Args:
+            name: Its name.
+            request: The request, such as `Trigger.Request()`.
+            timeout: Seconds of virtual time to wait at most, for the server and the response together.
+
+        Raises:
+            StepTimeout: There was no response in time; the message says whether there is a server.
+        """
+        __tracebackhide__ = True
+        name = _absolute(name)
+        interface = type_name(type(request))
+        kind = service_type(interface)
+        since_ns, seen = self._run.now_ns, len(self._observations)
+        told = self._perform(Call(name, interface, plain_fields(request)))
+
+        found = self._until(lambda: self._response(seen, name, told["client"]), since_ns + round(timeout * NS_PER_S))
+        if found is not None:
+            return built(kind.Response, found.value, name)
+        offered = any((e.service, e.type) == (name, interface) for e in telling.service_ends(self._graph, "service"))
+        why = (
+            f"{name} has a server, which has not answered"
+            if offered
+            else telling.no_server(self.trace(), name, interface)
+        )
+        raise StepTimeout(self._timeout(f"{name} did not answer", since_ns, {"the service": [why]}))
+
+    def send_goal(
+        self, name: str, goal: Any, *, cancel_after: float | None = None, timeout: float = 60.0
+    ) -> GoalResult:
+        """Send a goal to an action, let time pass until its result is there, and return it.
+
+        Args:
+            name: Name of the action.
+            goal: The goal, such as `Fibonacci.Goal(order=5)`.
+            cancel_after: Seconds after its acceptance at which the goal is cancelled; None to let it go on.
+            timeout: Seconds of virtual time to wait at most.
+
+        Raises:
+            StepTimeout: There was no result in time.
+        """
+        __tracebackhide__ = True
+        name = _absolute(name)
+        interface = type_name(type(goal))
+        kind = action_type(interface)
+        self._goals += 1
+        uuid = tuple(bytes.fromhex(derive(self._seed, "goal", str(self._goals))[:32]))
+        after_ns = 0 if cancel_after is None else max(1, round(cancel_after * NS_PER_S))
+        since_ns, seen = self._run.now_ns, len(self._observations)
+        told = self._perform(SendGoal(PlannedGoal(name, interface, since_ns, after_ns, plain_fields(goal), uuid)))
+        sent, asked = told["clients"][:2]
+
+        def ended() -> GoalResult | None:
+            accepted = self._response(seen, f"{name}/_action/send_goal", sent)
+            result = self._response(seen, f"{name}/_action/get_result", asked)
+            if accepted is None or (accepted.value["accepted"] and result is None):
+                return None
+            if result is None:
+                return GoalResult(accepted=False, status=0, result=None, feedback=[])
+            feedback = [
+                Received(one.t, one.message.feedback)
+                for one in self.received(f"{name}/_action/feedback")
+                if tuple(one.message.goal_id.uuid) == uuid
+            ]
+            ending = built(kind.Result, result.value["result"], name)
+            return GoalResult(accepted=True, status=result.value["status"], result=ending, feedback=feedback)
+
+        found = self._until(ended, since_ns + round(timeout * NS_PER_S))
+        if found is not None:
+            return found
+        accepted = self._response(seen, f"{name}/_action/send_goal", sent)
+        why = "it has accepted the goal" if accepted is not None else "it has not answered the goal"
+        offered = any(f"{name}/_action/send_goal" == offer.name for offer in self.trace().of(Offer))
+        first = {"the action": [why if offered else f"nobody offers the action {name}"]}
+        raise StepTimeout(self._timeout(f"{name} gave no result", since_ns, first))
+
+    def _response(self, seen: int, service: str, client: int) -> Response | None:
+        """Return the response of a program to a client of the test, among the observations from a number on."""
+        found = (o for o in self._observations[seen:] if isinstance(o, Response))
+        return next((o for o in found if (o.service, o.sender, o.client) == (service, "student", client)), None)
+
+    def set_parameter(self, node: str, name: str, value: Any, *, timeout: float = 10.0) -> None:
+        """Set a parameter of a node while it is running, as `ros2 param set` does.
+
+        Args:
+            node: Full name of the node.
+            name: Name of the parameter.
+            value: Its value.
+            timeout: Seconds of virtual time to wait at most.
+
+        Raises:
+            ParameterRejected: The node does not accept the value, or has not declared the parameter.
+            StepTimeout: There is no such node, or it does not answer.
+        """
+        __tracebackhide__ = True
+        kind = service_type("rcl_interfaces/srv/SetParameters")
+        request = kind.Request(parameters=[parameter_message(name, value)])
+        result = self.call(f"{_absolute(node)}/set_parameters", request, timeout=timeout).results[0]
+        if not result.successful:
+            raise ParameterRejected(f"{_absolute(node)}: {name} = {value!r} was not accepted: {result.reason}")
+
+    def simulate(self, simulation: Simulation | str, **parameters: Any) -> Simulation:
+        """Let a simulation take part from now on; its methods run in the test's process, while time stands still.
+
+        Args:
+            simulation: An object of a class that derives from `grader.api.Simulation`, or the name of a built-in one.
+            **parameters: Of a built-in one.
+
+        Returns:
+            The simulation, whose state the test may look at.
+        """
+        __tracebackhide__ = True
+        if isinstance(simulation, str):
+            simulation = made(simulation, "", b"", parameters)
+        number = len(self._simulations)
+        self._simulations.append(simulation)
+        simulation.begin(random.Random(derive(self._seed, "simulation", str(number))))  # noqa: S311 - it has to repeat
+        offers = simulation.publishes(), simulation.hears(), simulation.serves()
+        self._perform(Simulate(number, simulation.period, *map(dict, offers)))
+        return simulation
+
+    # --------------------------------------------------------------- looking
+
+    def received(self, topic: str) -> list[Received]:
+        """Return the messages that programs have published on a topic so far, with their times."""
+        __tracebackhide__ = True
+        self._await_start()
+        topic = _absolute(topic)
+        known = self._read.setdefault(topic, [])
+        for one in self._messages.get(topic, ())[len(known) :]:
+            known.append(Received(seconds(one.t_ns), read(one)))
+        return Messages(known, lambda: telling.silence(self.trace(), topic))
+
+    def messages(self, topic: str) -> list[Any]:
+        """Return the messages that programs have published on a topic so far."""
+        found = self.received(topic)
+        return Messages([one.message for one in found], lambda: telling.silence(self.trace(), _absolute(topic)))
+
+    def rate(self, topic: str, *, last: float | None = None) -> float:
+        """Return how many messages a second programs publish on a topic, from the first to the last one.
+
+        Args:
+            topic: Its name.
+            last: Count only the messages of so many last seconds.
+
+        Returns:
+            The rate, 0 for fewer than two messages.
+        """
+        __tracebackhide__ = True
+        self._await_start()
+        since_ns = 0 if last is None else self._run.now_ns - round(last * NS_PER_S)
+        times = [one.t_ns for one in self._messages.get(_absolute(topic), ()) if one.t_ns >= since_ns]
+        # n - 1 gaps, not n: counting messages overstates a short time
+        return (len(times) - 1) * NS_PER_S / (times[-1] - times[0]) if times and times[-1] > times[0] else 0.0
+
+    def nodes(self) -> list[str]:
+        """Return the full names of the programs' nodes, sorted."""
+        __tracebackhide__ = True
+        self._await_start()
+        return sorted(self._graph.nodes)
+
+    def topics(self) -> dict[str, str]:
+        """Return the topics that programs publish on or subscribe to, with their types."""
+        __tracebackhide__ = True
+        self._await_start()
+        return {e.topic: e.type for e in sorted(self._graph.endpoints, key=lambda e: e.topic)}
+
+    def services(self) -> dict[str, str]:
+        """Return the services that programs offer, with their types; without those that every node has."""
+        __tracebackhide__ = True
+        self._await_start()
+        return {e.service: e.type for e in telling.service_ends(self._graph, "service")}
+
+    def graph(self) -> GraphSnapshot:
+        """Return nodes, publishers, subscriptions, servers and clients of the programs as they are now."""
+        __tracebackhide__ = True
+        self._await_start()
+        return self._graph
+
+    @property
+    def programs(self) -> list[Program]:
+        """Every program that was started."""
+        return [*self._programs.values()]
+
+    @contextmanager
+    def expects_failure(self, match: str = "") -> Iterator[Failure]:
+        """Expect that a program fails in this block: what it raises does not fail the test.
+
+        Args:
+            match: A regular expression that is found in the exception, as in `ValueError: too fast`.
+
+        Raises:
+            AssertionError: No program has failed, or of something else.
+        """
+        __tracebackhide__ = True
+        failure = Failure()
+        self._expected.append(failure)
+        try:
+            yield failure
+        finally:
+            self._expected.remove(failure)
+        if failure.fault is None:
+            raise AssertionError("expected that a program fails, but none did")
+        if match and failure.fault.said(match) is None:
+            raise AssertionError(f"expected a failure that matches {match!r}, found {failure.text}")
+
+    # ------------------------------------------------------------- recording
+
+    def trace(self) -> Trace:
+        """Return what was observed so far as a trace, as checks of a rubric read it."""
+        now_ns = self._run.now_ns + 1
+        return Trace(
+            self._plan.scenario,
+            ClockKind.VIRTUAL,
+            stop_ns=now_ns,
+            observations=tuple(self._observations),
+            clock_reason=self._unsuitable,
+            notes=tuple(self._notes),
+        )
+
+    def keep(self, folder: Path | str, why: str = "") -> list[Path]:
+        """Write what happened so far into a folder, and return the paths: an MCAP file, and a page that plays the run.
+
+        Args:
+            folder: Where; it is created if it is not there.
+            why: What the page says above the run.
+        """
+        from grader.world.keeping import keep  # noqa: PLC0415 - takes long, and most tests pass
+
+        place = Path(folder)
+        place.mkdir(parents=True, exist_ok=True)
+        return keep(self.session, self.trace(), self._drawn, place, why)
+
+    def _repr_html_(self) -> str:
+        """Return the run so far as a notebook shows it: a page in the page that plays it."""
+        from grader.world.keeping import page_of  # noqa: PLC0415 - as above
+
+        page = html.escape(page_of(self.session, self.trace(), self._drawn))
+        return f'<iframe sandbox="allow-scripts" style="width:100%;height:60em;border:0" srcdoc="{page}"></iframe>'
+
+    @property
+    def _drawn(self) -> int | None:
+        return self._seed if self.is_drawn else None
+
+    @property
+    def seed(self) -> int:
+        """What everything drawn in this run follows from."""
+        return self._seed
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether anything in this run was drawn from its seed."""
+        return self._plan.drawn_order or bool(self._delay or self._lose)
+
+    @property
+    def problem(self) -> str:
+        """Why what happened may be untrue, once the world is closed; empty if it is not."""
+        return f"virtual time does not suit these programs: {self._unsuitable}" if self._unsuitable else ""
+
+    def close(self) -> None:
+        """End all programs, and the run; what was observed can still be looked at."""
+        if self._run.is_closed:
+            return
+        self._adopt(self._run.close())
+        self._notes, self._unsuitable = self._run.notes, self._run.unsuitable
+        self._failing.clear()
+
+    def _perform(self, command: Command) -> dict[str, Any]:
+        """Carry out a command; raises ProgramFailed if a program has failed meanwhile."""
+        __tracebackhide__ = True
+        if self._run.is_busy:
+            raise RuntimeError("a function that answers for the test cannot let time pass or act on the programs")
+        if not isinstance(command, (Start, Advance)):
+            self._await_start()
+        self._starting = isinstance(command, Start) and not command.settle
+        told, observations = self._run.perform(command)
+        if isinstance(command, Start):
+            for name in told["started"]:
+                self._programs.setdefault(name, Program(name, Path(command.plan.root), self._signal, self._await_start))
+        self._adopt(observations)
+        if self._run.full:
+            raise GraderError(f"the test was ended: {self._run.full}")
+        self._raise_failure()
+        return told
+
+    def _await_start(self) -> None:
+        """Let the programs come up that were started last: where a seed draws their order, they start together."""
+        __tracebackhide__ = True
+        if self._starting and not (self._run.is_busy or self._run.is_closed):
+            self._perform(Advance(self._run.now_ns))
+
+    def _adopt(self, observations: Sequence[Observation]) -> None:
+        for one in observations:
+            self._observations.append(one)
+            if isinstance(one, Message):
+                self._messages.setdefault(one.topic, []).append(one)
+            elif isinstance(one, GraphSnapshot):
+                self._graph = one
+            elif isinstance(one, (LogRecord, OutputLine, Fault)) and one.process in self._programs:
+                program = self._programs[one.process]
+                program._note(one)  # noqa: SLF001 - a program is told by its world alone
+                if isinstance(one, Fault) and one.kind in FAILING:
+                    self._failing.append((program, one))
+        for name, code in self._run.ended.items():
+            if name in self._programs:
+                self._programs[name]._end(code)  # noqa: SLF001 - the same
+
+    def _raise_failure(self) -> None:
+        __tracebackhide__ = True
+        failing, self._failing = self._failing, []
+        for program, fault in failing:
+            if not self._expected:
+                raise ProgramFailed(telling.failure(program, fault))
+            innermost = self._expected[-1]
+            if innermost.program is None:
+                innermost.program, innermost.fault = program, fault
+
+    def _answered(self, question: Mapping[str, Any]) -> Any:
+        """Answer a question of the worker: what a simulation does, or what a served function responds."""
+        if question["ask"] == "simulation":
+            now = Moment(question["now_ns"], question["clock_ns"])
+            answer = getattr(self._simulations[question["number"]], question["method"])(now, *question["arguments"])
+            return dict(answer) if isinstance(answer, Mapping) else [*answer]
+        name = question["service"]
+        kind, function = self._functions[name]
+        response = function(built(kind.Request, question["request"], name))
+        if not isinstance(response, kind.Response):
+            found = type(response).__name__
+            raise TypeError(f"{name}: expected a {kind.__name__}.Response from its function, found {found}")
+        return plain_fields(response)
+
+
+def _absolute(name: str) -> str:
+    return name if name.startswith(("/", "~")) else f"/{name}"

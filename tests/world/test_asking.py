@@ -1,0 +1,175 @@
+"""Goals, parameters, simulations, packages and launch files in stepped runs, with real nodes."""
+
+import importlib.util
+import shutil
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from std_srvs.srv import SetBool
+from test_msgs.action import Fibonacci
+
+from grader.api import Moment, Output, Simulation
+from grader.core.errors import HarnessError, SubmissionError
+from grader.world.errors import ParameterRejected, StepTimeout
+from grader.world.opening import Worlds
+from grader.world.world import World
+
+pytestmark = pytest.mark.ros
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+def test_a_goal_has_feedback_and_a_result(ros: World) -> None:
+    """A number every half second; the feedback of one goal is not that of another."""
+    ros.run("nodes/fibonacci_server.py")
+    for order, numbers in ((4, [0, 1, 1, 2, 3]), (3, [0, 1, 1, 2])):
+        began = ros.now
+        outcome = ros.send_goal("/fibonacci", Fibonacci.Goal(order=order))
+        assert (outcome.accepted, outcome.status, list(outcome.result.sequence)) == (True, 4, numbers)
+        assert [list(one.message.sequence) for one in outcome.feedback] == [numbers[: n + 3] for n in range(order - 1)]
+        assert ros.now - began == pytest.approx(0.5 * (order - 1), abs=1e-4)
+
+
+def test_a_goal_may_be_cancelled_or_refused(ros: World) -> None:
+    """Both are outcomes, not errors."""
+    ros.run("nodes/fibonacci_server.py")
+    cancelled = ros.send_goal("fibonacci", Fibonacci.Goal(order=100), cancel_after=2.2)
+    assert (cancelled.status, 2.2 <= ros.now < 3.0) == (5, True)
+    refused = ros.send_goal("/fibonacci", Fibonacci.Goal(order=-1))
+    assert (refused.accepted, refused.result) == (False, None)
+
+
+def test_a_goal_without_a_result_says_why(ros: World) -> None:
+    """Nobody offers the action, or it takes longer."""
+    with pytest.raises(StepTimeout, match="nobody offers the action /fibonacci"):
+        ros.send_goal("/fibonacci", Fibonacci.Goal(order=4), timeout=1.0)
+    ros.run("nodes/fibonacci_server.py")
+    with pytest.raises(StepTimeout, match="it has accepted the goal"):
+        ros.send_goal("/fibonacci", Fibonacci.Goal(order=50), timeout=1.0)
+
+
+def test_a_parameter_is_set_while_a_node_runs(ros: World) -> None:
+    """As with `ros2 param set`; a value that the node refuses, or does not know, fails."""
+    ros.run(REPOSITORY / "examples/parameters/reference/greeter.py", parameters={"period": 0.5})
+    ros.advance(2.0)
+    ros.set_parameter("/greeter", "name", "you")
+    ros.set_parameter("greeter", "period", 0.25)
+    ros.advance(1.0)
+    assert [m.data for m in ros.messages("/greeting")] == ["Hello world!"] * 4 + ["Hello you!"] * 4
+    with pytest.raises(ParameterRejected, match=r"/greeter: period = -1\.0 was not accepted: a period is above 0"):
+        ros.set_parameter("/greeter", "period", -1.0)
+    with pytest.raises(ParameterRejected):
+        ros.set_parameter("/greeter", "nmae", "you")
+    with pytest.raises(StepTimeout):
+        ros.set_parameter("/greter", "name", "you", timeout=1.0)
+
+
+def load_corridor() -> type[Simulation]:
+    """Load the simulation of an example."""
+    spec = importlib.util.spec_from_file_location("corridor", REPOSITORY / "examples/obstacle_stop/corridor.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = sys.modules["corridor"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    found: type[Simulation] = module.Corridor
+    return found
+
+
+def test_a_simulated_robot_drives_by_what_a_node_says(ros: World) -> None:
+    """Its state is in the test's process: the robot stops half a metre before the wall, and goes on when it opens."""
+    ros.run(REPOSITORY / "examples/obstacle_stop/reference/obstacle_stop.py")
+    robot = ros.simulate(load_corridor()(wall=2.0, opens=20_000_000_000))
+    ros.advance(15.0)
+    assert robot.x == pytest.approx(1.5, abs=0.2)  # type: ignore[attr-defined]
+    ros.wait_until(lambda: robot.x > 2.5, timeout=20.0)  # type: ignore[attr-defined]
+    assert ros.now > 20.0
+
+
+@dataclass
+class Door(Simulation):
+    """Offers /allowed, and counts how often it is asked."""
+
+    opened: int = 0
+
+    def serves(self) -> dict[str, str]:
+        """Return its service."""
+        return {"/allowed": "std_srvs/srv/Trigger"}
+
+    def on_request(self, now: Moment, service: str, request: object) -> dict[str, object]:
+        """Agree."""
+        self.opened += 1
+        return {"success": True, "message": f"{service} at {now.t_s:g} s"}
+
+
+@dataclass
+class Broken(Simulation):
+    """Fails in its third step."""
+
+    steps: int = 0
+
+    def step(self, now: Moment) -> list[Output]:
+        """Count."""
+        self.steps += 1
+        if self.steps == 3:
+            raise RuntimeError("third step")
+        return []
+
+
+def test_a_simulation_may_offer_services_and_fail(ros: World) -> None:
+    """What it raises is raised where time passes; a built-in one has a name."""
+    ros.run("nodes/switch.py")
+    door = ros.simulate(Door())
+    assert ros.call("/enable", SetBool.Request(data=True)).message == "/allowed at 0 s"
+    assert door.opened == 1  # type: ignore[attr-defined]
+    ros.simulate(Broken())
+    with pytest.raises(RuntimeError, match="third step"):
+        ros.advance(1.0)
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    """A copy of a workspace with a package, and a folder of tests in it."""
+    root = tmp_path / "workspace"
+    shutil.copytree(REPOSITORY / "tests/packages/workspace", root)
+    (root / "src/robot/test").mkdir()
+    return root / "src/robot/test"
+
+
+def test_an_executable_of_the_package_beside_a_test(ros_session: Worlds, workspace: Path) -> None:
+    """Named as for `ros2 run`; a slip is answered with the name that was meant."""
+    with ros_session.open(workspace) as ros:
+        ros.run("robot/talker", parameters={"rate": 10.0})
+        listener = ros.run("robot/listener")
+        ros.advance(1.0)
+        assert ros.rate("/chatter") == pytest.approx(10)
+        assert [program.name for program in ros.programs] == ["robot/talker", "robot/listener"]
+        assert len(listener.logs) == len(ros.messages("/chatter"))
+        with pytest.raises(SubmissionError) as wrong:
+            ros.run("robot/taker")
+        assert "did you mean robot/talker?" in wrong.value.hint
+
+
+def test_a_launch_file_starts_its_nodes(ros_session: Worlds, workspace: Path) -> None:
+    """With its arguments, names, namespaces and remappings, twice if need be."""
+    with ros_session.open(workspace) as ros:
+        launched = ros.launch("../launch/robot.launch.py", arguments={"rate": 5.0})
+        ros.advance(2.0)
+        assert [program.name for program in launched.programs] == ["robot/talker", "robot/listener"]
+        assert ros.nodes() == ["/ears/listener", "/speaker"]
+        assert ros.rate("/talk") == pytest.approx(5)
+        again = ros.launch("../launch/listener.launch.py")
+        assert [program.name for program in again.programs] == ["robot/listener (2)"]
+
+
+def test_a_launch_file_that_fails_is_told_with_its_line(ros_session: Worlds, tmp_path: Path) -> None:
+    """So is one that starts nothing; the world goes on."""
+    (tmp_path / "bad.launch.py").write_text("def generate_launch_description():\n    return missing\n")
+    (tmp_path / "node.py").write_text("print('here')\n")
+    with ros_session.open(tmp_path) as ros:
+        with pytest.raises(HarnessError, match=r"bad\.launch\.py:2: NameError: name 'missing' is not defined"):
+            ros.launch("bad.launch.py")
+        with pytest.raises(SubmissionError, match="expected a launch file"):
+            ros.launch("node.py")
+        assert ros.run("node.py").output == "here\n"

@@ -1,0 +1,24 @@
+"""The nodes and tests on the pages about own nodes, run as a reader would."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+#: A block that begins with its file's name.
+_FILE = re.compile(r"^```python\n# (\w+\.py)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+PAGES = {"docs/tutorials/first-test.md": (1 + 2 + 5, 4), "docs/how-to/launch-testing.md": (7, 8)}
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_what_a_page_shows_works(pytester: pytest.Pytester, page: str) -> None:
+    """Every test on it passes, with the nodes on it."""
+    passed, files = PAGES[page]
+    blocks = _FILE.findall((ROOT / page).read_text(encoding="utf-8"))
+    assert len(blocks) == files
+    for name, text in blocks:
+        (pytester.path / name).write_text(text, encoding="utf-8")
+    pytester.runpytest_subprocess("-p", "grader.pytest_plugin").assert_outcomes(passed=passed)

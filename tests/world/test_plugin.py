@@ -1,0 +1,291 @@
+"""The plugin in runs of pytest of its own: options, markers, failures and what they leave."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+NODES = Path(__file__).parent / "nodes"
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture
+def suite(pytester: pytest.Pytester) -> pytest.Pytester:
+    """A folder with the nodes of the tests."""
+    shutil.copytree(NODES, pytester.path, dirs_exist_ok=True)
+    return pytester
+
+
+def run(suite: pytest.Pytester, test: str, *arguments: str) -> pytest.RunResult:
+    """Run a file of tests in a process of its own, where warnings are errors."""
+    suite.makepyfile(test_it=test)
+    return suite.runpytest_subprocess("-p", "grader.pytest_plugin", "-W", "error", "-p", "no:cacheprovider", *arguments)
+
+
+FAILS = """
+from std_msgs.msg import String
+
+def test_a_right_answer(ros):
+    ros.run("echo.py")
+    ros.publish("/in", String(data="a"))
+    ros.advance(1.0)
+    assert ros.messages("/out")[-1].data == "a"
+
+def test_a_wrong_answer(ros):
+    ros.run("echo.py")
+    ros.publish("/in", String(data="a"), rate=2)
+    ros.advance(3.0)
+    assert ros.messages("/out")[-1].data == "b"
+
+def test_a_program_that_fails(ros):
+    ros.run("echo.py")
+    ros.publish("/in", String(data="fail"))
+    ros.advance(1.0)
+"""
+
+
+def test_a_failure_leaves_its_recording_and_a_page(suite: pytest.Pytester) -> None:
+    """Their paths are in the failure, and in the file for JUnit; the traceback ends in the test."""
+    result = run(suite, FAILS, "--junitxml=junit.xml", f"--basetemp={suite.path}/kept")
+    result.assert_outcomes(passed=1, failed=2)
+    text = result.stdout.str()
+    assert "grader/world" not in text
+    assert 'echo.py", line 20, in on_text' in text
+    assert "ValueError: asked to fail" in text
+    recordings = [Path(found) for found in re.findall(r"^(/\S+/recording\.mcap)$", text, re.MULTILINE)]
+    assert [path.parent.name for path in recordings] == ["test_a_wrong_answer0", "test_a_program_that_fails0"]
+    with recordings[0].open("rb") as recording:
+        decoded = make_reader(recording, decoder_factories=[DecoderFactory()]).iter_decoded_messages(["/in", "/out"])
+        messages = [(channel.topic, message.data) for _, channel, _, message in decoded]
+    assert messages == [(topic, "a") for _ in range(7) for topic in ("/in", "/out")]
+    page = (recordings[0].parent / "run.html").read_text(encoding="utf-8")
+    assert "test_a_wrong_answer" in page
+    assert "heard a" in page
+    assert str(recordings[1]) in (suite.path / "junit.xml").read_text(encoding="utf-8")
+    assert not [*(suite.path / "kept").glob("test_a_right_answer*/*")]
+
+
+RACE = """
+import pytest
+from std_msgs.msg import String
+
+@pytest.mark.ros(seeds=8)
+def test_the_last_word(ros):
+    ros.run("echo.py", name="one", remappings={"/out": "/said"}, env={"WORD": "one"})
+    ros.run("echo.py", name="two", remappings={"/out": "/said"}, env={"WORD": "two"})
+    listener = ros.run("last.py")
+    ros.publish("/in", String(data="x"))
+    ros.advance(1.0)
+    assert listener.logs[-1].text == "two"
+"""
+LAST = """
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+class Last(Node):
+    def __init__(self):
+        super().__init__("last")
+        self.create_subscription(String, "/said", lambda m: self.get_logger().info(m.data), 10)
+
+rclpy.init()
+rclpy.spin(Last())
+"""
+
+
+def test_a_race_is_found_under_several_seeds_and_repeated_by_its_own(suite: pytest.Pytester) -> None:
+    """Two programs that are ready at the same moment: which speaks last follows from the seed."""
+    echo = suite.path / "echo.py"
+    text = echo.read_text(encoding="utf-8").replace("import rclpy\n", "import os\n\nimport rclpy\n", 1)
+    echo.write_text(text.replace("publish(message)", "publish(String(data=os.environ['WORD']))"), encoding="utf-8")
+    suite.makepyfile(last=LAST)
+    result = run(suite, RACE, "-q", "-rf")
+    outcomes = result.parseoutcomes()
+    assert outcomes["passed"] + outcomes["failed"] == 8
+    assert min(outcomes["passed"], outcomes["failed"]) > 0
+    failed = re.findall(r"^FAILED test_it.py::test_the_last_word\[seed(\d)\]", result.stdout.str(), re.MULTILINE)
+    result.stdout.fnmatch_lines([f"seed {failed[0]}: repeat it with --ros-seed {failed[0]}"])
+    for _ in range(2):
+        run(suite, RACE, "--ros-seed", failed[0]).assert_outcomes(failed=1)
+    passed = next(str(seed) for seed in range(8) if str(seed) not in failed)
+    run(suite, RACE, "--ros-seed", passed).assert_outcomes(passed=1)
+
+
+HASTY = """
+import rclpy
+from std_srvs.srv import Trigger
+
+rclpy.init()
+node = rclpy.create_node("hasty")
+client = node.create_client(Trigger, "/ready")
+node.get_logger().info("asked" if client.service_is_ready() else "nobody there")
+rclpy.spin(node)
+"""
+SERVER = """
+import rclpy
+from std_srvs.srv import Trigger
+
+rclpy.init()
+node = rclpy.create_node("server")
+node.create_service(Trigger, "/ready", lambda request, response: response)
+rclpy.spin(node)
+"""
+TOGETHER = """
+import pytest
+
+@pytest.mark.ros(seeds=8)
+def test_the_service_is_there(ros):
+    ros.run("server.py")
+    hasty = ros.run("hasty.py")
+    assert ros.nodes() == ["/hasty", "/server"]
+    assert [log.text for log in hasty.logs] == ["asked"]
+
+def test_without_a_seed(ros):
+    ros.run("server.py")
+    assert [log.text for log in ros.run("hasty.py").logs] == ["asked"]
+"""
+
+
+def test_programs_start_together_where_their_order_is_drawn(suite: pytest.Pytester) -> None:
+    """A client that asks before the server is up is found under some seeds, and repeated by each of them."""
+    suite.makepyfile(hasty=HASTY, server=SERVER)
+    result = run(suite, TOGETHER, "-q", "-rf")
+    failed = re.findall(r"^FAILED test_it.py::test_the_service_is_there\[seed(\d)\]", result.stdout.str(), re.MULTILINE)
+    result.assert_outcomes(passed=9 - len(failed), failed=len(failed))
+    assert 0 < len(failed) < 8
+    run(suite, TOGETHER, "--ros-seed", failed[0], "-k", "is_there").assert_outcomes(failed=1, deselected=1)
+
+
+DISTURBED = """
+import pytest
+from std_msgs.msg import String
+
+@pytest.mark.ros(seed=3, lose={"/in": 0.25}, delay={"in": (0.01, 0.03)})
+def test_what_is_lost_and_late(ros):
+    ros.run("echo.py")
+    ros.publish("/in", String(data="x"), rate=10)
+    ros.advance(40.05)
+    times = [one.t for one in ros.received("/out")]
+    late = [round(t * 1000) % 100 for t in times]
+    assert 220 < len(times) < 380
+    assert min(late) >= 10 and max(late) <= 30 and len(set(late)) > 10
+    with open("told.txt", "a") as told:
+        told.write(repr(times) + "\\n")
+"""
+
+
+def test_losses_and_delays_follow_from_the_seed(suite: pytest.Pytester) -> None:
+    """The same seed loses the same messages, another one others."""
+    for seed in ((), (), ("--ros-seed", "4")):
+        run(suite, DISTURBED, *seed).assert_outcomes(passed=1)
+    first, second, other = (suite.path / "told.txt").read_text(encoding="utf-8").splitlines()
+    assert first == second
+    assert first != other
+
+
+WIDE = """
+import pytest
+from std_msgs.msg import String
+
+@pytest.fixture(scope="module")
+def robot(ros_session, request):
+    with ros_session.open(request.path.parent) as world:
+        world.run("echo.py")
+        yield world
+
+@pytest.mark.parametrize("text", ["a", "b"])
+def test_one_world_for_all(robot, ros, text):
+    assert ros.nodes() == []
+    robot.publish("/in", String(data=text))
+    robot.advance(1.0)
+    assert [m.data for m in robot.messages("/out")][-1] == text
+
+def test_time_has_passed(robot):
+    assert robot.now == 2.0
+"""
+
+
+def test_a_wider_scope_and_several_processes(suite: pytest.Pytester) -> None:
+    """One world for a module, beside those of single tests; with xdist as well."""
+    run(suite, WIDE).assert_outcomes(passed=3)
+    run(suite, FAILS, "-n", "2").assert_outcomes(passed=1, failed=2)
+
+
+WITHOUT_BUBBLEWRAP = """
+import pytest
+from grader.core.errors import EnvironmentFault
+from grader.execution.sandbox import choose
+
+known = choose.isolation_from_name
+
+def only_plain(name):
+    if name == "own-network":
+        raise EnvironmentFault("no bubblewrap here")
+    return known(name)
+
+choose.isolation_from_name = only_plain
+"""
+SHARED = """
+import os
+from pathlib import Path
+from std_msgs.msg import String
+
+def test_it(ros):
+    where = ros.run("where.py")
+    assert where.output == f"{Path(__file__).parent}/where.py {os.getcwd()}\\n"
+    ros.run("echo.py")
+    ros.publish("/in", String(data="a"), rate=10)
+    ros.advance(2.0)
+    assert len(ros.messages("/out")) == 21
+"""
+
+
+def test_without_bubblewrap_the_network_is_shared_and_that_is_said(suite: pytest.Pytester) -> None:
+    """The nodes run all the same, where they lie."""
+    suite.makeconftest(WITHOUT_BUBBLEWRAP)
+    (suite.path / "where.py").write_text("import os\nprint(__file__, os.getcwd())\n", encoding="utf-8")
+    for arguments in ((), ("-n", "1")):
+        result = run(suite, SHARED, *arguments)
+        result.assert_outcomes(passed=1)
+        result.stdout.fnmatch_lines(["ros: the nodes shared the network of this machine (no bubblewrap here)"])
+
+
+UNSUITABLE = """
+import pytest
+
+def test_it(ros):
+    with open("sub.py", "w") as program:
+        program.write("import subprocess\\nsubprocess.run(['true'])\\n")
+    ros.run("sub.py")
+
+def test_although_it_expects_a_failure(ros):
+    with ros.expects_failure():
+        ros.run("sub.py")
+"""
+
+
+def test_what_virtual_time_does_not_suit_fails_once(suite: pytest.Pytester) -> None:
+    """A program that starts another process is told with its line; no test passes with it."""
+    result = run(suite, UNSUITABLE)
+    result.assert_outcomes(failed=1, passed=1, errors=1)
+    result.stdout.fnmatch_lines(
+        [
+            "E *ProgramFailed: sub.py was stopped at t = 0.000 s",
+            "E *sub.py?, line 2, in <module>",
+            "E * starts another process, which runs in real time",
+        ]
+    )
+    text = "virtual time does not suit these programs: *: sub.py:2 starts another process, which runs in real time"
+    result.stdout.fnmatch_lines([text])
+
+
+def test_a_wrong_option_of_the_marker_is_told(suite: pytest.Pytester) -> None:
+    """It names what there is."""
+    text = "import pytest\n@pytest.mark.ros(sede=1)\ndef test_it(ros): pass\n"
+    result = run(suite, text)
+    assert result.ret != 0
+    result.stdout.fnmatch_lines(["*@pytest.mark.ros: expected seed, seeds, delay, lose by name, found sede"])
