@@ -12,6 +12,7 @@ from grader.judging.diagnosis.wiring import (
     elsewhere_because,
     goes_to,
     made,
+    names_called,
     reached,
     roots,
     runs,
@@ -151,7 +152,7 @@ def _future_never_done(case: Case) -> Clue | None:
         return None
     for loop in source.all(ast.While):
         asks = any(isinstance(n, ast.Call) and last_name(n.func) == "done" for n in ast.walk(loop.test))
-        inside = {last_name(n.func) for n in reached(source, [loop]) if isinstance(n, ast.Call)}
+        inside = names_called(source, [loop])
         if asks and not inside & set(SPINS):
             hint = f"'while {source.code(loop.test, 40)}' never ends: a response is taken only while the node spins; "
             return Clue(f"{hint}use rclpy.spin_until_future_complete(node, future)", source.place(loop))

@@ -20,6 +20,7 @@ from grader.judging.diagnosis.wiring import (
     is_log,
     made,
     made_for,
+    names_called,
     names_in,
     node_made,
     publish_calls,
@@ -477,7 +478,7 @@ def _waits_in_constructor(source: Source) -> Clue | None:
     callbacks = [f for m in made(source, "subscription") for f in roots(source, m.callback)]
     brought = {chain(n) for n in reached(source, callbacks) if isinstance(n, ast.Attribute) and last_name(n)}
     for loop in source.all(ast.While):
-        inside = {last_name(n.func) for n in reached(source, [loop]) if isinstance(n, ast.Call)}
+        inside = names_called(source, [loop])
         idle = not inside & {"spin_once", "spin", "publish", "wait_for_service"}
         asked = {chain(n) for n in ast.walk(loop.test) if isinstance(n, ast.Attribute)}
         if source.function_name(loop) == "__init__" and idle and asked & brought:
