@@ -8,8 +8,10 @@ the tests. `tests/test_messages.py` checks the wording of all of them.
 from __future__ import annotations
 
 import ast
+import io
 import re
 import sys
+import tokenize
 from collections.abc import Iterator
 from functools import cache
 from html.parser import HTMLParser
@@ -112,6 +114,16 @@ def in_code(source: str, place: str) -> Iterator[Sentence]:
             yield from visit(child, [*above, node])
 
     yield from sorted(visit(tree, []), key=lambda each: int(each.place.rpartition(":")[2]))
+
+
+def in_remarks(source: str, place: str) -> Iterator[Sentence]:
+    """Yield the docstrings and comments in the source of a module, which only authors read."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Expr) and (text := words_of(node.value)):
+            yield Sentence("docstring", f"{place}:{node.lineno}", text)
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT:
+            yield Sentence("comment", f"{place}:{token.start[0]}", token.string)
 
 
 class _Page(HTMLParser):

@@ -1,9 +1,10 @@
 """The list of messages finds what users read, and none of them has a phrase that sounds translated."""
 
 import re
+from collections.abc import Iterable
 
 import pytest
-from messages import Sentence, in_code, in_page, in_script, sentences
+from messages import ROOT, Sentence, in_code, in_page, in_remarks, in_script, sentences
 
 #: What nobody says to a colleague, with what to write instead.
 PHRASES = {
@@ -28,6 +29,27 @@ PHRASES = {
     r"\bin (?:Python|ROS)'s words\b": "the message of Python",
     r"\bhas not come\b": "has not arrived",
 }
+
+#: Phrases that docstrings and comments may use: "a process is told to stop", "a name need not be valid".
+_OF_MESSAGES_ALONE = (r"\btold\b", r"\bneeds? (?:it )?not\b", r"\btakes? \S+ out\b", r"\basked for: ")
+#: What nobody says to a colleague in docstrings and comments either, with what to write instead.
+REMARKS = {phrase: better for phrase, better in PHRASES.items() if phrase not in _OF_MESSAGES_ALONE} | {
+    r"\bneeds? it not\b": "does not need",
+    r"(?<!here )(?<!which )\b(?:is|are) none\b(?! of)": "is invalid, or is not a ...",
+    r"\bnobody's\b": "belongs to no ...",
+    r"\bis nobody\b": "is not ...",
+    r"\breckon": "compute",
+    r"\bis said of\b": "say who says what",
+}
+BAD_REMARKS = [
+    "the text is no number",
+    "raises EvidenceError if it is none",
+    "the kernel adds it to nobody's",
+    "None if that is nobody in the table",
+    "hidden criteria could be reckoned from it",
+    "nothing is said of the whole score",
+    "the compiled form needs it not",
+]
 
 BAD = [
     "'x' is no format",
@@ -55,18 +77,37 @@ BAD = [
 ]
 
 
-def found_in(text: str) -> list[str]:
+def found_in(text: str, phrases: Iterable[tuple[str, str]] = PHRASES.items()) -> list[str]:
     """Return the phrases in a text, without the expressions in its braces."""
     words = re.sub(r"\{[^{}]*\}", "{}", text)
-    return [
-        f"{better} (found: {match[0]})" for phrase, better in PHRASES.items() if (match := re.search(phrase, words))
-    ]
+    return [f"{better} (found: {match[0]})" for phrase, better in phrases if (match := re.search(phrase, words))]
 
 
 def test_no_message_sounds_translated() -> None:
     """Neither in the code nor in the golden texts."""
     wrong = [(each.place, each.text, found) for each in sentences() if (found := found_in(each.text))]
     assert wrong == []
+
+
+def test_no_docstring_or_comment_sounds_translated() -> None:
+    """In the grader, the exercises that come with it, and the benchmarks."""
+    files = sorted(path for folder in ("grader", "rubrics", "benchmarks") for path in (ROOT / folder).rglob("*.py"))
+    wrong = [
+        (each.place, found)
+        for path in files
+        for each in in_remarks(path.read_text(encoding="utf-8"), path.relative_to(ROOT).as_posix())
+        if (found := found_in(" ".join(each.text.split()), REMARKS.items()))
+    ]
+    assert wrong == []
+
+
+@pytest.mark.parametrize("text", BAD_REMARKS)
+def test_a_docstring_that_sounds_translated_is_found(text: str) -> None:
+    """Each phrase is found in a sentence that once stood in a docstring or comment."""
+    source = f'"""{text}."""\nx = 1  # {text}\n'
+    found = [found_in(each.text, REMARKS.items()) for each in in_remarks(source, "a.py")]
+    assert len(found) == 2
+    assert all(found)
 
 
 @pytest.mark.parametrize("text", BAD)
@@ -77,7 +118,8 @@ def test_a_phrase_that_sounds_translated_is_found(text: str) -> None:
 
 def test_every_phrase_has_a_sentence() -> None:
     """So that a pattern that matches nothing is noticed."""
-    assert [phrase for phrase in PHRASES if not any(re.search(phrase, text) for text in BAD)] == []
+    known = dict.fromkeys(PHRASES, BAD) | dict.fromkeys(REMARKS, BAD + BAD_REMARKS)
+    assert [phrase for phrase, texts in known.items() if not any(re.search(phrase, text) for text in texts)] == []
 
 
 @pytest.mark.parametrize(

@@ -362,8 +362,8 @@ class AnswersTogether:
     If the sensor subscribes to the answers, types and QoS must be compatible.
 
     The controller may answer each input, publish only on change, or publish on a timer of up to a second. If inputs are
-    on both sides of the threshold, both answers must occur. Inputs that never change, or that are drawn again and again
-    from one side only, prove nothing; inputs that change too slowly to reach the other side are accepted.
+    on both sides of the threshold, both answers must occur. Inputs that never change, or that are only
+    drawn from one side, prove nothing; inputs that change too slowly to reach the other side are accepted.
 
     If answers are rare, as from a timer of a second, a slightly wrong limit may go unnoticed: `threshold_response`
     judges the limit itself.

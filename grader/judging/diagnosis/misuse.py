@@ -260,7 +260,7 @@ def _wrong_request(crash: Crash) -> Clue | None:
     priority=7070,
 )
 def _node_name(crash: Crash) -> Clue | None:
-    """The name of the node is no text."""
+    """The name of the node is not a string."""
     for call in _calls(crash, "__init__"):
         first = argument(call, 0, "node_name")
         if first is not None and chain(call.func) == "super().__init__" and text_of(first) is None:
