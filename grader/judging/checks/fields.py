@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from grader.core.chart import Band
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.exercise import Finding, Problem, ProblemKind, Roles
 from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern, counted, seconds, within
 from grader.core.trace import Delivery, Fault, Message, Trace
 from grader.judging.facts import DrawFacts, SeriesFacts
@@ -48,6 +48,7 @@ class EqualFields:
     """A check whether fields hold what is expected in every message on a topic."""
 
     __slots__ = ()
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     topic: str
     after_discovery: bool
 
@@ -202,6 +203,7 @@ class FieldInRange(FewSuffice, InRange):
             can have discovered it.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     at_least: int = 1
     after_discovery: bool = False
 
@@ -235,6 +237,7 @@ class FieldMonotone(FewSuffice):
             can have discovered it.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     topic: str
     direction: Literal["rising", "falling"] = "rising"
     field: Annotated[str, FieldOf("topic")] = "data"
@@ -326,6 +329,7 @@ class FieldFunction:
         pattern: Regular expression whose first group, or whole match, is the number, if the field is a text.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     topic: str
     formula: Formula
     field: Annotated[str, FieldOf("topic")] = "data"
@@ -453,6 +457,7 @@ class RandomInRange:
         unit: Unit of the number, for reasons and charts, e.g. `m`.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     topic: str
     low: float
     high: float

@@ -80,7 +80,7 @@ class LogsValues:
             products that name each other's units for every message do not count. No unit needs to be named.
     """
 
-    roles: ClassVar[Roles] = Roles(given=("topic",))
+    roles: ClassVar[Roles] = Roles(hears=("topic",), given=("topic",))
     noun: ClassVar[str] = "message"
     process: str
     topic: str
