@@ -10,7 +10,7 @@ from fractions import Fraction
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Location, Problem, ProblemKind, exact_share
 from grader.core.quantities import NS_PER_S, counted, seconds
-from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace
+from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace, UnmetPolicy
 from grader.judging.facts import OtherEnd
 from grader.judging.values import HIDDEN_TOPICS, student_endpoints
 from grader.judging.wording import listed, moment, nearest, quote, span
@@ -235,6 +235,15 @@ def explain_no_subscription(trace: Trace, topic: str, type_: str | None = None) 
     """Return no credit with the reason why nothing subscribes to `topic`, with `type_` if given."""
     found = _explain(trace, "subscription", student_endpoints(trace, "subscription"), topic, type_)
     return found or _nothing(trace, topic, "subscription")
+
+
+#: Which publishers do not offer a policy that a subscription requests.
+_WITHOUT = {"durability": "a volatile publisher", "liveliness": "a publisher with automatic liveliness"}
+
+
+def request_said(unmet: UnmetPolicy) -> str:
+    """Return what a subscription requests and which publishers do not offer it, as a phrase."""
+    return f"{unmet.requested}, which {_WITHOUT.get(unmet.policy, 'a publisher without one')} does not offer"
 
 
 def explain_no_server(trace: Trace, service: str, type_: str | None = None) -> Finding:

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tracing import FLOAT32, ODOMETRY, TWIST, Recording, twist, velocity
 
+from grader.core.quantities import NS_PER_S
 from grader.core.trace import FaultKind
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
 
@@ -155,6 +156,23 @@ def test_subscriptions_of_either_reliability_are_met(reliability: str) -> None:
     """A reliable publisher reaches both."""
     rec = Recording().endpoint("subscription", "/odom", ODOMETRY, reliability=reliability)
     assert SUBSCRIBES.judge(rec.trace()).credit == 1
+
+
+@pytest.mark.parametrize(
+    ("policies", "asks", "default"),
+    [
+        ({"durability": "transient_local"}, "transient_local durability, which a volatile publisher", "durability"),
+        ({"deadline_ns": NS_PER_S // 2}, "a deadline of 0.5 s, which a publisher without one", "deadline"),
+        ({"liveliness": "manual_by_topic"}, "manual_by_topic liveliness, which a publisher with auto", "liveliness"),
+        ({"lease_ns": NS_PER_S}, "a liveliness lease of 1 s, which a publisher", "liveliness lease duration"),
+    ],
+)
+def test_the_policy_that_keeps_messages_away_is_named(policies: dict[str, Any], asks: str, default: str) -> None:
+    """Each that an ordinary publisher does not offer, in the reason and in the hint."""
+    finding = SUBSCRIBES.judge(Recording().endpoint("subscription", "/odom", ODOMETRY, **policies).trace())
+    assert finding.credit == 0
+    assert f"the subscription of /node asks for {asks}" in finding.reason
+    assert finding.hint == f"subscribe with the default {default}: pass the queue depth 10 as QoS"
 
 
 def test_a_transient_local_subscription_hears_nothing() -> None:

@@ -107,9 +107,10 @@ class Recording:
         reliability: str = "reliable",
         durability: str = "volatile",
         t_s: float = 0.0,
+        **policies: Any,
     ) -> Recording:
-        """Add an endpoint and the snapshot that shows it."""
-        self.ends.append(Endpoint(kind, topic, type_, node, participant, reliability, durability, 10))
+        """Add an endpoint and the snapshot that shows it; `policies` are further ones, such as `deadline_ns`."""
+        self.ends.append(Endpoint(kind, topic, type_, node, participant, reliability, durability, 10, **policies))
         return self.snapshot(t_s, self.ends)
 
     def snapshot(self, t_s: float, ends: Sequence[Endpoint]) -> Recording:

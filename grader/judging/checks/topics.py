@@ -10,10 +10,17 @@ from grader.core.chart import Level
 from grader.core.dataclass import dataclass
 from grader.core.exercise import NODE_GRAPH, Finding, ProblemKind, Roles
 from grader.core.quantities import SLACK, FieldNumber, FieldOf, Hertz, counted, seconds, within
-from grader.core.trace import Endpoint, Message, Trace
+from grader.core.trace import Message, Trace, unusual_request
 from grader.judging.charts import gaps_panel
 from grader.judging.checks.fields import EqualFields
-from grader.judging.findings import explain_fault, explain_no_message, explain_no_subscription, met, not_met
+from grader.judging.findings import (
+    explain_fault,
+    explain_no_message,
+    explain_no_subscription,
+    met,
+    not_met,
+    request_said,
+)
 from grader.judging.plots import Drawing, Plot, value_panels
 from grader.judging.values import FieldRule, equals, leaves, number_at, published, student_endpoints, text_at
 from grader.judging.wording import listed, moment, number, numbers, quote
@@ -71,7 +78,7 @@ class Subscribes:
         mine = [e for e in student_endpoints(trace, "subscription") if (e.topic, e.type) == (self.topic, self.type)]
         if not mine:
             return explain_no_subscription(trace, self.topic, self.type)
-        fitting = [e for e in mine if not _demand(e)]
+        fitting = [e for e in mine if unusual_request(e) is None]
         chosen = (fitting or mine)[0]
         evidence = {
             "topic": self.topic,
@@ -80,27 +87,12 @@ class Subscribes:
             "reliability": chosen.reliability,
             "durability": chosen.durability,
         }
-        if fitting:
+        unmet = unusual_request(chosen)
+        if unmet is None:
             return met(f"{self.topic}: {quote(chosen.node)} subscribes with type {self.type}", evidence)
-        reason = f"{self.topic}: the subscription of {quote(chosen.node)} asks for {_demand(chosen)}"
-        hint = "subscribe with the default durability: pass the queue depth 10 as QoS"
+        reason = f"{self.topic}: the subscription of {quote(chosen.node)} asks for {request_said(unmet)}"
+        hint = f"subscribe with the default {unmet.policy.replace('_', ' ')}: pass the queue depth 10 as QoS"
         return not_met(f"{reason}: no message arrives", evidence, hint=hint, problem=ProblemKind.KEPT_APART)
-
-
-def _demand(subscription: Endpoint) -> str:
-    """Return the policy that a subscription requests and an ordinary publisher does not offer; empty if none."""
-    if subscription.durability == "transient_local":
-        return "transient_local durability, which a volatile publisher does not offer"
-    if subscription.deadline_ns:
-        return (
-            f"a deadline of {number(seconds(subscription.deadline_ns))} s, which a publisher without one does not offer"
-        )
-    if subscription.liveliness == "manual_by_topic":
-        return "manual_by_topic liveliness, which a publisher with automatic liveliness does not offer"
-    if subscription.lease_ns:
-        lease = f"a liveliness lease of {number(seconds(subscription.lease_ns))} s"
-        return f"{lease}, which a publisher without one does not offer"
-    return ""
 
 
 @dataclass(frozen=True, slots=True)
