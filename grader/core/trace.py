@@ -242,6 +242,16 @@ class ServiceEnd:
     reliability: str = "reliable"  # as for an endpoint of a topic; of requests, and as a rule of responses as well
     durability: str = "volatile"
 
+    @property
+    def unusual(self) -> str:
+        """The policy that no end with the default QoS fits, in words; empty if there is none.
+
+        Requests go one way and responses the other, so both ends must be alike.
+        """
+        if self.reliability != "reliable":
+            return f"{self.reliability} reliability"
+        return f"{self.durability} durability" if self.durability != "volatile" else ""
+
 
 @dataclass(frozen=True, slots=True)
 class GraphSnapshot:

@@ -258,12 +258,31 @@ def explain_no_client(trace: Trace, service: str, type_: str | None = None) -> F
 
 def _explain_service(trace: Trace, kind: str, service: str, type_: str | None) -> Finding:
     ends = trace.service_ends(kind)
+    mine = [e for e in ends if e.service == service and type_ in (None, e.type)]
+    if mine and (apart := unusual_ends(mine)) is not None:
+        return apart
     found = _explain(trace, kind, ends, service, type_)
     if found is not None:
         return found
+    if mine and kind == "client":
+        client = f"{service} [{quote(mine[0].type)}]: the client of {quote(mine[0].node)}"
+        reason = f"{client} sends no request in {span(trace.stop_ns)}"
+        return not_met(reason, {"service": service, "node": mine[0].node}, problem=ProblemKind.SILENT)
     seen = list(dict.fromkeys(f"{e.service} [{e.type}]" for e in ends))
     reason = f"{service}: not in the ROS graph in {span(trace.stop_ns)}{f'; seen: {listed(seen)}' if seen else ''}"
     return not_met(reason, {"service": service, "seen": seen[:20]}, problem=ProblemKind.ABSENT)
+
+
+def unusual_ends(ends: Sequence[ServiceEnd]) -> Finding | None:
+    """Return why no end with the default QoS can communicate with those of a service; None if it can with one."""
+    if not all(end.unusual for end in ends):
+        return None
+    word, other = ("server", "client") if ends[0].kind == "service" else ("client", "server")
+    reason = f"{ends[0].service}: the {word} of {quote(ends[0].node)} has {ends[0].unusual}, which a {other} with the "
+    reason += "default QoS does not match: no call arrives"
+    evidence = {"service": ends[0].service, "node": ends[0].node}
+    hint = f"create the {word} without qos_profile"
+    return not_met(reason, evidence, hint=hint, problem=ProblemKind.KEPT_APART)
 
 
 def _explain(

@@ -363,6 +363,15 @@ def asking_once() -> Recording:
     return rec.request(7.0, BATTERY, 1, "student").response(7.05, BATTERY, 1, answer, "grader")
 
 
+def unanswered(**policies: Any) -> Recording:
+    """A client that waits for the server and never reaches it; `policies` are those of its QoS."""
+    rec = Recording(40.0, process="battery_service_client.py")
+    rec.service("client", BATTERY, TRIGGER, "/mission", **policies).mark(7.0, "server_starts", BATTERY)
+    for second in range(1, 40):
+        rec.log(second, "waiting for the battery server ...")
+    return rec
+
+
 def misnamed() -> Recording:
     """Both processes, of which the controller answers on another topic."""
     rec = Recording(20.2, process="temperature_sensor.py")
@@ -400,5 +409,6 @@ RECORDINGS: dict[str, tuple[str, Callable[..., Recording]]] = {
     "answering_once": ("controller_alone", answering_once),
     "swinging": ("alone", swinging),
     "asking_once": ("client_waits", asking_once),
+    "unanswered": ("client_waits", unanswered),
     "greeting": ("defaults", greeting),
 }

@@ -79,6 +79,19 @@ def _other_service(end: _End) -> Clue | None:
     return None
 
 
+@hint_rule(problem=ProblemKind.KEPT_APART, given=_end, priority=3015)
+def _service_qos(end: _End) -> Clue | None:
+    """A server or client has a QoS that the other end does not fit."""
+    for source in end.case.sources.values():
+        for call in _ends(source, end.kind):
+            given = next((k for k in call.keywords if k.arg == "qos_profile"), None)
+            if given is not None and goes_to(text_in_code(source, argument(call, 1, "srv_name")), end.service):
+                other = "server" if end.kind == "client" else "client"
+                hint = f"{source.code(given, 60)} does not match a {other} with the default QoS: remove it"
+                return Clue(hint, source.place(given))
+    return None
+
+
 def _type_of(end: _End) -> str:
     """Return the type that a criterion of the exercise asks for; empty if none does."""
     for check in (end.case.check, *end.case.siblings):
