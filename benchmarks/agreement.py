@@ -45,7 +45,7 @@ Results = dict[str, dict[str, Any]]
 
 
 def burn() -> None:
-    """Use a processor for ever."""
+    """Use a processor forever."""
     while True:
         pass
 

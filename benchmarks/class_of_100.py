@@ -114,7 +114,7 @@ def cost_of(submissions: Path, jobs: int) -> Cost:
 
 
 class Memory:
-    """Adds up, again and again, the memory of a process and of all that it started.
+    """Adds up, repeatedly, the memory of a process and of all that it started.
 
     Args:
         pid: Process id.

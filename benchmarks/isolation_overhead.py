@@ -117,7 +117,7 @@ def main() -> None:
         workers = {name: stack.enter_context(worker(name, ros, folder)) for name in holding(ros)}
         took: dict[str, list[float]] = {name: [] for name in workers}
         for process in workers.values():
-            started(process)  # what is read from disk for the first time is no overhead
+            started(process)  # reading from disk for the first time does not count as overhead
         for _ in range(rounds):
             for name, process in workers.items():
                 took[name].append(started(process))

@@ -1,4 +1,4 @@
-"""Grades a submission again and again, kills one of the grader's processes each time, and compares the reports.
+"""Grades a submission repeatedly, kills one of the grader's processes each time, and compares the reports.
 
 Usage: python benchmarks/killing.py [RUNS] [SUBMISSION | --class]
 

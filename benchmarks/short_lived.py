@@ -1,4 +1,4 @@
-"""Grades short-lived and re-connecting programs again and again, and compares the reports byte by byte.
+"""Grades short-lived and re-connecting programs repeatedly, and compares the reports byte by byte.
 
 Usage: python benchmarks/short_lived.py [--load] [--jobs N] [--clock CLOCK] [RUNS [NAME...]]
 

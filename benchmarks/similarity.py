@@ -37,7 +37,7 @@ def people(prefix: str) -> list[Handed]:
 
 
 def disguised(one: Handed, way: str, seed: int) -> Handed | None:
-    """Return a submission told differently; None if it cannot be parsed."""
+    """Return a submission written differently; None if it cannot be parsed."""
     try:
         made = [replace(p, text=copies.DISGUISES[way](p.text, seed), digest=f"{p.digest} {way}") for p in one.programs]
     except (SyntaxError, ValueError):

@@ -1,4 +1,4 @@
-"""Grades one correct and one wrong submission again and again, half of the time under load, and compares the reports.
+"""Grades one correct and one wrong submission repeatedly, half of the time under load, and compares the reports.
 
 Usage: python benchmarks/steadiness.py [RUNS]      RUNS (40) of each; two busy loops per core during the second half
 """
@@ -18,7 +18,7 @@ GRADE = str(Path(sys.executable).with_name("grade"))
 
 
 def burn() -> None:
-    """Use a processor for ever."""
+    """Use a processor forever."""
     while True:
         pass
 

@@ -1,4 +1,4 @@
-"""Grades ten programs near the thresholds of virtual time again and again, half of the time under load.
+"""Grades ten programs near the thresholds of virtual time repeatedly, half of the time under load.
 
 Usage: python benchmarks/thresholds.py [RUNS] [--jobs N] [--only NAME] [--out FILE]
        RUNS (100) of each program, so many at a time (6); two busy loops per core during the second half

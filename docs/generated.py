@@ -450,7 +450,7 @@ def example_report(exercise: str) -> Report:
 
 
 def files() -> dict[str, str | bytes]:
-    """Return the files of the site that are no pages, by their path: the reports of the examples, and the charts."""
+    """Return the files of the site other than pages, by their path: the reports of the examples, and the charts."""
     reports = {f"examples/{exercise}.html": render_html(example_report(exercise)) for exercise in exercises()}
     return reports | {f"reference/charts/{check}.svg": drawn(chart) for check, chart in charts().items()}
 

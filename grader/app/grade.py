@@ -75,7 +75,7 @@ class EarlyReports:
             self._on_report(_judge()(self._exercises, run, pictures=False, pending=pending))
 
 
-def grade_in(  # noqa: PLR0913  what to grade, and who is told
+def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
     session: RecordingSession,
     request: GradeRequest,
     progress: Progress,

@@ -102,10 +102,10 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
 
 
 def _sources(trace: Trace, submission: Submission) -> dict[str, str]:
-    """Return the text of the programs and of the files that faults name, by path; none for one that is no text."""
+    """Return the text of the programs and of the files that faults name, by path; none for one that is not text."""
     named = {fault.file for fault in trace.faults()} | {start.file for start in trace.starts}
     named |= {file.found for file in submission.files.values() if file.found}
-    # the paths are those of staged files: a process can name no other
+    # the paths are those of staged files: a process cannot name others
     texts = {name: source_text(submission.root / name) for name in sorted(named) if name}
     return {name: text for name, text in texts.items() if text is not None}
 

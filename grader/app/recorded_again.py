@@ -55,7 +55,7 @@ def main() -> None:
     """Record what standard input asks for."""
     gc.set_threshold(COLLECT_AFTER)
     lines = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # what anybody else prints is no line of JSON
+    os.dup2(2, 1)  # what others print is not a line of JSON
     recordings: Recordings = from_json(Recordings, json.load(sys.stdin))
     if recordings.processors:
         os.sched_setaffinity(0, recordings.processors)

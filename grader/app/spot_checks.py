@@ -124,7 +124,7 @@ class SpotChecks:
         return bool(self.reaches) or any(t.reached for (exercise, _), t in traces.items() if exercise == key[0])
 
 
-def check(  # noqa: PLR0913  what to check, with what, and who is told
+def check(  # noqa: PLR0913  what to check, with what, and where progress goes
     checks: SpotChecks,
     jobs: Mapping[Key, Job],
     traces: Mapping[Key, Trace],

@@ -39,7 +39,7 @@ KEPT = "kept"
 PROGRAM = (sys.executable, "-m", "grader.app.recorded_again")
 #: A loop that keeps a processor busy as long as the process lives that started it, whose pid is its argument.
 LOOP = "import os, sys\nwhile os.getppid() == int(sys.argv[1]):\n    for _ in range(1_000_000): pass\n"
-#: How much of what a failed program said is told, in characters.
+#: How much of the output of a failed program is shown, in characters.
 _MOST_CHARACTERS = 300
 
 

@@ -234,7 +234,7 @@ def _found(text: str) -> str:
 
 
 def _number_hint(path: TreePath, text: str) -> str:
-    """Return what to write instead of a text that is no plain number; empty if that is not clear."""
+    """Return what to write instead of a text that is not a plain number; empty if that is not clear."""
     key = str(path[-1])
     parts = re.fullmatch(rf"([+-]?)(\d{{1,6}},\d{{1,6}}|{_NUMBER})\s*({_UNITS})?", text, re.IGNORECASE)
     if parts is None:
@@ -306,7 +306,7 @@ def _contradictions(read: _File, tree: YamlTree) -> Iterator[Mistake]:
 
 
 def _unusable_names(read: _File, tree: YamlTree) -> Iterator[Mistake]:
-    """Yield a mistake for each file that would get a name that is none, or that another file gets."""
+    """Yield a mistake for each file whose new name would be invalid, or would be that of another file."""
     for name, student in read.students.items():
         for old, new in student.rename.items():
             where = tree.at(("students", name, "rename", old))

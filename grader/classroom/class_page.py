@@ -66,8 +66,11 @@ def _rows(book: Gradebook, run: RunOfClass, reports: Sequence[ReportData]) -> It
     if conditions.recording:
         yield "recording", conditions.recording
     yield "clock", _clock(conditions.clock, reports)
-    yield "isolation", f"asked for: {conditions.isolation}; {_counted(_isolation(r) for r in reports) or 'nothing ran'}"
-    yield "seed", f"{seed} for everybody" if seed is not None else "follows from the seed key and the files handed in"
+    yield "isolation", f"requested: {conditions.isolation}; {_counted(_isolation(r) for r in reports) or 'nothing ran'}"
+    yield (
+        "seed",
+        f"{seed} for all submissions" if seed is not None else "from the seed key and the submitted files",
+    )
     yield "jobs", str(run.jobs)
     yield "cost", _cost(book)
     yield "sources", ", ".join(f"{PurePath(source).name or source} ({layout})" for source, layout in book.layouts)
@@ -93,7 +96,7 @@ def _isolation(report: ReportData) -> str:
 
 def _clock(asked: str, reports: Sequence[ReportData]) -> str:
     on_wall = sum(any(e.get("clock") == "wall" for e in report["exercises"]) for report in reports)
-    return f"asked for: {asked}; on the wall clock in part or whole: {on_wall} of {len(reports)}"
+    return f"requested: {asked}; partly or wholly on the wall clock: {on_wall} of {len(reports)}"
 
 
 def _cost(book: Gradebook) -> str:
@@ -200,13 +203,13 @@ def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator
     yield Listing(
         "undecided",
         "Undecided",
-        "Not decided. The reasons say what is known. The same command with --rerun undecided grades them again.",
+        "Each criterion here says why it is undecided. The same command with --rerun undecided grades these again.",
         tuple(entry for k, row in undecided for entry in _undecided(k, row, run)),
     )
     yield Listing(
         "not-graded",
         "Not graded",
-        "There is no report. Students have to fix refused submissions; --rerun failed grades the failed ones again.",
+        "These have no report. Students have to fix refused submissions; --rerun failed grades the failed ones again.",
         tuple(
             PageEntry(f"{row.standing}{_problem(row, run)}", k)
             for k, row in enumerate(rows)
@@ -248,10 +251,12 @@ def _roster(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator[L
     yield Listing(
         "outdated",
         "Outdated results",
-        "The files or the rubric have changed since.",
+        "The files or the rubric have changed since these were graded.",
         named(outdated, "graded before"),
     )
-    yield Listing("strays", "Not submissions", "Other entries of the sources.", _texts(book.strays, run))
+    yield Listing(
+        "strays", "Not submissions", "Files and folders in the sources that were left out.", _texts(book.strays, run)
+    )
     yield Listing(
         "foreign",
         "Results without a submission",

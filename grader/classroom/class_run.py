@@ -368,4 +368,4 @@ def _with_distinct_labels(handed: Sequence[Handed]) -> list[Handed]:
 def _counted(similar: Similar) -> str:
     pairs = f"{len(similar.pairs)} pair{'' if len(similar.pairs) == 1 else 's'}"
     same = len(similar.same)
-    return f"{pairs}, {same} file{'' if same == 1 else 's'} handed in by several" if same else pairs
+    return f"{pairs}, {same} file{'' if same == 1 else 's'} handed in more than once" if same else pairs

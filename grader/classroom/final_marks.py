@@ -129,7 +129,7 @@ def _on_criteria(row: Row) -> Iterator[str]:
 def _on_the_whole(adjusted: Adjusted, *, totals: bool) -> Iterator[str]:
     """Yield each decision about the whole submission as a sentence.
 
-    Without totals nothing is said of the whole score, from which hidden criteria could be reckoned.
+    Without totals, the whole score is left out, because hidden criteria could be computed from it.
     """
     for old, new in adjusted.rename.items():
         yield f"{old} was renamed to {new} before grading."

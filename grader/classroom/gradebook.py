@@ -243,7 +243,7 @@ def decisions_for(
             raise several_students(decision, who, [entry.name for entry in meant])
         for entry in meant:
             if entry.name in exact:
-                continue  # what is said of one submission takes precedence over what is said of its student
+                continue  # an entry for one submission takes precedence over an entry for its student
             if entry.name in found:
                 raise decided_twice(decision, who, entry.name, found[entry.name][0])
             found[entry.name] = (who, decision)

@@ -1,4 +1,4 @@
-"""Grades submissions on this machine, in processes that serve one after the other; also the interface of schedulers."""
+"""Grades submissions on this machine, in processes that are used again; also the interface of schedulers."""
 
 from __future__ import annotations
 

@@ -210,7 +210,7 @@ def _late_in(row: Mapping[str, str]) -> str:
 
 
 def late_days(text: str) -> str:
-    """Return a time such as `1 day 3 hours` as a number of days, rounded up to hundredths; empty if it is none."""
+    """Return a time such as `1 day 3 hours` as a number of days, rounded up to hundredths; empty for any other text."""
     parts = re.findall(r"(\d+) ([a-z]+)", text.casefold())
     hours = [Fraction(count) * _HOURS[key] for count, unit in parts for key in _HOURS if unit.startswith(key)]
     if not hours or len(hours) < len(parts):

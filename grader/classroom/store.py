@@ -312,7 +312,7 @@ class Conditions:
 
     def _digest(self, depends_on: dict[str, Any], submission: str) -> str:
         if not self.interfaces:
-            del depends_on["interfaces"]  # results of earlier versions know none
+            del depends_on["interfaces"]  # results of earlier versions do not have it
         # A changed share affects only submissions that are drawn with one share and not with the other.
         del depends_on["spot_checks"]
         if self.draws(submission):

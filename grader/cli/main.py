@@ -260,14 +260,14 @@ def _graded(  # noqa: PLR0913  one parameter an option
     wanted = tuple(replace(output, evidence=next(iter(folders), None)) for output in wanted)
     writer = _evidence_writer(folders, request) if folders else None
     grading = _Grading(request, wanted, for_whom, writer, min_score, not no_progress, pages[0] if opens else None)
-    # What does not exist is no folder to watch; grading it says so.
+    # A folder that does not exist cannot be watched; grading it says so.
     watched = watch and Path(request.submission).exists()
     return grading.each_save(started) if watched else grading.once(started, session)
 
 
 @dataclass(slots=True)
 class _Grading:
-    """Grades a submission, once or again and again, and delivers its reports."""
+    """Grades a submission, once or repeatedly, and delivers its reports."""
 
     request: GradeRequest
     outputs: Sequence[Output]

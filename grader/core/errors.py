@@ -12,7 +12,7 @@
       · VariantError          the student whose variant is asked for
       · KeyFileError          a key
 
-A crash of a student's program is no exception but a Fault in the trace.
+A crash of a student's program is not an exception but a Fault in the trace.
 """
 
 from __future__ import annotations

@@ -172,7 +172,7 @@ class Location:
     """A place in a student's file; lines count from 1.
 
     Raises:
-        TypeError: The file is no text, or the line no whole number.
+        TypeError: The file is not a text, or the line not a whole number.
     """
 
     file: str
@@ -186,7 +186,7 @@ class Location:
 
 
 #: Denominators that a float may have as a share of points. With them, 0.7 + 0.2 + 0.1 is 1, and 1 - 1.0000000001 is 0:
-#: a rounding error costs no points and is no mistake. Points are shown with two decimals.
+#: a rounding error costs no points and is not a mistake. Points are shown with two decimals.
 _FINEST_SHARE = 1_000_000
 
 
@@ -194,7 +194,7 @@ def exact_share(share: object) -> Fraction:
     """Return a share of the points as a fraction; a float becomes the nearest one with a denominator up to a million.
 
     Raises:
-        TypeError: It is no number.
+        TypeError: It is not a number.
         ValueError: It is not in the range from 0 to 1.
     """
     if isinstance(share, bool) or not isinstance(share, Real):
@@ -215,7 +215,7 @@ class Finding:
     """What a check found in a trace.
 
     Raises:
-        TypeError: The credit is no number.
+        TypeError: The credit is not a number.
         ValueError: The credit is not in the range from 0 to 1.
     """
 

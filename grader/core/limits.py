@@ -19,7 +19,7 @@ ADDRESS_SPACE_BEYOND = 3 * GIB // 2
 class Limits:
     """What each student process and its children may use, and how much of their behaviour is recorded.
 
-    The student is told if a limit is reached, and the recording up to then is judged. The first group applies to each
+    The report says if a limit is reached, and the recording up to then is judged. The first group applies to each
     student process with its children, the second to each file or folder, the third to the scenario. The defaults are
     well above the most that any of the 170 correct programs of our test set needed, given in parentheses: each alone,
     for ten seconds of virtual time, on two processors. A rubric cannot set a limit below the needs of an idle node.

@@ -288,7 +288,7 @@ class RuleTrial:
     outcome: str
     reason: str
     # Name, priority, place and hint of each rule that applies, in their order: reports show the first. A place is
-    # written `file:line`, and is empty if the rule names none
+    # written `file:line`, and is empty if the rule does not name one
     rules: tuple[tuple[str, int, str, str], ...]
 
 

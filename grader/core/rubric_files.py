@@ -48,7 +48,7 @@ def notes_on(rubric: Path) -> Path:
 
 
 def rubric_of(notes: Path) -> Path | None:
-    """Return the path of the rubric that a file holds notes on; None if it is no file of notes, by its name."""
+    """Return the path of the rubric that a file holds notes on; None if its name is not that of a file of notes."""
     if notes.name.endswith(f".{NOTES}"):
         return notes.with_name(f"{notes.name.removesuffix(f'.{NOTES}')}.yaml")
     beside = notes.with_name(RUBRIC)

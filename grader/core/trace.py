@@ -177,22 +177,47 @@ class Endpoint:
     lease_ns: int = 0  # offered or requested lease of the liveliness, 0 for none
 
 
+@dataclass(frozen=True, slots=True)
+class UnmetPolicy:
+    """A QoS policy that keeps messages from passing."""
+
+    policy: str  # the name of its parameter in rclpy, e.g. `deadline`
+    offered: str  # by the publisher, in words, e.g. `no deadline`
+    requested: str  # by the subscription, in words, e.g. `a deadline of 0.5 s`
+    value: str  # what the subscription requests without the name of the policy, e.g. `0.5 s`
+
+
+def first_unmet(publisher: Endpoint, subscription: Endpoint) -> UnmetPolicy | None:
+    """Return the first QoS policy that keeps messages from passing; None if none does.
+
+    The rules are those of ROS 2 for "request versus offered" policies, as in the documentation of its QoS settings.
+    """
+    if (publisher.reliability, subscription.reliability) == ("best_effort", "reliable"):
+        return UnmetPolicy("reliability", "best_effort reliability", "reliable messages", "reliable")
+    if (publisher.durability, subscription.durability) == ("volatile", "transient_local"):
+        return UnmetPolicy("durability", "volatile durability", "transient_local durability", "transient_local")
+    if not keeps_within(publisher.deadline_ns, subscription.deadline_ns):
+        return _unmet_time("deadline", "deadline", publisher.deadline_ns, subscription.deadline_ns)
+    if (publisher.liveliness, subscription.liveliness) == ("automatic", "manual_by_topic"):
+        return UnmetPolicy("liveliness", "automatic liveliness", "manual_by_topic liveliness", "manual_by_topic")
+    if not keeps_within(publisher.lease_ns, subscription.lease_ns):
+        name = "liveliness_lease_duration"
+        return _unmet_time(name, "liveliness lease", publisher.lease_ns, subscription.lease_ns)
+    return None
+
+
 def unmet_policy(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:
     """Return the first QoS policy that keeps messages from passing, as offered and as requested; None if none does.
 
     The rules are those of ROS 2 for "request versus offered" policies, as in the documentation of its QoS settings.
     """
-    if (publisher.reliability, subscription.reliability) == ("best_effort", "reliable"):
-        return "best_effort reliability", "reliable"
-    if (publisher.durability, subscription.durability) == ("volatile", "transient_local"):
-        return "volatile durability", "transient_local"
-    if not keeps_within(publisher.deadline_ns, subscription.deadline_ns):
-        return _time_of("deadline", publisher.deadline_ns), f"{seconds(subscription.deadline_ns):g} s"
-    if (publisher.liveliness, subscription.liveliness) == ("automatic", "manual_by_topic"):
-        return "automatic liveliness", "manual_by_topic"
-    if not keeps_within(publisher.lease_ns, subscription.lease_ns):
-        return _time_of("liveliness lease", publisher.lease_ns), f"{seconds(subscription.lease_ns):g} s"
-    return None
+    unmet = first_unmet(publisher, subscription)
+    return None if unmet is None else (unmet.offered, unmet.value)
+
+
+def unusual_request(subscription: Endpoint) -> UnmetPolicy | None:
+    """Return the first QoS policy that a subscription requests and a publisher by default does not offer."""
+    return first_unmet(Endpoint("publisher", subscription.topic, "", "", -1, "reliable", "volatile"), subscription)
 
 
 def keeps_within(offered_ns: int, requested_ns: int) -> bool:
@@ -200,8 +225,10 @@ def keeps_within(offered_ns: int, requested_ns: int) -> bool:
     return requested_ns == 0 or 0 < offered_ns <= requested_ns
 
 
-def _time_of(name: str, offered_ns: int) -> str:
-    return f"a {name} of {seconds(offered_ns):g} s" if offered_ns else f"no {name}"
+def _unmet_time(policy: str, name: str, offered_ns: int, requested_ns: int) -> UnmetPolicy:
+    offered = f"a {name} of {seconds(offered_ns):g} s" if offered_ns else f"no {name}"
+    value = f"{seconds(requested_ns):g} s"
+    return UnmetPolicy(policy, offered, f"a {name} of {value}", value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,6 +241,16 @@ class ServiceEnd:
     node: str  # fully qualified node name
     reliability: str = "reliable"  # as for an endpoint of a topic; of requests, and as a rule of responses as well
     durability: str = "volatile"
+
+    @property
+    def unusual(self) -> str:
+        """The policy that no end with the default QoS fits, in words; empty if there is none.
+
+        Requests go one way and responses the other, so both ends must be alike.
+        """
+        if self.reliability != "reliable":
+            return f"{self.reliability} reliability"
+        return f"{self.durability} durability" if self.durability != "volatile" else ""
 
 
 @dataclass(frozen=True, slots=True)

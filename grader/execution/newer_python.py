@@ -223,6 +223,6 @@ def version_for(text: bytes, question: str) -> Version | None:
 
 
 def _checked(told: bytes) -> Version | None:
-    """Return the version that the process told; None if it reached a limit, which no file of a person makes it do."""
+    """Return the version that the process found; None if it reached a limit, which no ordinary file makes it do."""
     found = re.fullmatch(rb"\[(\d{1,2}), (\d{1,2})\]\n", told)
     return None if found is None else (int(found[1]), int(found[2]))

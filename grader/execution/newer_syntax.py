@@ -311,8 +311,8 @@ def _held(
 
 
 def _literal(node: cst.FormattedString | cst.TemplatedString, text: str) -> cst.BaseExpression:
-    """Return a text with the quotation marks around it, so that its escapes are checked."""
-    # the space keeps a quotation mark or a backslash at the end of the text from those that end the literal
+    """Return a text with the quotes around it, so that its escapes are checked."""
+    # the space keeps a quote or a backslash at the end of the text from those that end the literal
     return cst.SimpleString(f"{node.quote}{text} {node.quote}")
 
 

@@ -91,7 +91,7 @@ _QUOTED_CHARACTERS = 80
 
 
 def quoted(text: str) -> str:
-    """Return a student's text on one line in quotation marks, shortened; it cannot close them."""
+    """Return a student's text on one line in quotes, shortened; it cannot close them."""
     plain = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * _QUOTED_CHARACTERS]).split())
     plain = plain.replace('"', "'")
     return f'"{plain[: _QUOTED_CHARACTERS - 1]}…"' if len(plain) > _QUOTED_CHARACTERS else f'"{plain}"'

@@ -183,7 +183,7 @@ class Observer:
 
         One subscription takes all messages of a topic and type: a reliable one, or one with best effort if any
         publisher has it. With two, the messages of a reliable publisher would be taken twice, and a best-effort
-        publisher would be told of a subscription that asks for more.
+        publisher would hear of a subscription that asks for more.
 
         Args:
             endpoints: Endpoints of students' nodes.

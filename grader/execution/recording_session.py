@@ -35,7 +35,7 @@ VIRTUAL, WALL, AUTO = "virtual", "wall", "auto"
 
 #: The reason for the wall clock where a node is slower than it seems in virtual time.
 DRIFTS = "the node pauses after its work, so that virtual time would hide how slow it is"
-#: What readers are told where the machine was too busy to tell that on the wall clock.
+#: What readers see where the machine was too busy to find out on the wall clock.
 CHARGED_NOTE = "the machine was too busy for the wall clock: the measured time of the nodes' work was counted instead"
 #: The same work takes longer on a busy machine, which shares caches and cores: by up to a third was seen with ten
 #: programs for each processor. A node that keeps its pace if only this share counts may keep it on an idle machine.
@@ -71,7 +71,7 @@ class RecordingSession:
     recorder: Recorder
     folder: Path
 
-    def record(  # noqa: PLR0913  what to record, and who is told
+    def record(  # noqa: PLR0913  what to record, and where progress goes
         self,
         jobs: Mapping[Key, Job],
         clock: str,
@@ -207,7 +207,7 @@ def _was_held_up(trace: Trace) -> bool:
 
 
 @contextmanager
-def open_session(  # noqa: PLR0913  what to open, and who is told
+def open_session(  # noqa: PLR0913  what to open, and where progress goes
     isolation: str,
     workers: int | None = None,
     progress: Callable[[str], None] = lambda _: None,

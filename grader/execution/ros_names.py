@@ -37,7 +37,7 @@ def asked(question: Callable[..., Answer], *names: Any, nothing: Answer) -> Answ
 
 
 def listed(question: Callable[[], list[Answer]]) -> list[Answer]:
-    """Ask rcl for everything in the graph; nothing if a name in it is no text. Other failures are the grader's own."""
+    """Ask rcl for everything in the graph; nothing if a name in it is not text. Other failures are the grader's own."""
     try:
         return question()
     except UnicodeDecodeError:

@@ -50,7 +50,7 @@ class SocketMemory:
 
     Args:
         shared: Whether the network is used by other programs as well; sockets that no process has open, such as
-            connections that were not accepted, are then nobody's.
+            connections that were not accepted, then belong to no process.
     """
 
     def __init__(self, *, shared: bool) -> None:

@@ -76,7 +76,7 @@ class NodeProcess:
         wake_ns: When it next wants to run, or None.
         claims: Its endpoints, as it reports them.
         arrivals: Messages that are on their way to it and not yet announced to it, by channel.
-        told: The counterparts that it has been told to wait for.
+        told: The counterparts that it has to wait for.
         renewed: Whether its endpoints have changed since then.
         unmatched: The channels of its endpoints that had too few counterparts when the wait for them timed out.
         sees_graph: Whether its program queries the graph, as it reports.

@@ -277,7 +277,7 @@ class Worker(ABC):
 
 
 def _without_recording(plan: Plan, mistake: Any) -> Trace:
-    """Return an empty trace with the mistake of the rubric's author; raises HarnessError if it is none."""
+    """Return an empty trace with the mistake of the rubric's author; raises HarnessError if the author made none."""
     import msgspec  # noqa: PLC0415 - takes as long as the import of what reads traces
 
     try:
@@ -449,7 +449,7 @@ class Recorder:
         ended_ns: Processor time of the workers that were replaced.
     """
 
-    def __init__(  # noqa: PLR0913  what it records with, and who is told
+    def __init__(  # noqa: PLR0913  what it records with, and where progress goes
         self,
         isolation: Isolation,
         runtime: PythonRuntime,
@@ -642,7 +642,7 @@ class Recorder:
                 self._close(worker)
 
     def _close(self, worker: Worker) -> None:
-        # The kernel adds it to nobody's, because those who would wait for the processes are killed with them.
+        # The kernel never credits this time: the parents that would reap these processes die with them.
         self.ended_ns += worker.used_ns()
         worker.close()
 

@@ -141,7 +141,7 @@ def thread_starved_ns(pid: int, thread: int | str) -> int:
 
 
 def _status(pid: int) -> tuple[int, int]:
-    """Return the own memory of a process in KiB, and its number of threads."""
+    """Return the private memory of a process in KiB, and its number of threads."""
     status = _read(f"/proc/{pid}/status")
     return sum(_number(status, key) for key in OWN_MEMORY), _number(status, THREADS)
 

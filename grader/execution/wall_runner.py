@@ -30,7 +30,7 @@ MESSAGES_A_LOOK, READS_A_LOOK = 100, 2
 PAUSE_S = 0.0002
 LONGEST_PAUSE_NS = 10 * NS_PER_MS
 HELD_UP_NS = 150 * NS_PER_MS
-#: The most early messages that are told apart.
+#: The most early messages that are distinguished.
 MOST_EARLY = 10_000
 #: How long before its first message a publisher is created, so that subscriptions can discover it.
 LEAD_NS = 300 * NS_PER_MS

@@ -299,7 +299,7 @@ class Worker:
         return self._execute(plan, name, file, domain, {})
 
     def _execute(self, plan: Plan, name: str, file: str, domain: int, told: Mapping[str, Any]) -> NodeProcess:
-        """Start a process of the host with a request; one that evaluates a launch file is told so."""
+        """Start a process of the host with a request; the request says if it is to evaluate a launch file."""
         ours, theirs = socket.socketpair()
         process = StudentProcess(
             runtime=_with_packages(self._runtime, plan),
@@ -424,7 +424,7 @@ def with_copies(process: StudentProcess, file: str, limits: Limits) -> StudentPr
 
 
 def _own_folder(environment: Mapping[str, str]) -> str:
-    """Return the folder that an environment names for temporary files; empty if it names none."""
+    """Return the folder that an environment names for temporary files; empty if there is none."""
     return environment.get("TMPDIR", "")
 
 

@@ -97,7 +97,7 @@ class FieldType:
 
     @property
     def primitive(self) -> bool:
-        """Whether the type or that of its elements is no message."""
+        """Whether neither the type nor that of its elements is a message."""
         return "/" not in self.base
 
 

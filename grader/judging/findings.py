@@ -10,7 +10,7 @@ from fractions import Fraction
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Finding, Location, Problem, ProblemKind, exact_share
 from grader.core.quantities import NS_PER_S, counted, seconds
-from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace
+from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace, UnmetPolicy
 from grader.judging.facts import OtherEnd
 from grader.judging.values import HIDDEN_TOPICS, student_endpoints
 from grader.judging.wording import listed, moment, nearest, quote, span
@@ -237,6 +237,15 @@ def explain_no_subscription(trace: Trace, topic: str, type_: str | None = None) 
     return found or _nothing(trace, topic, "subscription")
 
 
+#: Which publishers do not offer a policy that a subscription requests.
+_WITHOUT = {"durability": "a volatile publisher", "liveliness": "a publisher with automatic liveliness"}
+
+
+def request_said(unmet: UnmetPolicy) -> str:
+    """Return what a subscription requests and which publishers do not offer it, as a phrase."""
+    return f"{unmet.requested}, which {_WITHOUT.get(unmet.policy, 'a publisher without one')} does not offer"
+
+
 def explain_no_server(trace: Trace, service: str, type_: str | None = None) -> Finding:
     """Return no credit with the reason why no student's node is a server of `service`, with `type_` if given."""
     return _explain_service(trace, "service", service, type_)
@@ -249,12 +258,31 @@ def explain_no_client(trace: Trace, service: str, type_: str | None = None) -> F
 
 def _explain_service(trace: Trace, kind: str, service: str, type_: str | None) -> Finding:
     ends = trace.service_ends(kind)
+    mine = [e for e in ends if e.service == service and type_ in (None, e.type)]
+    if mine and (apart := unusual_ends(mine)) is not None:
+        return apart
     found = _explain(trace, kind, ends, service, type_)
     if found is not None:
         return found
+    if mine and kind == "client":
+        client = f"{service} [{quote(mine[0].type)}]: the client of {quote(mine[0].node)}"
+        reason = f"{client} sends no request in {span(trace.stop_ns)}"
+        return not_met(reason, {"service": service, "node": mine[0].node}, problem=ProblemKind.SILENT)
     seen = list(dict.fromkeys(f"{e.service} [{e.type}]" for e in ends))
     reason = f"{service}: not in the ROS graph in {span(trace.stop_ns)}{f'; seen: {listed(seen)}' if seen else ''}"
     return not_met(reason, {"service": service, "seen": seen[:20]}, problem=ProblemKind.ABSENT)
+
+
+def unusual_ends(ends: Sequence[ServiceEnd]) -> Finding | None:
+    """Return why no end with the default QoS can communicate with those of a service; None if it can with one."""
+    if not all(end.unusual for end in ends):
+        return None
+    word, other = ("server", "client") if ends[0].kind == "service" else ("client", "server")
+    reason = f"{ends[0].service}: the {word} of {quote(ends[0].node)} has {ends[0].unusual}, which a {other} with the "
+    reason += "default QoS does not match: no call arrives"
+    evidence = {"service": ends[0].service, "node": ends[0].node}
+    hint = f"create the {word} without qos_profile"
+    return not_met(reason, evidence, hint=hint, problem=ProblemKind.KEPT_APART)
 
 
 def _explain(

@@ -8,20 +8,19 @@ from typing import Any
 
 from grader.core.exercise import Check
 from grader.core.trace import Request, Response, Trace
-from grader.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone, RandomInRange
+from grader.judging.checks.fields import EqualFields, FieldInRange, FieldMonotone, RandomInRange
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.timing import Period, Silence
-from grader.judging.checks.topics import FieldValues, Publishes
+from grader.judging.checks.topics import Publishes
 from grader.judging.values import HIDDEN_TOPICS, student_endpoints
 
 #: The service of an action by which a client sends its goal.
 _GOALS = "/_action/send_goal"
 #: Checks of what is published on the topics that they name, and of nothing else.
 _OF_PUBLISHERS = (
-    FieldEqual,
+    EqualFields,
     FieldInRange,
     FieldMonotone,
-    FieldValues,
     Period,
     Publishes,
     RandomInRange,

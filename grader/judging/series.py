@@ -93,7 +93,7 @@ def curve(text: str, *, of_fields: bool = False) -> Curve:
     """Return the formula in a text, of `n` and `t` or of the fields of a message such as `pose.x`.
 
     Raises:
-        FormulaError: It is none.
+        FormulaError: It is not a valid formula.
     """
     if len(text) > _MOST_CHARACTERS:
         raise FormulaError(f"at most {_MOST_CHARACTERS} characters")

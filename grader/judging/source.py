@@ -314,6 +314,12 @@ def text_of(node: ast.AST | None) -> str | None:
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
 
 
+def quoted_number(node: ast.AST | None) -> str:
+    """Return the number that a string literal holds, as in `'0.5'`; empty if it holds none."""
+    text = (text_of(node) or "").strip()
+    return text if text.lstrip("+-").replace(".", "", 1).isdigit() else ""
+
+
 def subtree(node: ast.AST) -> Iterator[ast.AST]:
     """Yield a node and everything in it, in no particular order, without the contents of inner classes."""
     waiting = [node]

@@ -83,7 +83,7 @@ _PLACES = ("topic", "service", "node", "process")
 def numberless(text: str) -> str:
     """Return a text without the lines of Python files, if no other number is in it; empty if there is one.
 
-    Digits in the names of message types are no numbers; digits of every script, and words for values, are.
+    Digits in the names of message types are not numbers; digits of every script, and words for values, are.
     """
     text = _LINE.sub(r"\1", text)
     rest = _KEPT.sub("", text)
@@ -241,7 +241,7 @@ def _verdict(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
 
 
 def _without_hidden(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
-    """Return a verdict that names no hidden criterion; a missing file may be named."""
+    """Return a verdict without the names of hidden criteria; a missing file may be named."""
     if shown.get(verdict.blocked_by) is Shows.NOTHING:
         reason = verdict.reason if verdict.missing_file else f"{NOT_JUDGED}needs {_HIDDEN}"
         verdict = replace(verdict, reason=reason, blocked_by="")

@@ -21,7 +21,7 @@ SHEET_SCHEMA = "grader/variant/v1"
 
 
 def render_explanations(found: Sequence[CriterionExplanation | CheckExplanation], *, width: int) -> str:
-    """Return explanations as text, one after the other, no line longer than `width` if words allow it."""
+    """Return explanations as text, one below another, no line longer than `width` if words allow it."""
     parts = [_criterion(e, width) if isinstance(e, CriterionExplanation) else _check(e, width) for e in found]
     return "\n\n".join("\n".join(lines) for lines in parts) + "\n"
 

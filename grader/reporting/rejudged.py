@@ -195,7 +195,7 @@ def render_changes(results: Sequence[RejudgedResult]) -> str:
     changes = dropped_first([r.change for r in judged if r.change is not None])
     compared = [r.change for r in judged if r.change is not None]
     lines = change_summary(compared) if changes else []
-    # Of a single submission everything is told, of a class only what changes a score.
+    # A single submission shows every change, a class only those that change a score.
     told = [change for change in changes if _score_changed(change) or len(judged) == 1]
     lines += [line for change in told for line in _change(change)]
     lines += _same_score([change for change in changes if change not in told])

@@ -19,7 +19,7 @@ from grader.submissions.collected import shown
 
 
 def builtin_recording() -> Path:
-    """Return the recording that the stimulus `odometry` plays, which names none: the folder of that name has it."""
+    """Return the recording that the stimulus `odometry` plays, which is in the folder of that name."""
     rubrics = shipped("rubrics")
     return next(rubrics.glob("*/odometry"), rubrics / "odometry")
 
@@ -41,7 +41,7 @@ def builtin_exercises() -> tuple[Exercise, ...]:
 
 
 def _read_exercises() -> tuple[Exercise, ...]:
-    from grader.rubrics.loader import read_rubric  # noqa: PLC0415 - takes long, and the compiled form needs it not
+    from grader.rubrics.loader import read_rubric  # noqa: PLC0415 - slow to import; the cached form does not need it
 
     return tuple(read_rubric(header.path) for header in builtin_headers())
 

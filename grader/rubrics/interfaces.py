@@ -61,7 +61,7 @@ _SENT: Mapping[type[Stimulus], tuple[str, str]] = {
     ActionGoal: ("goal", "_Goal"),
 }
 _KINDS = {"msg": "message", "srv": "service", "action": "action"}
-#: Values of simulated messages whose types can be told before they are published.
+#: Values of simulated messages whose types are known before they are published.
 _PLAIN = (bool, int, float, str, list, tuple, Mapping)
 _ORDERS = ("any_order", "in_order", "some_of")
 #: Builds the interface packages in some folders, and returns the folders with their type descriptions.
@@ -411,7 +411,7 @@ def _stimuli(rubric: RubricShape) -> Iterator[tuple[TreePath, Stimulus]]:
 
 def _simulated(rubric: RubricShape) -> Iterator[tuple[TreePath, Offered]]:
     for path, simulated in simulated_in(rubric):
-        with suppress(HarnessError):  # told where simulations are tried
+        with suppress(HarnessError):  # reported where simulations are tried
             yield path, offered(simulated)
 
 

@@ -191,7 +191,7 @@ def _in_criterion(criterion: CriterionShape, index: int, rubric: RubricShape, tr
 
 
 def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
-    """Yield the needs that name no earlier criterion; this rule prevents cycles."""
+    """Yield the needs that are not earlier criteria; this rule prevents cycles."""
     path: TreePath = ("criteria", index, "needs")
     earlier = [other.id for other in rubric.criteria[:index]]
     yield from _repeated(criterion.needs, path, tree)

@@ -1,4 +1,4 @@
-"""Tries the simulations of a rubric when it is read: an author's mistake is told before a student's file runs."""
+"""Tries the simulations of a rubric when it is read: an author learns of a mistake before a student's file runs."""
 
 from __future__ import annotations
 
@@ -100,6 +100,6 @@ def simulation_mistakes(rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake
 
 
 def _names_of_others(scenario: ScenarioShape) -> set[str]:
-    """Return the topics and services of the stimuli that are no simulations."""
+    """Return the topics and services of the stimuli that are not simulations."""
     stimuli = [build(shape) for shape in scenario.stimuli]
     return {getattr(s, key) for s in stimuli for key in ("topic", "service") if hasattr(s, key)}

@@ -1,4 +1,4 @@
-"""Simulated robots that drive as they are told: one with two wheels that publishes odometry, and a turtle."""
+"""Simulated robots that drive as commanded: one with two wheels that publishes odometry, and a turtle."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 """Runs inside a student's process, next to the student's file; imports rclpy and the standard library, but not grader.
 
-The host knows no rubric, no points and no expected values. It gives the student's unmodified file a clock that the
+The host does not know the rubric, points or expected values. It gives the student's unmodified file a clock that the
 grader controls: whenever every thread of the process would block, it reports this and waits for the grader's answer.
 """

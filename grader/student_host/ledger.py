@@ -372,14 +372,14 @@ class Ledger:
         return missing
 
     def await_events(self, refused: dict[str, list[int]], wait_s: float) -> list[str]:
-        """Wait, in real time, until the middleware has told of all counterparts, and let the program know.
+        """Wait, in real time, until the middleware has reported all counterparts, and let the program know.
 
         Args:
             refused: What `await_matches` was given under this name.
             wait_s: Time-out in seconds.
 
         Returns:
-            The names of the endpoints of which it has not told everything.
+            The names of the endpoints whose counterparts it has not all reported.
         """
         most = {int(number): counts[0] for number, counts in refused.items()}
         told = originals.wait_until(lambda: not self._untold(most), wait_s)

@@ -36,7 +36,7 @@ def install_alarms(give_up: Callable[[], None]) -> None:
 def install_processes(give_up: Callable[[], None]) -> None:
     """Call `give_up` before the program starts another process or replaces itself by one.
 
-    `multiprocessing` starts processes by a function that tells no audit hook, unless it forks.
+    `multiprocessing` starts processes by a function that does not call audit hooks, unless it forks.
     """
     import _posixsubprocess
 

@@ -30,7 +30,7 @@ def rename_functions() -> None:
 
 
 def guard_methods(modules: Iterable[str]) -> None:
-    """Give each method of this package its name, and call the original one for what is no instance of its class.
+    """Give each method of this package its name, and call the original one for objects of other classes.
 
     A program that calls `Node.__init__("talker")` gets the message of Python for it.
 

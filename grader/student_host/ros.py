@@ -155,7 +155,7 @@ class RosClocks:
     def watch_jumps(
         self, clock: Clock, threshold: JumpThreshold, *, pre_callback: Any = None, post_callback: Any = None
     ) -> JumpHandle:
-        """Replace `Clock.create_jump_callback`: that virtual time goes on is no jump."""
+        """Replace `Clock.create_jump_callback`: advancing virtual time is not a jump."""
 
         def told(callback: Any) -> Any:
             def call(*jump: Any) -> None:

@@ -253,7 +253,7 @@ def _is_watched(node: Any, publisher: Any) -> bool:
 
     try:
         with publisher.handle:
-            if not publisher.handle.get_subscription_count():  # unlike the program's own question, this is no wait
+            if not publisher.handle.get_subscription_count():  # unlike the program's own question, this does not wait
                 return False
         known = Node.get_subscriptions_info_by_topic(node, publisher.topic_name) if node is not None else []
     except (_rclpy.InvalidHandle, _rclpy.RCLError):

@@ -91,7 +91,7 @@ def foreign_members(  # noqa: PLR0913  four limits
 def _has_end(data: bytes, *, is_old: bool) -> bool:
     """Return whether the blocks of a rar lead to the block that ends it, or to encrypted ones.
 
-    Raises UnusableArchiveError for a file that is stored as a reference to another one: of those that are no links,
+    Raises UnusableArchiveError for a file that is stored as a reference to another one: for those that are not links,
     libarchive makes empty files.
 
     See "RAR 5.0 archive format" by its author, and technote.txt of older versions.

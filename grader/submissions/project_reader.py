@@ -31,7 +31,7 @@ from grader.execution.confinement import confine
 from grader.submissions.cmake_files import Contents, contents_of
 from grader.submissions.setup_files import LimitError, given_to_setup
 
-#: Why a file was not read: it is no valid text of its format, or reading it would take too much.
+#: Why a file was not read: it is not valid in its format, or reading it would take too much.
 INVALID, TOO_COSTLY = "invalid", "too costly"
 PROBLEMS = (INVALID, TOO_COSTLY)
 CMAKE = "CMakeLists.txt"

@@ -152,7 +152,7 @@ def _answers(asked: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _checked(answer: Mapping[str, Any], place: str, folder_name: str) -> tuple[Project, list[tuple[str, str]]]:
-    """Return a package as told by the process, with every name checked, and its problems as file and code."""
+    """Return a package as the process reported it, with every name checked, and its problems as file and code."""
     told = [
         (file, problem)
         for file, problem in _pairs(answer.get("problems"))
@@ -175,7 +175,7 @@ _START_BYTES, MOST_PROGRAMS = 256, 500
 
 
 def _with_programs(project: Project, answer: Mapping[str, Any], folder: Path) -> Project:
-    """Return a package with the programs that are installed as they are, as told by the process, each checked."""
+    """Return a package with the programs that are installed as they are, as the process reported them, each checked."""
     rows = answer.get("programs")
     found: dict[str, dict[str, str]] = {"programs": {}, "unrunnable": {}}
     foreign = [name for name in _strings(answer.get("built")) if _SCRIPT.fullmatch(name)]

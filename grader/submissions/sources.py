@@ -18,7 +18,7 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-#: Reported for a file that is too long to be examined, and for one that is no text, or in an unusual encoding.
+#: Reported for a file that is too long to be examined, and for one that is not text, or in an unusual encoding.
 LONG, UNREADABLE = "a very long file", "a file that cannot be read as text"
 #: Modules that show or change the internals of a process, or start others.
 _MODULES = _words(
@@ -235,7 +235,7 @@ def _timing(source: Source) -> Iterator[str]:
             yield "a loop that counts"
 
 
-#: Operators after which a time is no date any more: a difference, or what is left over.
+#: Operators after which a time is not a date any more: a difference or a remainder.
 _LESS = (ast.Sub, ast.Mod, ast.BitAnd)
 
 

@@ -30,7 +30,7 @@ MAX_SIMILAR = 3
 
 #: Other Python files shown for a missing one, and the likeness of names from which one of them is probably meant.
 MAX_CANDIDATES, LIKELY = 12, 0.6
-#: Files of packages, which are no nodes.
+#: Files of packages that are not nodes.
 _NO_NODES = ("__init__.py", "setup.py", "conftest.py")
 
 _EXPECTED = "a folder, a .py file or an archive"

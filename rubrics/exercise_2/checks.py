@@ -1,7 +1,7 @@
 """The checks of exercise 2: positions that a process logs while odometry is played, and how often it logs them.
 
 A log shows a position with any wording: the texts are grouped by their wording, and in each group the two numbers are
-chosen that agree most often with the x and y that were current. What the texts show instead is told apart at the end.
+chosen that agree most often with the x and y that were current. The last part finds what the texts show instead.
 """
 
 from __future__ import annotations

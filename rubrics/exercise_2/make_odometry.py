@@ -13,7 +13,7 @@ and each step of length h is integrated with the heading at its middle:
 
 It laps a circle right of the origin, crosses over above it, laps a circle on the left, and comes back below: all four
 quadrants, both signs of x and of y, and nearly nowhere |x| close to |y|, so that a log that swaps the two or drops a
-sign is told from a right one at any instant. The wheel commands are piecewise constant, then averaged over 0.8 s as a
+sign differs from a right one at any instant. The wheel commands are piecewise constant, then averaged over 0.8 s as a
 drive with limited acceleration would have it. What is published carries white noise of a few millimetres.
 
 Messages come at 26.8 Hz on average, on purpose not at a rate of which some round divisor is 1 s. Every number is drawn

@@ -302,8 +302,14 @@ class ThresholdResponse:
 
 
 def _deaf(subscriptions: Sequence[Endpoint]) -> str:
-    latched = all(e.durability == "transient_local" for e in subscriptions)
-    return " with transient_local durability, which a volatile publisher does not offer" if latched else ""
+    """Return what keeps subscriptions from hearing an ordinary publisher; empty if nothing does, or of one only."""
+    if all(e.durability == "transient_local" for e in subscriptions):
+        return " with transient_local durability, which a volatile publisher does not offer"
+    usual = Endpoint("publisher", "", "", "", -1, "reliable", "volatile")
+    policies = [unmet_policy(usual, end) for end in subscriptions]
+    if policies and policies[0] is not None and None not in policies:
+        return f" and requests {policies[0][1]} where an ordinary publisher offers {policies[0][0]}"
+    return ""
 
 
 def _answers_at_once(sent: Sequence[Reading], trace: Trace, answers: Sequence[Reading]) -> bool:
@@ -362,8 +368,8 @@ class AnswersTogether:
     If the sensor subscribes to the answers, types and QoS must be compatible.
 
     The controller may answer each input, publish only on change, or publish on a timer of up to a second. If inputs are
-    on both sides of the threshold, both answers must occur. Inputs that never change, or that are drawn again and again
-    from one side only, prove nothing; inputs that change too slowly to reach the other side are accepted.
+    on both sides of the threshold, both answers must occur. Inputs that never change, or that are only
+    drawn from one side, prove nothing; inputs that change too slowly to reach the other side are accepted.
 
     If answers are rare, as from a timer of a second, a slightly wrong limit may go unnoticed: `threshold_response`
     judges the limit itself.

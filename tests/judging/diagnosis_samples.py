@@ -137,12 +137,12 @@ def printing(text: str = "sent", stream: str = "stdout") -> Recording:
     return velocity().line(0.05, text, stream, process="velocity_publisher.py")
 
 
-def hearing(topic: str = "/odom", type_: str = ODOMETRY, durability: str = "volatile") -> Recording:
-    """A node that subscribes and publishes nothing."""
+def hearing(topic: str = "/odom", type_: str = ODOMETRY, durability: str = "volatile", **policies: Any) -> Recording:
+    """A node that subscribes and publishes nothing; `policies` are further ones of its subscription."""
     rec = driving()
     rec.items = [o for o in rec.items if not hasattr(o, "endpoints")]
     rec.ends = []
-    return rec.endpoint("subscription", topic, type_, "/odom_subscriber", durability=durability)
+    return rec.endpoint("subscription", topic, type_, "/odom_subscriber", durability=durability, **policies)
 
 
 _WRITTEN: dict[str, Callable[[float, float], str]] = {
@@ -301,12 +301,12 @@ def mute(hears: str = "/temperature") -> Recording:
     return rec.endpoint("subscription", hears, FLOAT32, "/fan_controller")
 
 
-def apart(reliability: str = "reliable", type_: str = FLOAT32) -> Recording:
-    """Both processes, of which the controller cannot hear the sensor."""
+def apart(reliability: str = "reliable", type_: str = FLOAT32, **policies: Any) -> Recording:
+    """Both processes, of which the controller cannot hear the sensor; `policies` are those of its subscription."""
     rec = Recording(20.2, process="temperature_sensor.py")
     rec.endpoint("publisher", "/temperature", FLOAT32, "/temperature_sensor", 1, reliability)
     rec.endpoint("subscription", "/fan_speed", FLOAT32, "/temperature_sensor", 1)
-    rec.endpoint("subscription", "/temperature", type_, "/fan_controller", 2)
+    rec.endpoint("subscription", "/temperature", type_, "/fan_controller", 2, **policies)
     rec.endpoint("publisher", "/fan_speed", FLOAT32, "/fan_controller", 2)
     rng = random.Random(5)
     for k in range(100):
@@ -363,6 +363,15 @@ def asking_once() -> Recording:
     return rec.request(7.0, BATTERY, 1, "student").response(7.05, BATTERY, 1, answer, "grader")
 
 
+def unanswered(**policies: Any) -> Recording:
+    """A client that waits for the server and never reaches it; `policies` are those of its QoS."""
+    rec = Recording(40.0, process="battery_service_client.py")
+    rec.service("client", BATTERY, TRIGGER, "/mission", **policies).mark(7.0, "server_starts", BATTERY)
+    for second in range(1, 40):
+        rec.log(second, "waiting for the battery server ...")
+    return rec
+
+
 def misnamed() -> Recording:
     """Both processes, of which the controller answers on another topic."""
     rec = Recording(20.2, process="temperature_sensor.py")
@@ -400,5 +409,6 @@ RECORDINGS: dict[str, tuple[str, Callable[..., Recording]]] = {
     "answering_once": ("controller_alone", answering_once),
     "swinging": ("alone", swinging),
     "asking_once": ("client_waits", asking_once),
+    "unanswered": ("client_waits", unanswered),
     "greeting": ("defaults", greeting),
 }

@@ -9,7 +9,7 @@ import pytest
 from tracing import FLOAT32, FLOAT64, Recording
 
 from grader.core.errors import HarnessError
-from grader.core.exercise import Location
+from grader.core.exercise import Location, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.core.trace import FaultKind
 from grader.judging.checks.graph import BidirectionalGraph, GraphEdge, GraphEdges, NodeName, Qos, TopicNames
@@ -107,10 +107,10 @@ def test_topics_by_name(check: TopicNames, credit: int, said: str) -> None:
 @pytest.mark.parametrize(
     ("check", "credit", "said"),
     [
-        (GraphEdges((GraphEdge("/a"),)), 1, "t = 1.000 s: a node ─/a→ a node"),
+        (GraphEdges((GraphEdge("/a"),)), 1, "t = 1.000 s: /talker ─/a→ /listener"),
         (GraphEdges((GraphEdge("/a", "/talker", "/listener"),), between_processes=True), 1, "/talker ─/a→ /listener"),
-        (GraphEdges((GraphEdge("/a", "/listener"),)), 0, "/talker publishes std_msgs/msg/Float32, /listener subscr"),
-        (GraphEdges((GraphEdge("/a"), GraphEdge("/b"))), 0, "no edge a node ─/b→ a node; nothing publishes /b"),
+        (GraphEdges((GraphEdge("/a", "/listener"),)), 0, "no edge /listener ─/a→ a node, found /talker ─/a→ /listener"),
+        (GraphEdges((GraphEdge("/a"), GraphEdge("/b"))), 0, "/b: nothing publishes it and nothing subscribes to it"),
     ],
 )
 def test_edges_of_the_graph(check: GraphEdges, credit: int, said: str) -> None:
@@ -130,8 +130,29 @@ def test_an_edge_needs_one_type_and_perhaps_two_processes_and_one_moment() -> No
     rec.snapshot(0.0, [e for e in ends if e.topic == "/a"]).snapshot(1.0, [e for e in ends if e.topic == "/b"])
     both = (GraphEdge("/a"), GraphEdge("/b"))
     assert GraphEdges(both).judge(rec.trace()).credit == 1
-    assert "never all of them at once" in GraphEdges(both, at_once=True).judge(rec.trace()).reason
+    apart = GraphEdges(both, at_once=True).judge(rec.trace())
+    assert apart.reason == "/a and /b: every edge is there, but not at once"
+    assert apart.evidence["edges"] == ["a node ─/a→ a node", "a node ─/b→ a node"]
+    assert apart.evidence["found"] == [["/talker", "/a", "/listener"], ["/node", "/b", "/node"]]
     assert FAULT_KEY in GraphEdges(both).judge(Recording().crashed(0.0).trace()).evidence
+
+
+def test_every_missing_edge_is_explained_by_its_ends() -> None:
+    """The node that has one end, what differs, and what to do; a process that talks to itself is no other node."""
+    rec = Recording().endpoint("publisher", "/a", node="/talker").endpoint("subscription", "/b", node="/listener")
+    finding = GraphEdges((GraphEdge("/a"), GraphEdge("/b"))).judge(rec.trace())
+    assert "/a: /talker publishes it, nothing subscribes to it; /b: /listener subscribes to it" in finding.reason
+    assert finding.hint == "subscribe to /a in a node"
+    apart = GraphEdges((GraphEdge("/a"), GraphEdge("/b")), between_processes=True).judge(rec.trace())
+    assert apart.hint == "subscribe to /a in the other node"
+    assert GraphEdges((GraphEdge("/a", "/talker", "/ear"),)).judge(rec.trace()).hint == "subscribe to /a in /ear"
+    assert finding.problem == Problem(ProblemKind.NO_EDGE, ("/a", "/b"))
+    typed = GraphEdges((GraphEdge("/a"),)).judge(with_end(type=FLOAT64).trace())
+    assert "use the same message type for /a" in typed.hint
+    itself = Recording().endpoint("publisher", "/a", node="/x").endpoint("subscription", "/a", node="/y")
+    for edge in (GraphEdge("/a"), GraphEdge("/a", "/x", "/y")):
+        said = GraphEdges((edge,), between_processes=True).judge(itself.trace()).reason
+        assert said == "/a: its publisher and its subscription are in one process or not there at the same time"
 
 
 def test_a_missing_edge_is_explained_by_the_name_in_a_file() -> None:

@@ -13,6 +13,7 @@ from tracing import Recording
 from grader.core.quantities import NS_PER_S
 from grader.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone
 from grader.judging.checks.logs import LogsMatching
+from grader.judging.checks.topics import FieldValues
 from grader.judging.findings import FAULT_KEY
 from grader.judging.values import FieldRule
 
@@ -33,15 +34,20 @@ EQUAL = FieldEqual(
 @pytest.mark.parametrize(
     ("change", "credit", "said"),
     [
-        ({}, 1, "/a: header.frame_id 'map', ok true, pose.x 1, pose.list [1, 2]"),
+        ({}, 1, "/a: header.frame_id = 'map', ok = true, pose.x = 1, pose.list = [1, 2], pose.list.1 = 2"),
         ({"header": {"frame_id": "odom"}}, 0, "t = 1.300 s, /a: header.frame_id is 'odom', expected 'map'; wrong in 1"),
         ({"ok": False}, 0, "ok is false, expected true"),
         ({"ok": 1}, 0, "ok is 1, expected true"),
         ({"pose": {"x": 1.0 + 5e-7, "list": [1, 2]}}, 1, ""),
         ({"pose": {"x": math.nan, "list": [1, 2]}}, 0, "pose.x is nan, expected 1"),
-        ({"pose": {"x": 1, "list": [2, 1]}}, 0, "pose.list is [2, 1], expected [1, 2]"),
+        (
+            {"pose": {"x": 1, "list": [2, 1]}},
+            0,
+            "pose.list is [2, 1], pose.list.1 is 1, expected [1, 2], 2; wrong",
+        ),
         ({"pose": {"x": 1, "list": [1]}}, 0, "pose.list is [1], expected [1, 2]"),
-        ({"header": 3}, 0, "there is no field header.frame_id"),
+        ({"header": 3}, 0, "/a: std_msgs/msg/Float32 has no field header.frame_id"),
+        ({"ok": "yes"}, 0, "ok is 'yes', expected true"),
     ],
 )
 def test_fields_of_every_kind_are_compared(change: dict[str, Any], credit: int, said: str) -> None:
@@ -49,6 +55,26 @@ def test_fields_of_every_kind_are_compared(change: dict[str, Any], credit: int, 
     finding = EQUAL.judge(sending([STAMPED, STAMPED, STAMPED, {**STAMPED, **change}]).trace())
     assert finding.credit == credit, finding.reason
     assert said in finding.reason
+
+
+def test_what_was_expected_and_found_is_in_the_evidence() -> None:
+    """By either name of the check: what is expected, a range as a text, and the wrong numbers that were found."""
+    check = FieldEqual("/a", {"ok": True, "pose.x": FieldRule(low=0, high=1), "header.frame_id": "map"})
+    wrong = {**STAMPED, "pose": {"x": 3}, "header": {"frame_id": "m" * 999}}
+    found = check.judge(sending([STAMPED, wrong, wrong]).trace()).evidence
+    assert found["values"] == {"ok": True, "pose.x": "0 to 1", "header.frame_id": "map"}
+    assert (found["messages"], found["wrong"], found["field"], found["found"]) == (3, 2, "pose.x", {"pose.x": 3.0})
+    numbers = FieldValues("/a", {"ok": 1, "pose.x": 1}).judge(sending([wrong]).trace()).evidence
+    assert (numbers["values"], numbers["field"], numbers["found"]) == ({"ok": 1, "pose.x": 1}, "ok", {"pose.x": 3.0})
+
+
+@pytest.mark.parametrize(("values", "where"), [([2], "the only message"), ([2, 3], "all 2 messages")])
+def test_it_says_if_every_message_is_wrong(values: list[int], where: str) -> None:
+    """By either name of the check."""
+    for check in (FieldEqual("/a", {"data": 1}), FieldValues("/a", {"data": 1})):
+        finding = check.judge(sending(values).trace())
+        assert finding.reason == f"t = 1.000 s, /a: data is 2, expected 1; wrong in {where}"
+        assert finding.brief == "/a: data is 2, expected 1"
 
 
 @pytest.mark.parametrize(

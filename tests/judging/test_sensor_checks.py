@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from fractions import Fraction
+from typing import Any
 
 import pytest
 from nodes import SPEEDS, drawn, hearing, sensed
@@ -12,6 +13,7 @@ from tracing import Recording, held_at, scripted
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Problem, ProblemKind
+from grader.core.quantities import NS_PER_S
 from grader.judging.checks.fields import RandomInRange
 from grader.judging.checks.received import LogsReceived
 
@@ -166,10 +168,19 @@ def test_no_subscription_is_the_reason() -> None:
     assert "subscribes to /fanspeed" in LOGS.judge(rec.trace()).reason
 
 
-def test_a_latched_subscription_is_the_reason() -> None:
-    """The policy is named."""
-    rec = scripted(SPEEDS, "/fan_speed", 12.2).endpoint("subscription", "/fan_speed", durability="transient_local")
-    assert "transient_local" in LOGS.judge(rec.trace()).reason
+@pytest.mark.parametrize(
+    ("policies", "said"),
+    [
+        ({"durability": "transient_local"}, "asks for transient_local durability, which a volatile publisher does not"),
+        ({"deadline_ns": NS_PER_S}, "asks for a deadline of 1 s, which a publisher without one does not offer"),
+        ({"liveliness": "manual_by_topic"}, "asks for manual_by_topic liveliness, which a publisher with automatic"),
+        ({"lease_ns": NS_PER_S}, "asks for a liveliness lease of 1 s, which a publisher without one does not offer"),
+    ],
+)
+def test_a_subscription_that_asks_for_too_much_is_the_reason(policies: dict[str, Any], said: str) -> None:
+    """Whatever the policy is that an ordinary publisher does not offer."""
+    rec = scripted(SPEEDS, "/fan_speed", 12.2).endpoint("subscription", "/fan_speed", **policies)
+    assert said in LOGS.judge(rec.trace()).reason
 
 
 def test_a_subscription_to_text_is_the_reason() -> None:

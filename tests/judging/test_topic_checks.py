@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tracing import FLOAT32, ODOMETRY, TWIST, Recording, twist, velocity
 
+from grader.core.quantities import NS_PER_S
 from grader.core.trace import FaultKind
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
 
@@ -97,6 +98,13 @@ def test_a_wrong_field_is_named_with_its_likely_slip(check: FieldValues, value: 
     assert "in all 200 messages" in finding.reason
 
 
+@pytest.mark.parametrize(("field", "hint"), [("linear.x", "linear.x is in m/s; 36 looks like km/h"), ("data", "")])
+def test_only_a_velocity_has_the_unit_of_one(field: str, hint: str) -> None:
+    """A number that is 3.6 times the expected one is km/h only in a field of a velocity."""
+    content = twist((36.0, 0, 0)) if field == "linear.x" else {"data": 36.0}
+    assert FieldValues("/a", {field: 10}).judge(Recording().message(1.0, "/a", content, TWIST).trace()).hint == hint
+
+
 def test_the_first_wrong_message_is_named() -> None:
     """One wrong message among many is enough, and the reason has its time."""
     rec = velocity().message(4.02, "/cmd_vel", twist((0, 0, 0)), TWIST)
@@ -116,7 +124,10 @@ def test_a_message_without_the_field_earns_nothing() -> None:
 def test_only_numbers_are_numbers(value: Any) -> None:
     """A string, a bool or a list in a field is not a number."""
     message = {"linear": {"x": value, "y": 0.0, "z": 0.0}}
-    assert LINEAR.judge(Recording().message(1.0, "/cmd_vel", message, TWIST).trace()).credit == 0
+    finding = LINEAR.judge(Recording().message(1.0, "/cmd_vel", message, TWIST).trace())
+    assert finding.credit == 0
+    said = ", expected 0.5; wrong in the only message" if value is not None else "Twist has no field linear.x"
+    assert finding.reason.endswith(said)
 
 
 def test_values_nobody_published_are_explained() -> None:
@@ -145,6 +156,23 @@ def test_subscriptions_of_either_reliability_are_met(reliability: str) -> None:
     """A reliable publisher reaches both."""
     rec = Recording().endpoint("subscription", "/odom", ODOMETRY, reliability=reliability)
     assert SUBSCRIBES.judge(rec.trace()).credit == 1
+
+
+@pytest.mark.parametrize(
+    ("policies", "asks", "default"),
+    [
+        ({"durability": "transient_local"}, "transient_local durability, which a volatile publisher", "durability"),
+        ({"deadline_ns": NS_PER_S // 2}, "a deadline of 0.5 s, which a publisher without one", "deadline"),
+        ({"liveliness": "manual_by_topic"}, "manual_by_topic liveliness, which a publisher with auto", "liveliness"),
+        ({"lease_ns": NS_PER_S}, "a liveliness lease of 1 s, which a publisher", "liveliness lease duration"),
+    ],
+)
+def test_the_policy_that_keeps_messages_away_is_named(policies: dict[str, Any], asks: str, default: str) -> None:
+    """Each that an ordinary publisher does not offer, in the reason and in the hint."""
+    finding = SUBSCRIBES.judge(Recording().endpoint("subscription", "/odom", ODOMETRY, **policies).trace())
+    assert finding.credit == 0
+    assert f"the subscription of /node asks for {asks}" in finding.reason
+    assert finding.hint == f"subscribe with the default {default}: pass the queue depth 10 as QoS"
 
 
 def test_a_transient_local_subscription_hears_nothing() -> None:

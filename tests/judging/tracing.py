@@ -107,9 +107,10 @@ class Recording:
         reliability: str = "reliable",
         durability: str = "volatile",
         t_s: float = 0.0,
+        **policies: Any,
     ) -> Recording:
-        """Add an endpoint and the snapshot that shows it."""
-        self.ends.append(Endpoint(kind, topic, type_, node, participant, reliability, durability, 10))
+        """Add an endpoint and the snapshot that shows it; `policies` are further ones, such as `deadline_ns`."""
+        self.ends.append(Endpoint(kind, topic, type_, node, participant, reliability, durability, 10, **policies))
         return self.snapshot(t_s, self.ends)
 
     def snapshot(self, t_s: float, ends: Sequence[Endpoint]) -> Recording:
@@ -117,10 +118,10 @@ class Recording:
         return self.add(GraphSnapshot(nanoseconds(t_s), nodes, tuple(ends), tuple(self.services)))
 
     def service(
-        self, kind: str, service: str, type_: str = TRIGGER, node: str = "/node", t_s: float = 0.0
+        self, kind: str, service: str, type_: str = TRIGGER, node: str = "/node", t_s: float = 0.0, **policies: str
     ) -> Recording:
-        """Add a server or a client to the graph, and the snapshot that shows it."""
-        self.services.append(ServiceEnd(kind, service, type_, node))
+        """Add a server or a client to the graph, and the snapshot that shows it; `policies` are those of its QoS."""
+        self.services.append(ServiceEnd(kind, service, type_, node, **policies))
         return self.snapshot(t_s, self.ends)
 
     def request(

@@ -137,7 +137,7 @@ def test_a_missing_file_is_told_by_its_name() -> None:
 def test_values_may_be_anything() -> None:
     """A report of somebody else's making, or an older one, is grouped too."""
     evidence: list[Any] = [None, [], "x", {"diagnosis": 3, "missing": [], "fault": "f"}]
-    assert {kind_of(criterion(evidence=one)).label for one in evidence} == {"as measured"}
+    assert {kind_of(criterion(evidence=one)).label for one in evidence} == {"cause unknown"}
     problems: list[Any] = [None, "x", {"kind": 3, "topics": 4}, {"kind": "late", "topics": [None]}, {"topics": []}]
     assert all(isinstance(kind_of(criterion(problem=one)).label, str) for one in problems)
     fault = {"kind": "exception", "text": "ValueError: 3"}

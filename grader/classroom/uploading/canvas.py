@@ -34,7 +34,7 @@ class Canvas:
     def __init__(self, url: str, token: str, course: int, assignment: int) -> None:
         """Look up course and assignment; raises PlatformError if the token or one of them cannot be used."""
         requester = Requester(url, token)
-        for scheme in ("https://", "http://"):  # the library itself waits for ever
+        for scheme in ("https://", "http://"):  # the library itself waits forever
             requester._session.mount(scheme, Patient())  # noqa: SLF001
         self._url = url
         self._course = self._found(f"course {course}", lambda: Course(requester, _json(requester, f"courses/{course}")))

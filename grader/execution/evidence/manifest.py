@@ -183,7 +183,7 @@ def dump(manifest: Manifest) -> bytes:
 
 
 def parse(data: bytes) -> Manifest:
-    """Parse a manifest; raises EvidenceError if the text is none, or has another version."""
+    """Parse a manifest; raises EvidenceError if it is invalid, or has another version."""
     try:
         found = json.loads(data)
         version = found.get("format") if isinstance(found, dict) else None

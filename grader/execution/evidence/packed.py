@@ -312,7 +312,7 @@ def pack(trace: Trace, there: Sequence[bool]) -> bytes:
 
 
 def unpack(data: bytes) -> Trace:
-    """Unpack a trace without the bytes of messages, which judging does not read; raises EvidenceError if it is none."""
+    """Unpack a trace without the bytes of messages, which judging does not read; raises EvidenceError if invalid."""
     if not data.isascii():
         return unpack_exactly(data, None)  # `pack` writes ASCII, and only of that the quick way checks every byte
     try:
@@ -328,7 +328,7 @@ def unpack(data: bytes) -> Trace:
 
 
 def unpack_exactly(data: bytes, cdrs: Sequence[bytes] | None) -> Trace:
-    """Unpack a trace; raises EvidenceError if it is none, or does not match the recording.
+    """Unpack a trace; raises EvidenceError if it is invalid, or does not match the recording.
 
     The bytes of the recording's messages are given one for each observation; None leaves them out.
     """

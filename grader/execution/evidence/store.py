@@ -47,7 +47,7 @@ class Evidence:
 def check_place(folder: Path) -> None:
     """Check, before anything is run, that evidence can be written to a folder.
 
-    Raises EvidenceError if it is no folder, or has files of the same names that the grader did not write.
+    Raises EvidenceError if it is not a folder, or has files of the same names that the grader did not write.
     """
     if folder.exists() and not folder.is_dir():
         raise EvidenceError(f"{folder}: expected a folder for the evidence, found a file", "name another folder")

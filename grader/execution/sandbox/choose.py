@@ -44,7 +44,7 @@ def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str]
 
     Wanted is `auto` for the strongest tier that has all required properties, `none` for no sandbox, `own-programs` for
     a network of their own where that is possible, or the name of a tier, which must have the properties that it
-    promises. When a sandbox is tested, `progress` is told why.
+    promises. When a sandbox is tested, `progress` gets the reason.
     """
     if wanted == NO_SANDBOX:
         return TierChoice(isolation_from_name(wanted))
@@ -102,7 +102,7 @@ def inspect_tier(
 ) -> TierReport:
     """Return the report on one tier, from the last self-test if nothing relevant has changed since.
 
-    When the tier is tested, `progress` is told why; `afresh` tests it in any case.
+    When the tier is tested, `progress` gets the reason; `afresh` tests it in any case.
     """
     try:
         isolation = isolation_from_name(name)

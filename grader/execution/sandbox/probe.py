@@ -221,7 +221,7 @@ def raises(which: int) -> bool:
 
 def hoards(request: dict[str, Any]) -> Iterator[str]:
     """Map more memory than the limit allows."""
-    private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | 0x4000  # MAP_NORESERVE: a small machine's refusal is no limit
+    private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | 0x4000  # MAP_NORESERVE: a small machine may refuse
     if raises(resource.RLIMIT_AS) or works(mmap.mmap, -1, request["memory"], private):
         yield f"mapped {request['memory'] >> 20} MiB"
 

@@ -17,7 +17,7 @@ def execute(argv: Sequence[str], told: Mapping[str, Any], environment: Mapping[s
 
     Args:
         argv: The command.
-        told: What it is told in its last argument, besides the number of its socket.
+        told: Content of its last argument, besides the number of its socket.
         environment: Its complete environment.
     """
     line, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)

@@ -32,7 +32,7 @@ _LONGEST = 2**20
 
 
 class MalformedMessageError(ValueError):
-    """Received bytes are no message of the type."""
+    """Received bytes are not a message of the type."""
 
 
 @dataclass(frozen=True)
@@ -252,7 +252,7 @@ def _boolean(value: int) -> bool:
 
 
 class _Run:
-    """Primitives one after the other, packed by one struct for each offset modulo 8 that they may begin at."""
+    """Consecutive primitives, packed by one struct for each offset modulo 8 that they may begin at."""
 
     def __init__(self) -> None:
         self.codes: list[str] = []

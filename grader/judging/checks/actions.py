@@ -6,12 +6,12 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from grader.core.chart import Look, Panel, Tone
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import DurationNs, FieldOf, counted, seconds
 from grader.core.trace import Message, Trace
 from grader.judging.charts import Lanes, drawn_case, series
@@ -282,6 +282,7 @@ class LifecycleStates:
         node: Fully qualified name of the node; the one that the stimuli address if left out.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     states: tuple[str, ...] = ()
     topic: str | None = None
     node: str | None = None

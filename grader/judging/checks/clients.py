@@ -209,7 +209,8 @@ class WaitsForService:
         there = f"{self.service} appeared at {moment(appears_ns)}"
         if crashed := explain_fault(trace, f"{there}, no request was sent", process=self.process):
             return crashed
-        if not trace.requests(self.service, "student") and not trace.service_ends("client", self.service):
+        usual = [e for e in trace.service_ends("client", self.service) if not e.unusual]
+        if not trace.requests(self.service, "student") and not usual:
             return waiting_for("service_calls", explain_no_client(trace, self.service))
         when = f"the first request was sent at {moment(asked[0])}" if asked else "no request was sent"
         if not asked and trace.stop_ns - appears_ns <= self.within:

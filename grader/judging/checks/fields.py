@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from grader.core.chart import Band
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.exercise import Finding, Problem, ProblemKind, Roles
 from grader.core.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern, counted, seconds, within
 from grader.core.trace import Delivery, Fault, Message, Trace
 from grader.judging.facts import DrawFacts, SeriesFacts
@@ -27,12 +27,11 @@ from grader.judging.values import (
     RuleOrValue,
     as_number,
     as_rule,
-    breach,
     broken_rules,
     number_at,
     published,
     published_numbers,
-    rules_text,
+    shown,
     text_at,
     value_at,
 )
@@ -45,8 +44,77 @@ _EXTREMES: tuple[tuple[str, Callable[[Sequence[float]], float], str], ...] = (
 )
 
 
+class EqualFields:
+    """A check whether fields hold what is expected in every message on a topic."""
+
+    __slots__ = ()
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
+    topic: str
+    after_discovery: bool
+
+    @property
+    def at_least(self) -> int:
+        """Number of messages needed for a judgement."""
+        return 1
+
+    @property
+    def rules(self) -> dict[str, FieldRule]:
+        """What is expected by field path."""
+        raise NotImplementedError
+
+    @property
+    def _wanted(self) -> str:
+        exact = {p: "= " if r.equals is not None or r.items is not None else "" for p, r in self.rules.items()}
+        return ", ".join(f"{path} {exact[path]}{rule.wanted}" for path, rule in self.rules.items())
+
+    @property
+    def expected(self) -> str:
+        return f"{self._wanted} in every message on {self.topic}"
+
+    def judge(self, trace: Trace) -> Finding:
+        messages = published(trace, self.topic, self.after_discovery)
+        if len(messages) < max(1, self.at_least):
+            return too_few_messages(trace, self.topic, len(messages), self.at_least)
+        rules = self.rules
+        # most messages equal the one before, which is faster to see than to judge; but True equals 1
+        equal_counts = not any(isinstance(rule.equals, bool) or rule.items for rule in rules.values())
+        wrong: list[tuple[Message, list[str]]] = []
+        paths: list[str] = []
+        before: tuple[str, Mapping[str, object]] | None = None
+        for message in messages:
+            if not equal_counts or (message.type, message.value) != before:
+                paths, before = broken_rules(message.value, rules), (message.type, message.value)
+            if paths:
+                wrong.append((message, paths))
+        values = {path: rule.wanted if rule.equals is None else rule.equals for path, rule in rules.items()}
+        evidence = {"topic": self.topic, "values": values, "messages": len(messages), "wrong": len(wrong)}
+        if not wrong:
+            return met(f"{self.topic}: {self._wanted} in {counted(len(messages), 'message')}", evidence)
+        first, paths = wrong[0]
+        got = {path: value for path in paths if (value := value_at(first.value, path)) is not None}
+        told = {path: read for path, value in got.items() if (read := as_number(value)) is not None}
+        evidence |= {"first_wrong_s": seconds(first.t_ns), "found": told, "field": paths[0]}
+        if paths[0] not in got:
+            reason = f"{moment(first.t_ns)}, {self.topic}: {quote(first.type)} has no field {paths[0]}"
+            return not_met(reason, evidence, problem=ProblemKind.NO_FIELD)
+        found = ", ".join(f"{path} is {shown(value)}" for path, value in got.items())
+        brief = f"{self.topic}: {found}, expected {', '.join(rules[path].wanted for path in got)}"
+        share = "all" if len(wrong) == len(messages) else f"{len(wrong)} of"
+        where = "the only message" if len(messages) == 1 else f"{share} {len(messages)} messages"
+        reason, hint = f"{moment(first.t_ns)}, {brief}; wrong in {where}", self.slip(first, paths)
+        return not_met(reason, evidence, hint=hint, problem=ProblemKind.WRONG_VALUE, brief=brief)
+
+    def slip(self, first: Message, paths: Sequence[str]) -> str:  # noqa: ARG002 - not every check knows slips
+        """Return a hint about the first wrong message and its wrong fields; empty if there is none."""
+        return ""
+
+    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
+        """Return the fields with what is expected of them."""
+        return Drawing((Plot(self.topic, rules=self.rules),))
+
+
 @dataclass(frozen=True, slots=True)
-class FieldEqual(FewSuffice):
+class FieldEqual(FewSuffice, EqualFields):
     """Every message on a topic has the expected value in each named field: numbers, texts, truth values or lists.
 
     Attributes:
@@ -65,27 +133,9 @@ class FieldEqual(FewSuffice):
     after_discovery: bool = False
 
     @property
-    def expected(self) -> str:
-        return f"{rules_text(self.fields)} in every message on {self.topic}"
-
-    def judge(self, trace: Trace) -> Finding:
-        messages = published(trace, self.topic, self.after_discovery)
-        if len(messages) < max(1, self.at_least):
-            return too_few_messages(trace, self.topic, len(messages), self.at_least)
-        wrong = [m for m in messages if broken_rules(m.value, self.fields, self.tolerance)]
-        evidence = {"topic": self.topic, "messages": len(messages), "wrong": len(wrong)}
-        if not wrong:
-            return met(f"{self.topic}: {rules_text(self.fields)} in {counted(len(messages), 'message')}", evidence)
-        path = broken_rules(wrong[0].value, self.fields, self.tolerance)[0]
-        clause = breach(wrong[0].value, path, as_rule(self.fields[path], self.tolerance))
-        reason = f"{moment(wrong[0].t_ns)}, {self.topic}: {clause}; wrong in {len(wrong)} of "
-        reason += counted(len(messages), "message")
-        known = evidence | {"field": path, "first_wrong_s": seconds(wrong[0].t_ns)}
-        return not_met(reason, known, problem=ProblemKind.WRONG_VALUE, brief=f"{self.topic}: {clause}")
-
-    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
-        """Return the fields with what is expected of them."""
-        return Drawing((Plot(self.topic, rules=self.fields),))
+    def rules(self) -> dict[str, FieldRule]:
+        """What is expected by field path."""
+        return {path: as_rule(rule, self.tolerance) for path, rule in self.fields.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +203,7 @@ class FieldInRange(FewSuffice, InRange):
             can have discovered it.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     at_least: int = 1
     after_discovery: bool = False
 
@@ -186,6 +237,7 @@ class FieldMonotone(FewSuffice):
             can have discovered it.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     topic: str
     direction: Literal["rising", "falling"] = "rising"
     field: Annotated[str, FieldOf("topic")] = "data"
@@ -277,6 +329,7 @@ class FieldFunction:
         pattern: Regular expression whose first group, or whole match, is the number, if the field is a text.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     topic: str
     formula: Formula
     field: Annotated[str, FieldOf("topic")] = "data"
@@ -404,6 +457,7 @@ class RandomInRange:
         unit: Unit of the number, for reasons and charts, e.g. `m`.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     topic: str
     low: float
     high: float

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import product
 from typing import ClassVar, Literal
 
 from grader.core.dataclass import dataclass
@@ -15,6 +16,117 @@ from grader.judging.values import student_endpoints
 from grader.judging.wording import listed, moment, nearest, number, quote
 
 Pair = tuple[Endpoint, Endpoint]
+
+
+@dataclass(frozen=True, slots=True)
+class GraphEdge:
+    """An edge of the ROS graph; a node that is left out may be any of the students'.
+
+    Attributes:
+        topic: Topic name as on the wire.
+        source: Fully qualified name of the publishing node.
+        target: Fully qualified name of the subscribing node.
+    """
+
+    topic: str
+    source: str | None = None
+    target: str | None = None
+
+    def __str__(self) -> str:
+        """Return the edge in the form of reports."""
+        return f"{self.source or 'a node'} ─{self.topic}→ {self.target or 'a node'}"
+
+    def joins(self, publisher: Endpoint, subscription: Endpoint) -> bool:
+        """Return whether it may join two endpoints by the names of their nodes."""
+        return self.source in (None, publisher.node) and self.target in (None, subscription.node)
+
+
+@dataclass(frozen=True, slots=True)
+class GraphEdges:
+    """The live graph has edges between students' nodes by given topics, with matching types.
+
+    Attributes:
+        edges: Each with `topic`, and `source` and `target` if the nodes' names matter.
+        at_once: Whether all edges must exist at one moment.
+        between_processes: Whether the two nodes must belong to different processes.
+    """
+
+    drawing: ClassVar[str] = NODE_GRAPH
+    edges: tuple[GraphEdge, ...]
+    at_once: bool = False
+    between_processes: bool = False
+
+    @property
+    def expected(self) -> str:
+        return f"{', '.join(map(str, self.edges))} in the ROS graph{' at one moment' if self.at_once else ''}"
+
+    def judge(self, trace: Trace) -> Finding:
+        return self.judged(trace)
+
+    def judged(self, trace: Trace, *, both_ways: bool = False) -> Finding:
+        """Judge a recording; `both_ways`: the two edges must lead there and back between the same two processes."""
+        snapshots = [g for g in trace.graphs() if g.t_ns < trace.stop_ns]
+        found = [[self._pairs(g, edge) for edge in self.edges] for g in snapshots]
+        first = {edge: next((p[k][0] for p in found if p[k]), None) for k, edge in enumerate(self.edges)}
+        wanted: dict[str, object] = {} if both_ways else {"edges": [str(edge) for edge in self.edges if first[edge]]}
+        key = "edges" if both_ways else "found"
+        for snapshot, pairs in zip(snapshots, found, strict=True):
+            chosen = next((c for c in product(*pairs) if not both_ways or _lead_back(*c)), None)
+            if chosen is not None:
+                drawn = {"t_s": seconds(snapshot.t_ns), key: [_edge(*pair) for pair in chosen]}
+                return met(f"{moment(snapshot.t_ns)}: {_all_drawn(chosen)}", wanted | drawn)
+        seen = [pair for pair in first.values() if pair is not None]
+        if len(seen) == len(first) and not self.at_once:
+            return met(_all_drawn(seen), wanted | {key: [_edge(*pair) for pair in seen]})
+        between = [pair for g in snapshots for topic in _topics(self.edges) for pair in _edges(g, topic)]
+        evidence = wanted | {key: [list(e) for e in dict.fromkeys(tuple(_edge(*pair)) for pair in between)]}
+        missing = [edge for edge, pair in first.items() if pair is None]
+        topics = _topics(missing or self.edges)
+        if missing and (crashed := explain_fault(trace, f"no edge over {' and '.join(topics)}", evidence)):
+            return crashed
+        reason, hint = self._explain(snapshots, missing, between, both_ways=both_ways)
+        return not_met(reason, evidence, hint=hint, problem=Problem(ProblemKind.NO_EDGE, topics))
+
+    def _pairs(self, graph: GraphSnapshot, edge: GraphEdge) -> list[Pair]:
+        return [
+            (source, target)
+            for source, target in _edges(graph, edge.topic)
+            if edge.joins(source, target) and not (self.between_processes and source.participant == target.participant)
+        ]
+
+    def _explain(
+        self, graphs: list[GraphSnapshot], missing: list[GraphEdge], pairs: list[Pair], *, both_ways: bool
+    ) -> tuple[str, str]:
+        """Return why edges are missing, or not there together, and a hint, which may be empty."""
+        if not missing:
+            between = "between the same two processes " if both_ways else ""
+            return f"{' and '.join(_topics(self.edges))}: every edge is there, but not {between}at once", ""
+        endpoints = [e for g in graphs for e in g.endpoints if e.participant != -1]
+        gaps = [self._gap(edge, endpoints, pairs) for edge in missing]
+        one_way = "; connected in one direction only" if both_ways and len(missing) == 1 else ""
+        return "; ".join(said for said, _ in gaps) + one_way, gaps[0][1]
+
+    def _gap(self, edge: GraphEdge, endpoints: list[Endpoint], pairs: list[Pair]) -> tuple[str, str]:
+        """Return why an edge is missing, and a hint, which may be empty."""
+        topic, apart = edge.topic, self.between_processes
+        publishers, subscriptions = _ends(topic, endpoints)
+        if not publishers and not subscriptions:
+            return f"{topic}: nothing publishes it and nothing subscribes to it", ""
+        if not publishers:
+            said = f"{topic}: {quote(subscriptions[0].node)} subscribes to it, nothing publishes it"
+            return said, f"publish {topic} in {edge.source or ('the other node' if apart else 'a node')}"
+        if not subscriptions:
+            said = f"{topic}: {quote(publishers[0].node)} publishes it, nothing subscribes to it"
+            return said, f"subscribe to {topic} in {edge.target or ('the other node' if apart else 'a node')}"
+        found = [pair for pair in pairs if pair[0].topic == topic]
+        if found and not any(edge.joins(*pair) for pair in found):
+            return f"no edge {edge}, found {listed(list(dict.fromkeys(_drawn(*pair) for pair in found)))}", ""
+        if publishers[0].type != subscriptions[0].type:
+            said = f"{topic}: {quote(publishers[0].node)} publishes {quote(publishers[0].type)}, "
+            said += f"{quote(subscriptions[0].node)} subscribes {quote(subscriptions[0].type)}"
+            return said, f"use the same message type for {topic} in both {'files' if apart else 'places'}"
+        where = "in one process or " if apart else ""
+        return f"{topic}: its publisher and its subscription are {where}not there at the same time", ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,41 +147,20 @@ class BidirectionalGraph:
         return f"one node reached by {self.forward}, the other by {self.back}, with the types agreeing"
 
     def judge(self, trace: Trace) -> Finding:
-        snapshots = [g for g in trace.graphs() if g.t_ns < trace.stop_ns]
-        for snapshot in snapshots:
-            edges = self._both_ways(snapshot)
-            if edges:
-                drawn = " and ".join(_drawn(*pair) for pair in edges)
-                evidence = {"t_s": seconds(snapshot.t_ns), "edges": [_edge(*pair) for pair in edges]}
-                return met(f"{moment(snapshot.t_ns)}: {drawn}", evidence)
-        return self._explain(trace, snapshots)
+        edges = (GraphEdge(self.forward), GraphEdge(self.back))
+        return GraphEdges(edges, at_once=True, between_processes=True).judged(trace, both_ways=True)
 
-    def _both_ways(self, snapshot: GraphSnapshot) -> tuple[Pair, Pair] | None:
-        back = _edges(snapshot, self.back)
-        for there in _edges(snapshot, self.forward):
-            ends = (there[1].participant, there[0].participant)
-            here = next((b for b in back if (b[0].participant, b[1].participant) == ends), None)
-            if here is not None and ends[0] != ends[1]:
-                return there, here
-        return None
 
-    def _explain(self, trace: Trace, snapshots: list[GraphSnapshot]) -> Finding:
-        endpoints = [e for g in snapshots for e in g.endpoints if e.participant != -1]
-        edges = [pair for g in snapshots for topic in (self.forward, self.back) for pair in _edges(g, topic)]
-        evidence = {"edges": [list(e) for e in dict.fromkeys(tuple(_edge(*pair)) for pair in edges)]}
-        complete = {pair[0].topic for pair in edges if pair[0].participant != pair[1].participant}
-        broken = [topic for topic in (self.forward, self.back) if topic not in complete]
-        fault = first_fault(trace)
-        if broken and fault is not None:
-            return faulted(fault, f"no edge over {' and '.join(broken)}", evidence)
-        if not broken:
-            reason = (
-                f"{self.forward} and {self.back}: both have an edge, but not between the same two processes at once"
-            )
-            return not_met(reason, evidence, problem=Problem(ProblemKind.NO_EDGE, (self.forward, self.back)))
-        gaps = [_gap(topic, endpoints) for topic in broken]
-        reason = "; ".join(said for said, _ in gaps) + ("; connected in one direction only" if len(broken) == 1 else "")
-        return not_met(reason, evidence, hint=gaps[0][1], problem=Problem(ProblemKind.NO_EDGE, tuple(broken)))
+def _lead_back(there: Pair, back: Pair) -> bool:
+    return (there[0].participant, there[1].participant) == (back[1].participant, back[0].participant)
+
+
+def _topics(edges: Iterable[GraphEdge]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(edge.topic for edge in edges))
+
+
+def _all_drawn(pairs: Iterable[Pair]) -> str:
+    return " and ".join(_drawn(*pair) for pair in pairs)
 
 
 def _edges(snapshot: GraphSnapshot, topic: str) -> list[Pair]:
@@ -89,24 +180,6 @@ def _ends(topic: str, endpoints: Iterable[Endpoint]) -> tuple[list[Endpoint], li
     """Return the publishers and the subscriptions of a topic."""
     mine = [e for e in endpoints if e.topic == topic]
     return [e for e in mine if e.kind == "publisher"], [e for e in mine if e.kind == "subscription"]
-
-
-def _gap(topic: str, endpoints: list[Endpoint]) -> tuple[str, str]:
-    """Return why a topic connects no two processes, and a hint, which may be empty."""
-    publishers, subscriptions = _ends(topic, endpoints)
-    if not publishers and not subscriptions:
-        return f"{topic}: nothing publishes it and nothing subscribes to it", ""
-    if not publishers:
-        said = f"{topic}: {quote(subscriptions[0].node)} subscribes to it, nothing publishes it"
-        return said, f"publish {topic} in the other node"
-    if not subscriptions:
-        said = f"{topic}: {quote(publishers[0].node)} publishes it, nothing subscribes to it"
-        return said, f"subscribe to {topic} in the other node"
-    if publishers[0].type != subscriptions[0].type:
-        said = f"{topic}: {quote(publishers[0].node)} publishes {quote(publishers[0].type)}, "
-        said += f"{quote(subscriptions[0].node)} subscribes {quote(subscriptions[0].type)}"
-        return said, f"use the same message type for {topic} in both files"
-    return f"{topic}: its publisher and its subscription are in one process or not there at the same time", ""
 
 
 _QOS_HINT = "pass a QoSProfile with that policy where the {kind} is created"
@@ -260,77 +333,3 @@ def _flaws(word: str, wanted: Sequence[str], found: Sequence[str], *, exactly: b
         near = nearest(topic, found)
         flaws.append(f"{topic} is not {word}" + (f", but {quote(near)} is" if near else ""))
     return flaws + [f"{quote(topic)} is {word} too" for topic in found if exactly and topic not in wanted]
-
-
-@dataclass(frozen=True, slots=True)
-class GraphEdge:
-    """An edge of the ROS graph; a node that is left out may be any of the students'.
-
-    Attributes:
-        topic: Topic name as on the wire.
-        source: Fully qualified name of the publishing node.
-        target: Fully qualified name of the subscribing node.
-    """
-
-    topic: str
-    source: str | None = None
-    target: str | None = None
-
-    def __str__(self) -> str:
-        """Return the edge in the form of reports."""
-        return f"{self.source or 'a node'} ─{self.topic}→ {self.target or 'a node'}"
-
-
-@dataclass(frozen=True, slots=True)
-class GraphEdges:
-    """The live graph has edges between students' nodes by given topics, with matching types.
-
-    Attributes:
-        edges: Each with `topic`, and `source` and `target` if the nodes' names matter.
-        at_once: Whether all edges must exist at one moment.
-        between_processes: Whether the two nodes must belong to different processes.
-    """
-
-    drawing: ClassVar[str] = NODE_GRAPH
-    edges: tuple[GraphEdge, ...]
-    at_once: bool = False
-    between_processes: bool = False
-
-    @property
-    def expected(self) -> str:
-        return f"{', '.join(map(str, self.edges))} in the ROS graph{' at one moment' if self.at_once else ''}"
-
-    def judge(self, trace: Trace) -> Finding:
-        graphs = [g for g in trace.graphs() if g.t_ns < trace.stop_ns]
-        shown = {g.t_ns: [edge for edge in self.edges if self._has(g, edge)] for g in graphs}
-        seen = [edge for edge in self.edges if any(edge in edges for edges in shown.values())]
-        whole = next((t for t, edges in shown.items() if len(edges) == len(self.edges)), None)
-        evidence = {"edges": [str(edge) for edge in seen]}
-        if len(seen) == len(self.edges) and (not self.at_once or whole is not None):
-            when = f"{moment(whole)}: " if whole is not None else ""
-            return met(f"{when}{', '.join(map(str, self.edges))}", evidence)
-        missing = next((edge for edge in self.edges if edge not in seen), None)
-        if missing is None:
-            return not_met("every edge is there, but never all of them at once", evidence)
-        return explain_fault(trace, f"no edge {missing}", evidence) or not_met(
-            f"no edge {missing}; {self._instead(trace, missing)}",
-            evidence,
-            problem=Problem(ProblemKind.NO_EDGE, (missing.topic,)),
-        )
-
-    def _has(self, graph: GraphSnapshot, edge: GraphEdge) -> bool:
-        return any(
-            edge.source in (None, source.node)
-            and edge.target in (None, target.node)
-            and not (self.between_processes and source.participant == target.participant)
-            for source, target in _edges(graph, edge.topic)
-        )
-
-    def _instead(self, trace: Trace, edge: GraphEdge) -> str:
-        ends = student_endpoints(trace, topic=edge.topic)
-        if not ends:
-            return f"nothing publishes {edge.topic} and nothing subscribes to it"
-        found = [
-            f"{quote(e.node)} {'publishes' if e.kind == 'publisher' else 'subscribes'} {quote(e.type)}" for e in ends
-        ]
-        return f"{edge.topic}: {', '.join(list(dict.fromkeys(found))[:4])}"

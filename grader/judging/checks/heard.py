@@ -48,7 +48,7 @@ class LogsTexts:
         within: Longest time from a message to its log record.
     """
 
-    roles: ClassVar[Roles] = Roles(given=("topic",))
+    roles: ClassVar[Roles] = Roles(hears=("topic",), given=("topic",))
     process: str
     topic: str
     field: Annotated[str, FieldOf("topic")] = "data"

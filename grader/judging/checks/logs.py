@@ -7,11 +7,11 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from grader.core.chart import Band, Level, Look, Panel, Tone
 from grader.core.dataclass import dataclass
-from grader.core.exercise import Finding, Location, ProblemKind
+from grader.core.exercise import Finding, Location, ProblemKind, Roles
 from grader.core.quantities import DurationNs, FieldOf, Pattern, counted, seconds, within
 from grader.core.trace import LogRecord, Message, Trace
 from grader.judging.charts import Lanes, gaps_panel, series
@@ -241,6 +241,7 @@ class LogsEvery:
         field: Path of the published number.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     process: str
     topic: str
     every: int

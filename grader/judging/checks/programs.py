@@ -6,12 +6,12 @@ import ast
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from grader.core.chart import Look, Panel
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, Location, ProblemKind
+from grader.core.exercise import Finding, Location, ProblemKind, Roles
 from grader.core.quantities import NS_PER_S, DurationNs, FieldOf, counted, seconds, within
 from grader.core.trace import FaultKind, Message, Trace
 from grader.judging.charts import drawn_case, expected_series, series
@@ -137,6 +137,7 @@ class ParameterTakesEffect:
         text: What the field holds if the value is a part of it, with `{}` in its place, such as `Hello {}!`.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     name: str
     topic: str
     effect: Literal["field", "rate", "period"] = "field"

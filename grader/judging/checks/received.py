@@ -15,7 +15,7 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind, Roles
 from grader.core.quantities import NS_PER_MS, NS_PER_S, FieldOf, counted, seconds
-from grader.core.trace import ClockKind, Endpoint, LogRecord, Message, Trace
+from grader.core.trace import ClockKind, Endpoint, LogRecord, Message, Trace, unusual_request
 from grader.judging.charts import expected_series, series
 from grader.judging.facts import LogFacts
 from grader.judging.findings import (
@@ -26,6 +26,7 @@ from grader.judging.findings import (
     met,
     not_met,
     only_printed,
+    request_said,
 )
 from grader.judging.logs.conversions import LoggedNumbers, times, wrong_conversion
 from grader.judging.logs.matching import Sought, followed, shows_about, standing, surroundings
@@ -80,7 +81,7 @@ class LogsValues:
             products that name each other's units for every message do not count. No unit needs to be named.
     """
 
-    roles: ClassVar[Roles] = Roles(given=("topic",))
+    roles: ClassVar[Roles] = Roles(hears=("topic",), given=("topic",))
     noun: ClassVar[str] = "message"
     process: str
     topic: str
@@ -462,10 +463,9 @@ class LogsReceived:
         if logged and logged <= (ends := {min(sent), max(sent)}) and len(sent - ends) >= _BETWEEN:
             only = f"{' and '.join(map(number, sorted(logged)))} {'is' if len(logged) == 1 else 'are'}"
             reason += f"; only {only}, so the log does not show what was received"
-        if all(e.durability == "transient_local" for e in subscriptions):
-            reason += (
-                "; the subscription asks for transient_local durability, which a volatile publisher does not offer"
-            )
+        requests = [unusual_request(e) for e in subscriptions]
+        if requests and requests[0] is not None and None not in requests:
+            reason += f"; the subscription asks for {request_said(requests[0])}"
         hint = "log msg.data in the callback of the subscription to " + self.topic
         brief = f"{self.topic}: {number(first.value)} is never logged"
         return not_met(reason, evidence, hint=hint, problem=ProblemKind.NOT_LOGGED, brief=brief)

@@ -51,7 +51,7 @@ class ServiceAvailable:
     def judge(self, trace: Trace) -> Finding:
         answers = [r for r in trace.responses(self.service, "student") if r.type == self.type]
         ends = [e for e in trace.service_ends("service", self.service) if e.type == self.type]
-        if not answers and not ends:
+        if not answers and all(end.unusual for end in ends):
             return explain_no_server(trace, self.service, self.type)
         node = quote(ends[0].node) if ends else "a node"
         evidence = {"service": self.service, "type": self.type, "responses": len(answers)}
@@ -180,7 +180,7 @@ def never_asked(trace: Trace, service: str) -> Finding:
     Raises:
         HarnessError: The server existed and was running.
     """
-    if not trace.service_ends("service", service):
+    if all(end.unusual for end in trace.service_ends("service", service)):
         return waiting_for("service_available", explain_no_server(trace, service))
     if crashed := explain_fault(trace, f"{service} could not be called"):
         return crashed

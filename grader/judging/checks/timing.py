@@ -71,6 +71,7 @@ class Period:
         at_least: Number of messages needed for a judgement.
     """
 
+    roles: ClassVar[Roles] = Roles(speaks=("topic",))
     topic: str
     least: DurationNs | None = None
     largest: DurationNs | None = None
@@ -149,7 +150,7 @@ class Latency:
         share: Share of the inputs that must be followed in time.
     """
 
-    roles: ClassVar[Roles] = Roles(hears=("input",))
+    roles: ClassVar[Roles] = Roles(hears=("input",), speaks=("output",))
     input: str
     output: str
     within: DurationNs
@@ -375,7 +376,7 @@ class Reaction:
         tolerance: Largest difference of a number without a tolerance of its own.
     """
 
-    roles: ClassVar[Roles] = Roles(hears=("input",))
+    roles: ClassVar[Roles] = Roles(hears=("input",), speaks=("output",))
     input: str
     output: str
     cases: tuple[ReactionCase, ...]

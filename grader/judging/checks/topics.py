@@ -10,9 +10,17 @@ from grader.core.chart import Level
 from grader.core.dataclass import dataclass
 from grader.core.exercise import NODE_GRAPH, Finding, ProblemKind, Roles
 from grader.core.quantities import SLACK, FieldNumber, FieldOf, Hertz, counted, seconds, within
-from grader.core.trace import Endpoint, Message, Trace
+from grader.core.trace import Message, Trace, unusual_request
 from grader.judging.charts import gaps_panel
-from grader.judging.findings import explain_fault, explain_no_message, explain_no_subscription, met, not_met
+from grader.judging.checks.fields import EqualFields
+from grader.judging.findings import (
+    explain_fault,
+    explain_no_message,
+    explain_no_subscription,
+    met,
+    not_met,
+    request_said,
+)
 from grader.judging.plots import Drawing, Plot, value_panels
 from grader.judging.values import FieldRule, equals, leaves, number_at, published, student_endpoints, text_at
 from grader.judging.wording import listed, moment, number, numbers, quote
@@ -70,7 +78,7 @@ class Subscribes:
         mine = [e for e in student_endpoints(trace, "subscription") if (e.topic, e.type) == (self.topic, self.type)]
         if not mine:
             return explain_no_subscription(trace, self.topic, self.type)
-        fitting = [e for e in mine if not _demand(e)]
+        fitting = [e for e in mine if unusual_request(e) is None]
         chosen = (fitting or mine)[0]
         evidence = {
             "topic": self.topic,
@@ -79,31 +87,16 @@ class Subscribes:
             "reliability": chosen.reliability,
             "durability": chosen.durability,
         }
-        if fitting:
+        unmet = unusual_request(chosen)
+        if unmet is None:
             return met(f"{self.topic}: {quote(chosen.node)} subscribes with type {self.type}", evidence)
-        reason = f"{self.topic}: the subscription of {quote(chosen.node)} asks for {_demand(chosen)}"
-        hint = "subscribe with the default durability: pass the queue depth 10 as QoS"
+        reason = f"{self.topic}: the subscription of {quote(chosen.node)} asks for {request_said(unmet)}"
+        hint = f"subscribe with the default {unmet.policy.replace('_', ' ')}: pass the queue depth 10 as QoS"
         return not_met(f"{reason}: no message arrives", evidence, hint=hint, problem=ProblemKind.KEPT_APART)
 
 
-def _demand(subscription: Endpoint) -> str:
-    """Return the policy that a subscription requests and an ordinary publisher does not offer; empty if none."""
-    if subscription.durability == "transient_local":
-        return "transient_local durability, which a volatile publisher does not offer"
-    if subscription.deadline_ns:
-        return (
-            f"a deadline of {number(seconds(subscription.deadline_ns))} s, which a publisher without one does not offer"
-        )
-    if subscription.liveliness == "manual_by_topic":
-        return "manual_by_topic liveliness, which a publisher with automatic liveliness does not offer"
-    if subscription.lease_ns:
-        lease = f"a liveliness lease of {number(seconds(subscription.lease_ns))} s"
-        return f"{lease}, which a publisher without one does not offer"
-    return ""
-
-
 @dataclass(frozen=True, slots=True)
-class FieldValues:
+class FieldValues(EqualFields):
     """Every message on a topic holds the given numbers.
 
     Attributes:
@@ -120,70 +113,18 @@ class FieldValues:
     after_discovery: bool = False
 
     @property
-    def expected(self) -> str:
-        wanted = ", ".join(f"{path} = {number(value)}" for path, value in self.values.items())
-        return f"{wanted} in every message on {self.topic}"
+    def rules(self) -> dict[str, FieldRule]:
+        """What is expected by field path."""
+        return {path: FieldRule(equals=want, tolerance=self.tolerance) for path, want in self.values.items()}
 
-    def judge(self, trace: Trace) -> Finding:
-        messages = published(trace, self.topic, self.after_discovery)
-        if not messages:
-            return explain_no_message(trace, self.topic)
-        wrong = self._differing(messages)
-        if wrong:
-            return self._differs(wrong, len(messages))
-        wanted = ", ".join(f"{path} = {number(want)}" for path, want in self.values.items())
-        reason = f"{self.topic}: {wanted} in {counted(len(messages), 'message')}"
-        return met(reason, {"topic": self.topic, "values": dict(self.values), "messages": len(messages), "wrong": 0})
-
-    def _differing(self, messages: Sequence[Message]) -> list[Message]:
-        """Return the messages with a wrong field; a message equal to a known right one is right."""
-        wrong = []
-        right: tuple[str, Mapping[str, object]] | None = None
-        for message in messages:
-            content = (message.type, message.value)
-            if content == right:
-                continue
-            if self._wrong_fields(message):
-                wrong.append(message)
-            else:
-                right = content
-        return wrong
-
-    def _wrong_fields(self, message: Message) -> dict[str, float | None]:
-        got = {path: number_at(message.value, path) for path in self.values}
-        return {p: g for p, g in got.items() if g is None or not equals(g, self.values[p], self.tolerance)}
-
-    def _differs(self, wrong: list[Message], total: int) -> Finding:
-        first = wrong[0]
-        fields = self._wrong_fields(first)
-        missing = [path for path, got in fields.items() if got is None]
-        evidence = {
-            "topic": self.topic,
-            "values": dict(self.values),
-            "messages": total,
-            "wrong": len(wrong),
-            "first_wrong_s": seconds(first.t_ns),
-            "found": {path: got for path, got in fields.items() if got is not None},
-        }
-        where = f"{moment(first.t_ns)}, {self.topic}"
-        if missing:
-            reason = f"{where}: {quote(first.type)} has no field {missing[0]}"
-            return not_met(reason, evidence, problem=ProblemKind.NO_FIELD)
-        found = ", ".join(f"{p} is {number(g)}" for p, g in fields.items() if g is not None)
-        wanted = ", ".join(number(self.values[p]) for p in fields)
-        share = f"in all {total} messages" if len(wrong) == total else f"in {len(wrong)} of {total} messages"
-        reason = f"{where}: {found}, expected {wanted}; wrong {'in the only message' if total == 1 else share}"
-        brief = f"{self.topic}: {found}, expected {wanted}"
-        return not_met(reason, evidence, hint=self._hint(first), problem=ProblemKind.WRONG_VALUE, brief=brief)
-
-    def _hint(self, message: Message) -> str:
+    def slip(self, first: Message, paths: Sequence[str]) -> str:
         """Return the very likely slip in a message: field, sign or unit; empty if there is none."""
-        got = {p: g for p, g in self._wrong_fields(message).items() if g is not None}
+        got = {p: g for p in paths if (g := number_at(first.value, p)) is not None}
         for path, value in got.items():
             want = self.values[path]
             if abs(want) <= self.tolerance:
                 continue
-            hint = self._misplaced(message, path, want) or _sign_or_unit(path, value, want)
+            hint = self._misplaced(first, path, want) or _sign_or_unit(path, value, want)
             if hint:
                 return hint
         stray = next((p for p, g in got.items() if within(self.values[p], 0.0, SLACK) and not within(g, 0.0, 1e-6)), "")
@@ -196,10 +137,6 @@ class FieldValues:
                 return f"{number(want)} is in {quote(other)}; it belongs in {path}"
         return ""
 
-    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
-        """Return the fields that the check names, with the numbers that it expects."""
-        return Drawing((Plot(self.topic, rules={path: FieldRule(equals=want) for path, want in self.values.items()}),))
-
 
 def _sign_or_unit(path: str, got: float, want: float) -> str:
     """Return a hint for a value that has the wrong sign or unit; empty otherwise."""
@@ -208,14 +145,15 @@ def _sign_or_unit(path: str, got: float, want: float) -> str:
     ratio = got / want
     if math.isclose(ratio, -1.0, rel_tol=1e-6):
         return f"the sign of {path} is inverted"
-    angular = "angular" in path
-    if angular and (
+    if "angular" in path and (
         math.isclose(abs(ratio), 180 / math.pi, rel_tol=0.01) or math.isclose(abs(ratio), math.pi / 180, rel_tol=0.01)
     ):
         return f"{path} is in rad/s; {number(got)} looks like a conversion between degrees and radians"
+    if "linear" not in path:
+        return ""
     factors = {1000.0: "mm/s", 100.0: "cm/s", 3.6: "km/h"}
     unit = next((u for f, u in factors.items() if math.isclose(ratio, f, rel_tol=1e-3)), "")
-    return f"{path} is in m/s; {number(got)} looks like {unit}" if unit and not angular else ""
+    return f"{path} is in m/s; {number(got)} looks like {unit}" if unit else ""
 
 
 _AXES = ("x", "y", "z")

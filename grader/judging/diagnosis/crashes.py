@@ -74,7 +74,7 @@ def _not_a_float(source: Source, value: ast.expr, target: str) -> Clue:
 def _no_number_yet(  # noqa: PLR0911  one for each kind of value
     source: Source, value: ast.expr, target: str, written: str
 ) -> Clue:
-    """Return the clue for a value that is no number as it is written."""
+    """Return the clue for a literal that is not a valid number."""
     message = received(source, source.function_of(value))
     if message is not None and chain(value) == message.name and message.type in SINGLE_NUMBERS:
         return Clue(f"{written} is the whole message: write {target}{written}.data")

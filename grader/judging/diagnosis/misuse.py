@@ -25,6 +25,7 @@ from grader.judging.source import (
     first_line,
     last_name,
     parameters,
+    quoted_number,
     text_of,
 )
 
@@ -259,7 +260,7 @@ def _wrong_request(crash: Crash) -> Clue | None:
     priority=7070,
 )
 def _node_name(crash: Crash) -> Clue | None:
-    """The name of the node is no text."""
+    """The name of the node is not a string."""
     for call in _calls(crash, "__init__"):
         first = argument(call, 0, "node_name")
         if first is not None and chain(call.func) == "super().__init__" and text_of(first) is None:
@@ -422,8 +423,9 @@ def _text_and_number(crash: Crash) -> Clue | None:
     texts = [text_of(p) for p in parts]
     if not any(t is not None for t in texts):
         return None
-    if all(t is None or t.strip().replace(".", "", 1).isdigit() for t in texts):
-        number = next(t for t in texts if t is not None).strip()
+    numbers = [quoted_number(p) for p in parts if text_of(p) is not None]
+    if all(numbers):
+        number = numbers[0]
         return Clue(f"'{number}' is a string: write {number} without quotes to calculate with it")
     filled = [t if t is not None else f"{{{source.code(p, 30)}}}" for t, p in zip(texts, parts, strict=True)]
     shown = "".join(filled)
@@ -460,8 +462,7 @@ def _text_or_list_as_number(crash: Crash) -> Clue | None:
     source = crash.source
     for node in source.on_line(crash.line, ast.BinOp):
         for side in (node.left, node.right):
-            written = (text_of(side) or "").strip()
-            if written.lstrip("-").replace(".", "", 1).isdigit():
+            if written := quoted_number(side):
                 return Clue(f"{source.code(side)} is a string: write {written} without quotes to calculate with it")
             if isinstance(side, ast.List) and len(side.elts) == 1:
                 inside = source.code(side.elts[0], 30)
@@ -475,9 +476,8 @@ def _text_compared(crash: Crash) -> Clue | None:
     source = crash.source
     for test in source.on_line(crash.line, ast.Compare):
         for side in (test.left, *test.comparators):
-            written = text_of(side)
-            if written is not None and written.strip().replace(".", "", 1).lstrip("-").isdigit():
-                return Clue(f"{source.code(side)} is a string: compare with the number {written.strip()}")
+            if written := quoted_number(side):
+                return Clue(f"{source.code(side)} is a string: compare with the number {written}")
     return Clue("one side is a string, the other a number: convert the string with float(...)")
 
 

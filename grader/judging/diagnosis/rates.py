@@ -19,6 +19,7 @@ from grader.judging.diagnosis.wiring import (
     head_of,
     made,
     made_for,
+    names_called,
     publish_calls,
     reached,
     roots,
@@ -292,7 +293,7 @@ def _pace_of(paced: _Paced, loop: Loop) -> Clue | None:
 def _no_pause(paced: _Paced, loop: Loop) -> Clue | None:
     waits = {"wait", "wait_for", "get", "join", "sleep", "sleep_until", "sleep_for", "spin_once", "select"}
     waits |= {"now", "time", "monotonic", "perf_counter", "time_ns", "monotonic_ns"}
-    inside = {last_name(n.func) for n in reached(paced.source, [loop]) if isinstance(n, ast.Call)}
+    inside = names_called(paced.source, [loop])
     if inside & waits or paced.found_hz < 5 * paced.wanted_hz:
         return None
     head = "while" if isinstance(loop, ast.While) else "for"

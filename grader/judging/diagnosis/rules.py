@@ -132,7 +132,7 @@ class Case:
 
     @property
     def type(self) -> str:
-        """The message type that the check asks for; empty if it names none."""
+        """The message type that the check asks for; empty if there is none."""
         return "".join(named(self.check, roles_of(type(self.check)).type))
 
 

@@ -104,7 +104,7 @@ def _of_a_class(source: Source, name: str, inside: list[Function]) -> Clue | Non
 
 
 def _text_without_quotes(crash: Crash, name: str) -> Clue | None:
-    """A topic, or the name of a node, is written without quotation marks."""
+    """A topic, or the name of a node, is written without quotes."""
     source = crash.source
     if name in source.stored:
         return None

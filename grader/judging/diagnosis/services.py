@@ -12,6 +12,7 @@ from grader.judging.diagnosis.wiring import (
     elsewhere_because,
     goes_to,
     made,
+    names_called,
     reached,
     roots,
     runs,
@@ -75,6 +76,19 @@ def _other_service(end: _End) -> Clue | None:
         does = "asks" if end.kind == "client" else "offers"
         hint = f"{source.code(call)} {does} {quote(found, 60)}: the task asks for {end.service}"
         return Clue(hint + elsewhere_because(written, end.service), source.place(call))
+    return None
+
+
+@hint_rule(problem=ProblemKind.KEPT_APART, given=_end, priority=3015)
+def _service_qos(end: _End) -> Clue | None:
+    """A server or client has a QoS that the other end does not fit."""
+    for source in end.case.sources.values():
+        for call in _ends(source, end.kind):
+            given = next((k for k in call.keywords if k.arg == "qos_profile"), None)
+            if given is not None and goes_to(text_in_code(source, argument(call, 1, "srv_name")), end.service):
+                other = "server" if end.kind == "client" else "client"
+                hint = f"{source.code(given, 60)} does not match a {other} with the default QoS: remove it"
+                return Clue(hint, source.place(given))
     return None
 
 
@@ -151,7 +165,7 @@ def _future_never_done(case: Case) -> Clue | None:
         return None
     for loop in source.all(ast.While):
         asks = any(isinstance(n, ast.Call) and last_name(n.func) == "done" for n in ast.walk(loop.test))
-        inside = {last_name(n.func) for n in reached(source, [loop]) if isinstance(n, ast.Call)}
+        inside = names_called(source, [loop])
         if asks and not inside & set(SPINS):
             hint = f"'while {source.code(loop.test, 40)}' never ends: a response is taken only while the node spins; "
             return Clue(f"{hint}use rclpy.spin_until_future_complete(node, future)", source.place(loop))

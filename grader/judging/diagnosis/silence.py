@@ -8,6 +8,7 @@ import re
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Location, Outcome, ProblemKind, named, roles_of
 from grader.core.quantities import seconds
+from grader.core.trace import first_unmet, unusual_request
 from grader.judging.diagnosis.rules import NO_SOURCE, Case, Clue, file_for, hint_rule, silent_topic, unheard_topic
 from grader.judging.diagnosis.wiring import (
     MOST_MADE,
@@ -20,6 +21,7 @@ from grader.judging.diagnosis.wiring import (
     is_log,
     made,
     made_for,
+    names_called,
     names_in,
     node_made,
     publish_calls,
@@ -43,6 +45,8 @@ from grader.judging.wording import quote
 
 _THREADS = {"Thread", "MultiThreadedExecutor", "start_new_thread", "ThreadPoolExecutor"}
 _COMMENTED_TIMER = re.compile(r"^\s*#.*\bcreate_timer\s*\(")
+#: What follows from a request that an ordinary publisher does not meet.
+_ONLY_SAME = "it receives only from publishers that offer the same: remove it"
 #: A sleep longer than this before the node spins probably explains its silence.
 _LONG_SLEEP_S = 15.0
 
@@ -167,18 +171,53 @@ def _wrong_type(case: Case) -> Clue | None:
 @hint_rule(priority=8050)
 def _latched_subscription(case: Case) -> Clue | None:
     """A subscription with transient_local durability receives only from publishers that offer it."""
+    deaf = _deaf_subscription(case)
+    if deaf is None or deaf.policy != "durability":
+        return None
+    policy = next((n for n in deaf.source.all(ast.Attribute) if n.attr == "TRANSIENT_LOCAL"), None)
+    hint = "a TRANSIENT_LOCAL subscription receives only from publishers that offer this too: remove the durability"
+    return Clue(hint, deaf.source.place(policy if policy is not None else deaf.item.call), key=f"apart:{deaf.topic}")
+
+
+@hint_rule(priority=8055)
+def _demanding_subscription(case: Case) -> Clue | None:
+    """A subscription that requests a deadline or a liveliness receives only from publishers that offer it."""
+    deaf = _deaf_subscription(case)
+    if deaf is None or deaf.policy == "durability":
+        return None
+    source, profile = deaf.source, value_of(deaf.source, deaf.item.qos)
+    given: list[ast.AST] = [
+        n for n in (ast.walk(profile) if profile else ()) if isinstance(n, ast.keyword) and n.arg == deaf.policy
+    ]
+    given = given or [
+        n for n in source.all(ast.Assign) if len(n.targets) == 1 and chain(n.targets[0]).endswith(f".{deaf.policy}")
+    ]
+    if len(given) != 1:
+        return None
+    hint = f"with {source.code(given[0], 60)} {_ONLY_SAME}"
+    return Clue(hint, source.place(given[0]), key=f"apart:{deaf.topic}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Deaf:
+    """A subscription to which no publisher offers what it requests."""
+
+    topic: str
+    policy: str  # the name of the parameter in rclpy
+    source: Source
+    item: Made
+
+
+def _deaf_subscription(case: Case) -> _Deaf | None:
     topic = next(iter(case.hears), "")
     listening = student_endpoints(case.trace, "subscription", topic)
-    deaf = not case.speaks or bool(silent_topic(case))
-    if not listening or not deaf or any(e.durability != "transient_local" for e in listening):
+    requests = [unusual_request(end) for end in listening]
+    first = requests[0] if requests else None
+    if first is None or None in requests or (case.speaks and not silent_topic(case)):
         return None
     source = file_for(case, "subscription", topic)
     item = made_for(source, "subscription", topic, short(listening[0].type))
-    if item is None:
-        return None
-    policy = next((n for n in source.all(ast.Attribute) if n.attr == "TRANSIENT_LOCAL"), None)
-    hint = "a TRANSIENT_LOCAL subscription receives only from publishers that offer this too: remove the durability"
-    return Clue(hint, source.place(policy if policy is not None else item.call), key=f"apart:{topic}")
+    return None if item is None else _Deaf(topic, first.policy, source, item)
 
 
 @hint_rule(priority=8060)
@@ -203,6 +242,9 @@ def _kept_apart(case: Case) -> Clue | None:
             return Clue(f"this asks for reliable messages, but {other} sends best effort: use the same QoS", place, key)
         if (here[0].durability, there[0].durability) == ("volatile", "transient_local"):
             return Clue(f"this asks for transient_local durability, which {other} does not offer", place, key)
+        if (unmet := first_unmet(here[0], there[0])) is not None:
+            hint = f"this requests {unmet.requested}, but {other} offers {unmet.offered}: use the same QoS"
+            return Clue(hint, place, key)
     return None
 
 
@@ -418,8 +460,7 @@ def _stopped_listening(case: Case) -> Clue | None:
         given = [n for n in ast.walk(profile) if isinstance(n, ast.keyword)] if profile is not None else []
         near = [k for k in given if k.arg in ("deadline", "liveliness_lease_duration")]
         if len(near) == 1:
-            hint = f"with {source.code(near[0], 50)} it receives only from publishers that offer the same: remove it"
-            return Clue(hint, source.place(near[0]))
+            return Clue(f"with {source.code(near[0], 50)} {_ONLY_SAME}", source.place(near[0]))
     ends = next(source.calls("destroy_subscription"), None)
     if ends is None:
         return None
@@ -477,7 +518,7 @@ def _waits_in_constructor(source: Source) -> Clue | None:
     callbacks = [f for m in made(source, "subscription") for f in roots(source, m.callback)]
     brought = {chain(n) for n in reached(source, callbacks) if isinstance(n, ast.Attribute) and last_name(n)}
     for loop in source.all(ast.While):
-        inside = {last_name(n.func) for n in reached(source, [loop]) if isinstance(n, ast.Call)}
+        inside = names_called(source, [loop])
         idle = not inside & {"spin_once", "spin", "publish", "wait_for_service"}
         asked = {chain(n) for n in ast.walk(loop.test) if isinstance(n, ast.Attribute)}
         if source.function_name(loop) == "__init__" and idle and asked & brought:

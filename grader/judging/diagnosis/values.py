@@ -394,7 +394,7 @@ def _counter_reset(case: Case) -> Clue | None:
 
 @hint_rule("field_function", priority=10120)
 def _counts_sometimes(case: Case) -> Clue | None:
-    """The counter grows only on a condition, or `=+ 1` gives it the same number again and again."""
+    """The counter grows only on a condition, or `=+ 1` assigns the same number each time."""
     source = case.source
     for counter in _counters(case):
         for store in source.stores(counter):

@@ -314,6 +314,11 @@ def reached(source: Source, start: Sequence[ast.AST]) -> Iterator[ast.AST]:
                 waiting.extend(roots(source, node.func))
 
 
+def names_called(source: Source, start: Sequence[ast.AST]) -> set[str]:
+    """Return the names of all functions and methods that may be called when these functions run."""
+    return {last_name(n.func) for n in reached(source, start) if isinstance(n, ast.Call)}
+
+
 def runs(source: Source, item: Made) -> list[ast.AST]:
     """Return every node that may run in the callback of a subscription or timer."""
     return list(reached(source, roots(source, item.callback)))

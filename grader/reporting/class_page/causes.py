@@ -25,7 +25,7 @@ class CauseKind:
     @property
     def label(self) -> str:
         """A short description of the kind."""
-        fixed = {"missing": "file missing", "criterion": "as measured"}
+        fixed = {"missing": "file missing", "criterion": "cause unknown"}
         named = self.key.replace("_", " ")
         return fixed.get(self.source) or (f"{named}: {', '.join(self.parts)}" if self.parts else named)
 

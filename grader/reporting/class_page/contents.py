@@ -51,7 +51,7 @@ class PageEntry:
     """A line of a list."""
 
     text: str  # the text of the line
-    student: int | None = None  # index of the student it refers to; None if that is nobody in the table
+    student: int | None = None  # index of the student it refers to; None if the student is not in the table
     exercise: str = ""  # exercise of the report that the line links to; empty for the whole report
 
 

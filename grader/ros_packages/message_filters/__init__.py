@@ -137,7 +137,7 @@ class Cache(SimpleFilter):
 
 
 class Chain(SimpleFilter):
-    """Passes messages through filters, one after the other.
+    """Passes messages through filters in turn.
 
     Args:
         message_filter: The filter whose messages go in; None to give them to `add`.

@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 NS_PER_S = 1_000_000_000
-#: How long a buffer keeps transforms, unless it is told otherwise.
+#: How long a buffer keeps transforms, unless its creator says otherwise.
 CACHE_S = 10
 #: The square of a quaternion's length may differ from 1 by this; others are not rotations.
 NORMALIZED = 1e-2
@@ -151,7 +151,7 @@ def _ns(time: Any) -> int:
 
 
 def _invalid(frame: str) -> str:
-    """Return why a text is no name of a frame; empty if it is one."""
+    """Return why a text is not a valid name of a frame; empty if it is."""
     if not frame:
         return "in tf2 frame_ids cannot be empty"
     return "in tf2 frame_ids cannot start with a '/'" if frame.startswith("/") else ""

@@ -22,7 +22,7 @@ from types import ModuleType
 from typing import Any
 
 #: Processors of the machine that every program sees: as many as a small laptop has. rclpy's MultiThreadedExecutor
-#: starts so many threads; with a single one, correct programs that call a service in a callback wait for ever.
+#: starts so many threads; with a single one, correct programs that call a service in a callback wait forever.
 PROCESSORS = 4
 #: Memory of that machine, in bytes.
 MEMORY_BYTES = 4 << 30

@@ -66,7 +66,7 @@ class FigureCanvas(FigureCanvasAgg):
         _turn()
 
     def start_event_loop(self, timeout: float = 0) -> None:
-        """Run the event loop for so many seconds, or until it is stopped if they are none."""
+        """Run the event loop for so many seconds, or until it is stopped if there is no limit."""
         self._looping = True
         end_s = time.monotonic() + timeout if timeout > 0 else math.inf
         _run(lambda: self._looping, end_s)

@@ -133,7 +133,8 @@
     show();
     const which = cause === null ? "" : ` with cause ${cause + 1}`;
     const all = wanted.length === rows.length;
-    byId("shown").textContent = all ? `${rows.length} rows` : `${wanted.length} of ${rows.length} rows${which}`;
+    const total = `${rows.length} ${rows.length === 1 ? "row" : "rows"}`;
+    byId("shown").textContent = all ? total : `${wanted.length} of ${total}${which}`;
   }
 
   function clear() {
@@ -213,7 +214,7 @@
       xAxis: {
         type: "category",
         data: data.bins.map((bin) => short(bin[0])),
-        name: narrow ? "percent of the points, from" : "percent of the points",
+        name: narrow ? "percent of the points, at least" : "percent of the points",
         nameLocation: "middle",
         nameGap: 28,
         nameTextStyle: FONT,

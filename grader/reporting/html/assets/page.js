@@ -133,8 +133,8 @@
   };
 
   function tools(parent, picture, panning) {
-    button(parent, "Zoom in (plus key, or ctrl and wheel)", "+", () => picture.zoom(0.5));
-    button(parent, "Zoom out (minus key)", "\u2212", () => picture.zoom(2));
+    button(parent, "Zoom in (+ key, or Ctrl and mouse wheel)", "+", () => picture.zoom(0.5));
+    button(parent, "Zoom out (- key)", "\u2212", () => picture.zoom(2));
     if (panning) {
       button(parent, "Earlier", "\u2190", () => picture.pan(-0.5));
       button(parent, "Later", "\u2192", () => picture.pan(0.5));
