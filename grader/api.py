@@ -204,6 +204,11 @@ if TYPE_CHECKING:
     from grader.judging.wording import numbers as numbers
     from grader.judging.wording import quote as quote
     from grader.judging.wording import span as span
+    from grader.reporting.escape import csv_cell as csv_cell
+    from grader.reporting.escape import shown as shown
+    from grader.reporting.escape import shown_lines as shown_lines
+    from grader.reporting.formats import Format as Format
+    from grader.reporting.json_report import report_to_json as report_to_json
     from grader.simulation import DifferentialDrive as DifferentialDrive
     from grader.simulation import Moment as Moment
     from grader.simulation import Output as Output
@@ -285,6 +290,11 @@ CONTENTS: dict[str, dict[str, str]] = {
             "message_classes value_of number_in_code text_in_code elsewhere_because goes_to head_of "
             "python_loggers waits_for_ever"
         ),
+    },
+    "Report formats": {
+        "grader.reporting.formats": "Format",
+        "grader.reporting.json_report": "report_to_json",
+        "grader.reporting.escape": "shown shown_lines csv_cell",
     },
     "Simulations": {
         "grader.simulation": "Simulation Moment Output DifferentialDrive Turtle Unicycle",

@@ -18,9 +18,8 @@ import click
 
 import grader
 from grader.cli import batch, completion, export, interfaces, rejudge, rubric, upload, verify
-from grader.cli.completion import complete_criterion, complete_exercise, complete_file, complete_output
+from grader.cli.completion import complete_criterion, complete_exercise, complete_file
 from grader.cli.options import (
-    EVIDENCE,
     ISOLATION,
     PATH,
     RUBRIC,
@@ -32,7 +31,6 @@ from grader.cli.options import (
     inputs_options,
     interfaces_option,
     isolation_option,
-    parse_outputs,
     parse_percent,
     parse_share,
     print_result,
@@ -41,6 +39,7 @@ from grader.cli.options import (
     shown_progress,
     time_budget_option,
 )
+from grader.cli.outputs import outputs_option
 from grader.core.dataclass import dataclass
 from grader.core.errors import (
     ALL_MET,
@@ -52,7 +51,7 @@ from grader.core.errors import (
     RubricError,
     exit_code,
 )
-from grader.reporting.formats import FORMATS
+from grader.reporting.formats import EVIDENCE, known
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -129,16 +128,7 @@ class _Default(click.Command):
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key and the files handed in.")
 @recording_options
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON, and nothing else.")
-@click.option(
-    "-o",
-    "--output",
-    "outputs",
-    metavar="FORMAT=PATH",
-    multiple=True,
-    callback=parse_outputs,
-    shell_complete=complete_output,
-    help=f"Write a report ({', '.join(FORMATS)}), `-` is standard output; or keep evidence=FOLDER; repeatable.",
-)
+@outputs_option("Write a report ({formats}), `-` is standard output; or keep evidence=FOLDER; repeatable.")
 @click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 @interfaces_option
 @click.option(
@@ -285,7 +275,7 @@ class _Grading:
 
         remember = self.writer.remember if self.writer is not None else None
         early = early_delivery(self.outputs, self.readers)
-        pictures = any(FORMATS[output.format].illustrated for output in self.outputs)
+        pictures = any(known(output.format).illustrated for output in self.outputs)
         with shown_progress(wanted=self.shows_progress) as progress:
             progress("starting")
             report = start.grade(

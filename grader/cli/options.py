@@ -19,7 +19,6 @@ from grader.core.errors import EnvironmentFault, GraderError
 from grader.core.limits import TIME_BUDGET_S
 from grader.core.rubric_files import rubric_file
 from grader.core.scenario import ODOMETRY
-from grader.reporting.formats import FORMATS
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -27,12 +26,9 @@ if TYPE_CHECKING:
     from grader.app.grade import Progress
     from grader.app.seeds import ByKey, SeedKey
     from grader.reporting.audience import Readers
-    from grader.reporting.delivery import Output
     from grader.reporting.formats import PageLayout
 
 
-#: The format name in `-o evidence=FOLDER`, which keeps the recordings of a run.
-EVIDENCE = "evidence"
 PATH = click.Path(path_type=Path)
 
 
@@ -185,29 +181,6 @@ def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) ->
     except ValueError:
         pass
     raise click.BadParameter(f"expected a date such as 2026-12-01, found {value!r}")
-
-
-def parse_outputs(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[Output, ...]:
-    """Parse the values of `-o FORMAT=PATH`; a click callback."""
-    del ctx, param
-    return tuple(_parse_output(value) for value in values)
-
-
-def _parse_output(value: str) -> Output:
-    format_, equals, path = value.partition("=")
-    if not equals or not path or not format_:
-        from grader.cli.near_misses import output_meant
-
-        meant = output_meant(value)
-        likely = f"; did you mean {meant}" if meant else ""
-        raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}{likely}")
-    if format_ not in (*FORMATS, EVIDENCE):
-        raise click.BadParameter(f"{format_!r} is not a format{nearest(format_, [*FORMATS, EVIDENCE])}")
-    if format_ == EVIDENCE and path == "-":
-        raise click.BadParameter("evidence is a folder: expected evidence=FOLDER, found evidence=-")
-    from grader.reporting.delivery import Output
-
-    return Output(format_, None if path == "-" else Path(path))
 
 
 def parse_percent(ctx: click.Context, param: click.Parameter, value: float | None) -> Fraction | None:
