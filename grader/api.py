@@ -14,6 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from grader.classroom.local import Attempt as Attempt
+    from grader.classroom.local import ClassScheduler as ClassScheduler
+    from grader.classroom.local import failed_attempt as failed_attempt
+    from grader.classroom.receiving import UnwantedError as UnwantedError
+    from grader.classroom.receiving import grade_packed as grade_packed
+    from grader.classroom.schedulers import Connect as Connect
+    from grader.classroom.sending import pack_task as pack_task
+    from grader.classroom.sending import store_answer as store_answer
     from grader.core.chart import Band as Band
     from grader.core.chart import Chart as Chart
     from grader.core.chart import Level as Level
@@ -295,6 +303,12 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.reporting.formats": "Format",
         "grader.reporting.json_report": "report_to_json",
         "grader.reporting.escape": "shown shown_lines csv_cell",
+    },
+    "Class schedulers": {
+        "grader.classroom.schedulers": "Connect",
+        "grader.classroom.local": "ClassScheduler Attempt failed_attempt",
+        "grader.classroom.sending": "pack_task store_answer",
+        "grader.classroom.receiving": "grade_packed UnwantedError",
     },
     "Simulations": {
         "grader.simulation": "Simulation Moment Output DifferentialDrive Turtle Unicycle",

@@ -32,12 +32,14 @@ def installed(files: Mapping[str, str], folder: Path) -> Path:
     return target
 
 
-def grade(*arguments: str, packages: Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+def grade(
+    *arguments: str, packages: Path, cwd: Path, environment: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run `grade` where the packages in a folder are installed as well."""
     command = [sys.executable, "-c", "from grader.cli.main import main; main()", *arguments]
     paths = os.pathsep.join(filter(None, [str(packages), str(ROOT), os.environ.get("PYTHONPATH", "")]))
-    environment = {**os.environ, "PYTHONPATH": paths, "COLUMNS": "120"}
-    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    around = {**os.environ, "PYTHONPATH": paths, "COLUMNS": "120", **(environment or {})}
+    return subprocess.run(command, cwd=cwd, env=around, capture_output=True, text=True, check=False, timeout=300)
 
 
 def register(

@@ -120,6 +120,9 @@ def _added_format(name: str, package: str) -> Fact:
 
 
 def _added_scheduler(name: str, package: str) -> Fact:
+    if name in entry_points.own(entry_points.SCHEDULERS):
+        text = f"{name} of {package} is not used: the grader has its own"
+        return Fact("class scheduler", text, remedy=f"give the scheduler of {package.partition(' ')[0]} another name")
     try:
         entry_points.load(entry_points.SCHEDULERS, name, object, "a scheduler")
     except EnvironmentFault as fault:

@@ -148,7 +148,7 @@ class LocalScheduler:
             try:
                 process = self._start()
             except OSError as error:
-                return failed(task, f"the grader cannot be started: {error.strerror}")
+                return failed_attempt(task, f"the grader cannot be started: {error.strerror}")
             return self._attempt(process, task, on_step, place, waiting)
 
     @contextmanager
@@ -189,8 +189,8 @@ class LocalScheduler:
         if status is not None:
             return Attempt(task, status)
         if overdue.is_set():
-            return failed(task, f"the grader was not done after {task.deadline_s:.0f} s")
-        return failed(task, f"the grader ended without a result (exit code {process.returncode})")
+            return failed_attempt(task, f"the grader was not done after {task.deadline_s:.0f} s")
+        return failed_attempt(task, f"the grader ended without a result (exit code {process.returncode})")
 
     def _idle_one(self) -> subprocess.Popen[bytes] | None:
         with self._lock:
@@ -308,6 +308,6 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
             os.killpg(process.pid, signal.SIGKILL)
 
 
-def failed(task: Task, problem: str, hint: str = AGAIN) -> Attempt:
+def failed_attempt(task: Task, problem: str, hint: str = AGAIN) -> Attempt:
     """Build a failed attempt, which is never the student's fault."""
     return Attempt(task, ResultStatus(State.FAILED, "", "", task.label, problem, hint))

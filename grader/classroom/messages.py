@@ -22,7 +22,7 @@ MAX_ANSWER_FILES = 1_000
 
 # File names are bytes, because a student's file name need not be valid text.
 Files = tuple[tuple[bytes, bytes], ...]
-_Message = TypeVar("_Message", "Terms", "GradingJob", "JobResult", "Fitness", "_Reading")
+_Message = TypeVar("_Message", "Terms", "GradingJob", "JobResult", "Fitness", "Parcel", "_Reading")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +61,15 @@ class GradingJob:
 
 
 @dataclass(frozen=True, slots=True)
+class Parcel:
+    """One submission with all that another machine needs to grade it."""
+
+    version: str  # of the grader that asks
+    terms: bytes  # packed `Terms`
+    job: bytes  # packed `GradingJob`
+
+
+@dataclass(frozen=True, slots=True)
 class JobResult:
     """The result of one submission."""
 
@@ -87,7 +96,7 @@ class _Reading:
     notes: tuple[bytes, ...]
 
 
-def pack(message: Terms | GradingJob | JobResult | Fitness) -> bytes:
+def pack(message: Terms | GradingJob | JobResult | Fitness | Parcel) -> bytes:
     """Encode a message."""
     return msgspec.msgpack.encode(message)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from grader.app.kept_recordings import PlannedRun, recorded_alike
 from grader.app.rejudge import WORTH_A_POOL, judged_again
 from grader.app.request import request_to_json
-from grader.classroom.local import Attempt, Task, failed
+from grader.classroom.local import Attempt, Task, failed_attempt
 from grader.classroom.store import Conditions, ResultStatus, State
 from grader.classroom.worker import EVIDENCE, request_for, status_of, write_reports
 from grader.core.dataclass import dataclass
@@ -94,11 +94,11 @@ def _attempt(task: Task, kept: KeptRecordings) -> Attempt:
     try:
         status = _judged(task, kept)
     except GraderError as error:
-        return failed(task, error.message)
+        return failed_attempt(task, error.message)
     except OSError as error:
-        return failed(task, f"the result cannot be written: {error.strerror}")
+        return failed_attempt(task, f"the result cannot be written: {error.strerror}")
     except Exception as error:  # as in `worker.attempt`; the submission is run then
-        return failed(task, f"the grader failed: {type(error).__name__}: {error}")
+        return failed_attempt(task, f"the grader failed: {type(error).__name__}: {error}")
     return Attempt(task, replace(status, duration_s=round(time.perf_counter() - began_s, 3)))
 
 

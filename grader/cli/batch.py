@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,15 +17,14 @@ from grader.cli.options import (
     parse_share,
     print_result,
     recording_options,
-    require,
     time_budget_option,
 )
 from grader.cli.remembered import RepeatingCommand, is_left_out, options_to_keep
 from grader.core.checkup import TIERS
 from grader.core.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED, UNUSABLE
+from grader.core.extras import require
 
 if TYPE_CHECKING:
-    from grader.classroom.local import MakeScheduler
     from grader.classroom.outputs import Graded
 
 _LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "canvas")
@@ -47,7 +45,11 @@ _RERUNS = ("changed", "failed", "undecided", "all")
     help="Late days, scores, comments; else RESULTS/adjust.yaml.",
 )
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Submissions at a time; by default one a core.")
-@click.option("--scheduler", metavar="ADDRESS", help="Grade on the Dask cluster of this scheduler, or scheduler file.")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Grade on the Dask cluster of this scheduler, or scheduler file; NAME=PLACE for one of another package.",
+)
 @click.option(
     "--rerun", type=click.Choice(_RERUNS), default="changed", help="Which submissions to grade again, besides new ones."
 )
@@ -129,14 +131,13 @@ def command(  # noqa: PLR0913  one parameter an option
     Exit codes: 0 everybody was graded, 1 a submission cannot be used, 2 the command or something it was given cannot be
     used, or a rubric has a mistake, 3 something failed or was undecided through no fault of a student, 130 interrupted.
     """
-    if scheduler is not None:
-        require("--scheduler", "distributed", "dask")
     if similarity:
         require("--similarity", "copydetect", "similarity")
     from grader.app.request import GradeRequest
     from grader.classroom.class_run import grade_class
     from grader.classroom.grading import ClassRequest
     from grader.classroom.outputs import platforms, render_summary, summary_json
+    from grader.classroom.schedulers import opened
     from grader.classroom.watching import shown_watcher
     from grader.core.shipped import shipped
     from grader.similarity.finding import read_given
@@ -165,7 +166,7 @@ def command(  # noqa: PLR0913  one parameter an option
         given=read_given(templates or (shipped("student_template"),)) if similarity else None,
     )
     try:
-        with _scheduler_factory(scheduler, jobs) as make, shown_watcher(wanted=not no_progress) as watcher:
+        with opened(scheduler, jobs, complain) as make, shown_watcher(wanted=not no_progress) as watcher:
             graded = grade_class(course, watcher, complain, make)
     except KeyboardInterrupt:
         click.echo("interrupted: what was graded is kept; run the same command again to continue", err=True)
@@ -176,17 +177,6 @@ def command(  # noqa: PLR0913  one parameter an option
         complain(f"the rubric has a mistake: {mistake} ({count})", kind="error")
         complain("correct it, and run the same command again", kind="hint")
     return _code(graded)
-
-
-def _scheduler_factory(scheduler: str | None, jobs: int | None) -> AbstractContextManager[MakeScheduler]:
-    """Return a scheduler factory for this machine, or for a cluster, which stays connected in the context."""
-    if scheduler is None:
-        from grader.classroom.local import LocalScheduler
-
-        return nullcontext(LocalScheduler)
-    from grader.classroom.cluster.dispatcher import connected
-
-    return connected(scheduler, jobs, complain)
 
 
 def _code(graded: Graded) -> int:

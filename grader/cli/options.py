@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import re
 import sys
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from grader.core.checkup import TIERS
-from grader.core.errors import EnvironmentFault, GraderError
+from grader.core.errors import GraderError
 from grader.core.limits import TIME_BUDGET_S
 from grader.core.rubric_files import rubric_file
 from grader.core.scenario import ODOMETRY
@@ -158,15 +157,6 @@ def drawn_with(seed: int | None, path: Path | None) -> SeedKey | None:
     from grader.app.seeds import seed_key
 
     return seed_key(path)
-
-
-def require(what: str, library: str, extra: str) -> None:
-    """Raise EnvironmentFault, with the command to install it, if the library of an optional extra is missing."""
-    if importlib.util.find_spec(library) is None:
-        from grader.core.extras import install_command
-
-        message = f"{what}: expected the package {library} of the extra {extra!r}, found none"
-        raise EnvironmentFault(message, install_command(library))
 
 
 def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) -> str:

@@ -15,12 +15,12 @@ from grader.cli.options import (
     interfaces_option,
     print_for_programs,
     print_result,
-    require,
     shown_progress,
     write_file,
 )
 from grader.core.checkup import TIERS
 from grader.core.errors import ALL_MET, NOT_ALL_MET, UNUSABLE, GraderError, RubricError
+from grader.core.extras import require
 from grader.core.rubric_files import notes_on, rubric_files, rubric_of
 
 if TYPE_CHECKING:

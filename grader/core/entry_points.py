@@ -41,6 +41,8 @@ def load(group: str, name: str, kind: type[_Kind], expected: str) -> tuple[_Kind
     found = {_package(entry): entry for entry in _entries(group) if entry.name == name}
     if not found:
         return None
+    own = {package: entry for package, entry in found.items() if _is_own(package)}
+    found = own or found  # names of the grader stay its own
     if len(found) > 1:
         problem = f"{name!r} of {group}: expected one package that registers it, found {' and '.join(sorted(found))}"
         raise EnvironmentFault(problem, "uninstall all but one of them")
@@ -60,7 +62,12 @@ def added(group: str) -> list[tuple[str, str]]:
     Raises EnvironmentFault if the metadata of a package cannot be read.
     """
     found = {(entry.name, _package(entry)) for entry in _entries(group)}
-    return sorted((name, package) for name, package in found if package.partition(" ")[0] != _GRADER)
+    return sorted((name, package) for name, package in found if not _is_own(package))
+
+
+def own(group: str) -> list[str]:
+    """Return the names that the grader itself registers; raises as `added`."""
+    return [entry.name for entry in _entries(group) if _is_own(_package(entry))]
 
 
 @contextmanager
@@ -68,7 +75,7 @@ def faults(problem: str, hint: str) -> Iterator[None]:
     """Make an EnvironmentFault of whatever the code of another package raises, an exit included."""
     try:
         yield
-    except (GraderError, KeyboardInterrupt):
+    except (GraderError, KeyboardInterrupt, GeneratorExit):
         raise
     except BaseException as error:
         raise EnvironmentFault(f"{problem}: {_told(error)}", hint) from error
@@ -91,6 +98,10 @@ def _entries(group: str) -> list[EntryPoint]:
 
 def _package(entry: EntryPoint) -> str:
     return "an unknown package" if entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
+
+
+def _is_own(package: str) -> bool:
+    return package.partition(" ")[0] == _GRADER
 
 
 def _remedy(package: str) -> str:

@@ -19,9 +19,9 @@ from ruamel.yaml import YAML
 
 from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest
-from grader.classroom.cluster.jobs import write_task
-from grader.classroom.cluster.sending import checks_of
 from grader.classroom.messages import GradingJob, Terms
+from grader.classroom.receiving import write_task
+from grader.classroom.sending import checks_of
 from grader.classroom.store import Conditions
 from grader.cli import main
 from grader.core.author_files import run

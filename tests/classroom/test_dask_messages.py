@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from dask_samples import CONDITIONS, graded, task
 
-from grader.classroom.cluster.jobs import write_task
-from grader.classroom.cluster.sending import job_for, store_result, terms_of
-from grader.classroom.local import Attempt, Task, failed
+from grader.classroom.local import Attempt, Task, failed_attempt
 from grader.classroom.messages import GradingJob, JobResult, SentBag, Terms, pack, read_collected, unpack, write_answer
+from grader.classroom.receiving import write_task
+from grader.classroom.sending import job_for, store_result, terms_of
 from grader.classroom.store import State
 from grader.core.errors import HarnessError, RecordingError, RubricError
 from grader.submissions.submission import stage_collected, stage_submission
@@ -137,7 +137,7 @@ def test_another_rubric_is_no_result(tmp_path: Path) -> None:
 @pytest.mark.parametrize("data", [b"", b"\xc1", b"\x81\xa1a\x01", pickle.dumps({}), pack(JobResult("w", b"[]"))])
 def test_nonsense_is_no_result(tmp_path: Path, data: bytes) -> None:
     """Whatever comes back, it is read as data, never run, and never a mark."""
-    from grader.classroom.cluster.sending import answer_in
+    from grader.classroom.sending import answer_in
 
     assert store_result(task(tmp_path), answer_in(data, "cluster")).status.state is State.FAILED
 
@@ -146,7 +146,7 @@ def test_a_full_disk_is_a_failure(tmp_path: Path) -> None:
     """The result is tried again when there is room."""
     one = task(tmp_path, into=tmp_path / "no" / "such" / "folder")
     assert store_result(one, graded()).status.problem == "the result cannot be written: No such file or directory"
-    assert failed(one, "x").status.hint == "run the same command again"
+    assert failed_attempt(one, "x").status.hint == "run the same command again"
 
 
 def test_too_many_files_are_no_result(tmp_path: Path) -> None:

@@ -1,8 +1,7 @@
-"""Runs on the workers of a cluster: grades a submission sent as bytes, and answers in bytes."""
+"""Runs on another machine: grades a submission that was sent as bytes, and answers in bytes."""
 
 from __future__ import annotations
 
-import asyncio
 import fcntl
 import os
 import socket
@@ -12,8 +11,6 @@ from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from distributed import Worker, get_worker
-
 import grader
 from grader.classroom import store as kept
 from grader.classroom.local import AGAIN, Attempt, LocalScheduler, Task
@@ -22,6 +19,7 @@ from grader.classroom.messages import (
     Fitness,
     GradingJob,
     JobResult,
+    Parcel,
     Terms,
     files_below,
     pack,
@@ -154,42 +152,35 @@ def _alone() -> Iterator[None]:
         os.close(lock)
 
 
-#: Keys of a progress event.
-NAME, STEP = "name", "step"
-_UNWANTED = ("cancelled", "released", "forgotten")
+class UnwantedError(Exception):
+    """The result is no longer wanted: raised by an `on_step`, it ends the grading and comes out."""
 
 
-class _UnwantedError(Exception):
-    """The result of this submission is no longer wanted."""
+def _unheard(step: str) -> None:
+    """Report steps to nobody."""
 
 
-async def inspect(isolation: str, dask_worker: Worker) -> bytes:
-    """Report whether this worker can grade, as a packed `Fitness`; Dask supplies it because of the parameter's name."""
-    return pack(await asyncio.to_thread(fitness, isolation, _machine(dask_worker)))
+def grade_packed(parcel: bytes, on_step: Callable[[str], None] = _unheard) -> bytes:
+    """Grade a submission that `pack_task` packed on another machine, and return the answer for `store_answer` there.
 
-
-def grade(version: str, terms: bytes, job: bytes, topic: str) -> bytes:
-    """Grade a submission, and return a packed `JobResult`.
-
-    The version is that of the requesting machine, terms and job are packed, and events of progress go to the topic.
+    Steps are passed to `on_step`, which may raise UnwantedError; nothing else is raised.
     """
-    worker = get_worker()
-    machine = _machine(worker)
+    machine = socket.gethostname()
+    try:
+        given = unpack(parcel, Parcel)
+    except HarnessError as error:
+        return pack(JobResult(machine, unfit=error.message, hint=error.hint))
+    return answer(given.version, given.terms, given.job, machine, on_step)
+
+
+def answer(version: str, terms: bytes, job: bytes, machine: str, on_step: Callable[[str], None]) -> bytes:
+    """Grade a submission for a grader of this version, and return a packed `JobResult`; see `grade_packed`."""
     if version != grader.__version__:
         return pack(JobResult(machine, unfit=other_version(version, grader.__version__), hint=remedy(version)))
-    key = worker.get_current_task()
-
-    def on_step(step: str) -> None:
-        task = worker.state.tasks.get(key)
-        if task is None or task.state in _UNWANTED:
-            raise _UnwantedError
-        worker.log_event(topic, {NAME: what.name, STEP: step})
-
     try:
-        what = unpack(job, GradingJob)
-        return pack(grade_job(unpack(terms, Terms), what, machine, on_step))
-    except _UnwantedError:
-        return b""
+        return pack(grade_job(unpack(terms, Terms), unpack(job, GradingJob), machine, on_step))
+    except UnwantedError:
+        raise
     except HarnessError as error:
         return pack(JobResult(machine, unfit=error.message, hint=error.hint))
     except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
@@ -203,8 +194,4 @@ def other_version(wanted: str, found: str) -> str:
 
 def remedy(version: str) -> str:
     """Return the hint that fixes a wrong version."""
-    return f"install rclpy-grader {version} with its extra dask there"
-
-
-def _machine(worker: Worker) -> str:
-    return f"worker {worker.address} on {socket.gethostname()}"
+    return f"install rclpy-grader {version} there"

@@ -1,4 +1,4 @@
-"""Packs submissions for a cluster, and stores its answers; does not depend on the transport."""
+"""Packs submissions for other machines, and stores their answers; knows no way that these travel."""
 
 from __future__ import annotations
 
@@ -6,25 +6,29 @@ import os
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
+import grader
 from grader.app.grade import read_exercises, wanted_files
 from grader.app.request import GradeRequest
 from grader.classroom import store as kept
-from grader.classroom.local import Attempt, Task, failed
+from grader.classroom.local import Attempt, Task, failed_attempt
 from grader.classroom.messages import (
     Files,
     GradingJob,
     JobResult,
+    Parcel,
     SentBag,
     Terms,
     files_below,
+    pack,
     pack_collected,
     travelling_name,
     unpack,
     write_answer,
 )
-from grader.classroom.store import State, refused
+from grader.classroom.store import ResultStatus, State, refused
 from grader.classroom.worker import PARTS
 from grader.core.errors import HarnessError, RecordingError, RubricError, SubmissionError
 from grader.interfaces.definitions import files_in
@@ -63,9 +67,15 @@ def _definitions(folders: Sequence[Path]) -> Iterator[tuple[bytes, bytes]]:
 
 
 def files_wanted(task: Task) -> Sequence[str]:
-    """Return the names of the files that the class of a task has to hand in."""
-    asked = GradeRequest("", exercises=task.exercises, every=task.conditions.every, rubrics=task.rubrics, draw=First())
-    asked = replace(asked, interfaces=task.interfaces)
+    """Return the names of the files that the class of a task has to hand in; all tasks of a class share them."""
+    return _files_wanted(task.exercises, task.rubrics, task.interfaces, every=task.conditions.every)
+
+
+@cache
+def _files_wanted(
+    exercises: tuple[str, ...], rubrics: tuple[Path, ...], interfaces: tuple[Path, ...], *, every: bool
+) -> Sequence[str]:
+    asked = GradeRequest("", exercises=exercises, every=every, rubrics=rubrics, interfaces=interfaces, draw=First())
     return wanted_files(read_exercises(asked))
 
 
@@ -77,7 +87,7 @@ def job_for(task: Task, wanted: Sequence[str]) -> GradingJob | Attempt:
     except SubmissionError as error:
         return Attempt(task, refused(task.label, task.conditions, error))
     except (OSError, MemoryError, RecursionError) as error:
-        return failed(task, f"the submission cannot be read: {type(error).__name__}")
+        return failed_attempt(task, f"the submission cannot be read: {type(error).__name__}")
     return GradingJob(
         task.name,
         os.fsencode(task.label),
@@ -88,23 +98,58 @@ def job_for(task: Task, wanted: Sequence[str]) -> GradingJob | Attempt:
     )
 
 
+def has_report(status: ResultStatus) -> bool:
+    """Return whether a report belongs to a status."""
+    return status.state in (State.GRADED, State.UNDECIDED)
+
+
+def doubt(task: Task, status: object) -> str:
+    """Return why the status of a task that was graded elsewhere cannot be believed; empty if it can."""
+    if not isinstance(status, ResultStatus) or not isinstance(status.state, State):
+        return "expected a result, found something else"
+    if has_report(status) and status.key != task.conditions.key(status.digest):
+        return "graded by other rubrics or another recording than those here"
+    return ""
+
+
 def store_result(task: Task, answer: JobResult) -> Attempt:
     """Write the result from an answer into the task's folder."""
     status = kept.load(answer.status)
     if status is None:
-        return failed(task, f"{answer.machine}: expected a result, found something else")
-    conditions = task.conditions
-    has_report = status.state in (State.GRADED, State.UNDECIDED)
-    if has_report and status.key != conditions.key(status.digest):
-        return failed(task, f"{answer.machine}: graded by other rubrics or another recording than those here")
+        return failed_attempt(task, f"{answer.machine}: expected a result, found something else")
+    if wrong := doubt(task, status):
+        return failed_attempt(task, f"{answer.machine}: {wrong}")
     try:
-        if has_report:
+        if has_report(status):
             write_answer(answer.files, task.into, _PARTS)
     except HarnessError as error:
-        return failed(task, f"{answer.machine}: {error.message}")
+        return failed_attempt(task, f"{answer.machine}: {error.message}")
     except OSError as error:
-        return failed(task, f"the result cannot be written: {error.strerror}")
+        return failed_attempt(task, f"the result cannot be written: {error.strerror}")
     return Attempt(task, replace(status, label=task.label))
+
+
+def pack_task(task: Task) -> bytes | Attempt:
+    """Pack a submission with all that another machine needs to grade it, for `grade_packed` there.
+
+    Return an attempt instead if the submission cannot be used, or cannot be read. Raises GraderError if a rubric, a
+    recording or an interface package cannot be read.
+    """
+    job = job_for(task, files_wanted(task))
+    if isinstance(job, Attempt):
+        return job
+    return pack(Parcel(grader.__version__, pack(terms_of(task)), pack(job)))
+
+
+def store_answer(task: Task, answer: object, machine: str) -> Attempt:
+    """Write the files of an answer of `grade_packed` into the task's folder, and return the attempt.
+
+    Whatever came instead of an answer makes it a failure of the machine, which is named so, and never a mark.
+    """
+    result = answer_in(answer, machine)
+    if result.unfit:
+        return failed_attempt(task, f"{result.machine}: {result.unfit}", *filter(None, [result.hint]))
+    return store_result(task, result)
 
 
 def answer_in(data: object, machine: str) -> JobResult:
