@@ -560,16 +560,19 @@ LOCKS = {
 
 
 @pytest.mark.parametrize("lock", LOCKS)
-def test_a_lock_on_a_shared_file_is_felt_by_nobody(
-    any_tier: Sandbox, tmp_path: Path, ros: RosInstallation, lock: str
-) -> None:
-    """Students who are graded at the same time could speak by it; the program believes that it has its lock."""
+def test_a_lock_on_a_shared_file_is_felt_by_nobody(any_tier: Sandbox, submission: Path, lock: str) -> None:
+    """Students who are graded at the same time could speak by it; the program believes that it has its lock.
+
+    The file is this test's own: another test that holds its lock on a library's file would fail this one.
+    """
     if any_tier.isolation.name == "none":
         pytest.skip("there is no filter")
-    shared = Path(os.__file__)
+    shared = submission / "shared"
+    shared.touch()
+    seen_at = Path(any_tier.isolation.submission_seen_at or submission)
     code = f"""
 import fcntl, struct, sys, time
-file = open({str(shared)!r}, "rb")
+file = open({str(seen_at / "shared")!r}, "rb")
 {LOCKS[lock]}
 print("locked", flush=True)
 time.sleep(60)
