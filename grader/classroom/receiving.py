@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import grader
 from grader.classroom import store as kept
@@ -28,6 +28,7 @@ from grader.classroom.messages import (
 from grader.classroom.store import ResultStatus, State
 from grader.core.checkup import NO_SANDBOX, missing
 from grader.core.errors import EnvironmentFault, GraderError, HarnessError
+from grader.core.grading_options import paths
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import TierChoice, choose_isolation
 from grader.execution.temp_dirs import scratch_folder
@@ -51,7 +52,7 @@ def fitness(isolation: str, machine: str) -> Fitness:
 def grade_job(terms: Terms, job: GradingJob, machine: str, on_step: Callable[[str], None]) -> JobResult:
     """Grade a submission in its own process, in a sandbox chosen here; an exception of `on_step` aborts it."""
     try:
-        choice = choose_isolation(terms.conditions.isolation, find_ros())
+        choice = choose_isolation(terms.conditions.options.isolation, find_ros())
     except EnvironmentFault as fault:
         return JobResult(machine, unfit=fault.message, hint=fault.hint)
     try:
@@ -95,11 +96,12 @@ def write_task(terms: Terms, job: GradingJob, scratch: Path) -> Task:
     """
     start = _start(terms, scratch)
     start.mkdir(parents=True)
-    for name, content in (*terms.rubrics, *terms.checks):
-        _write(start, os.fsdecode(name), content, scratch)
-    for bag in terms.bags:
-        for name, content in bag.files:
-            _write(start, str(PurePosixPath(os.fsdecode(bag.path), os.fsdecode(name))), content, scratch)
+    for name, content in terms.files:
+        path = _inside(start, Path(os.fsdecode(name)), scratch)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    for path in paths(terms.conditions.options):
+        _inside(start, path, scratch)
     collected = scratch / "collected"
     collected.write_bytes(job.collected)
     return Task(
@@ -107,32 +109,28 @@ def write_task(terms: Terms, job: GradingJob, scratch: Path) -> Task:
         label=os.fsdecode(job.label),
         submission=Path(os.fsdecode(job.path)),
         into=scratch / "result",
-        exercises=terms.exercises,
-        rubrics=tuple(Path(os.fsdecode(name)) for name, _ in terms.rubrics),
-        bags=tuple((bag.name, Path(os.fsdecode(bag.path))) for bag in terms.bags),
-        conditions=replace(terms.conditions, variants=job.variants, seed=job.seed),
+        conditions=terms.conditions.of_submission(job.seed, job.variants),
         # The parallelism of a cluster is one submission per thread.
         workers=1,
         standalone=terms.standalone,
         deadline_s=terms.deadline_s,
         collected=collected,
-        interfaces=tuple(Path(os.fsdecode(name)) for name in terms.interfaces),
     )
 
 
 def _start(terms: Terms, scratch: Path) -> Path:
     """Return where relative paths start from: so deep that those which lead up stay inside."""
-    names = (*(name for name, _ in (*terms.rubrics, *terms.checks)), *(bag.path for bag in terms.bags))
-    up = max((name.split(b"/").count(b"..") for name in names), default=0)
+    named = (*(Path(os.fsdecode(name)) for name, _ in terms.files), *paths(terms.conditions.options))
+    up = max((path.parts.count("..") for path in named), default=0)
     return scratch.joinpath("files", *["up"] * up)
 
 
-def _write(start: Path, name: str, content: bytes, scratch: Path) -> None:
-    path = Path(os.path.normpath(start / name))
+def _inside(start: Path, named: Path, scratch: Path) -> Path:
+    """Return where a path leads from the start; raises HarnessError if that is outside of what was laid out here."""
+    path = Path(os.path.normpath(start / named))
     if not path.is_relative_to(scratch / "files"):
         raise HarnessError("terms: expected paths that stay inside, found one that does not")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(content)
+    return path
 
 
 def _one_at_a_time(choice: TierChoice) -> bool:

@@ -15,7 +15,7 @@ from grader.app.rejudge import WORTH_A_POOL, judged_again
 from grader.app.request import request_to_json
 from grader.classroom.local import Attempt, Task, failed_attempt
 from grader.classroom.store import Conditions, ResultStatus, State
-from grader.classroom.worker import EVIDENCE, request_for, status_of, write_reports
+from grader.classroom.worker import EVIDENCE, request_of_task, status_of, write_reports
 from grader.core.dataclass import dataclass
 from grader.core.errors import EvidenceError, GraderError
 from grader.core.exercise import Exercise
@@ -47,7 +47,7 @@ def kept_recordings(
     The earlier result must be of the same files, seed, clock, sandbox, limits and version of the grader; rubrics are
     compared by their scenarios.
     """
-    if result is None or result.state not in (State.GRADED, State.UNDECIDED) or conditions.seed is None:
+    if result is None or result.state not in (State.GRADED, State.UNDECIDED) or conditions.options.seed is None:
         return None
     if not digest or result.recorded != conditions.recorded(digest):
         return None
@@ -55,7 +55,7 @@ def kept_recordings(
         evidence = open_evidence(place / EVIDENCE)
     except EvidenceError:
         return None
-    planned = PlannedRun(digest, conditions.seed, conditions.recording, conditions.interfaces)
+    planned = PlannedRun(digest, conditions.options.seed, conditions.recording, conditions.interfaces)
     reused = frozenset(exercise.id for exercise in recorded_alike(evidence, exercises, planned))
     return KeptRecordings(place / EVIDENCE, tuple(exercises), reused) if reused else None
 
@@ -103,7 +103,7 @@ def _attempt(task: Task, kept: KeptRecordings) -> Attempt:
 
 
 def _judged(task: Task, kept: KeptRecordings) -> ResultStatus:
-    request = request_for(task)
+    request = request_of_task(task)
     evidence = open_evidence(kept.evidence)
     report = judged_again(evidence, kept.exercises, request, task.conditions.recording)
     task.into.mkdir()

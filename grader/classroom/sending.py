@@ -11,7 +11,7 @@ from pathlib import Path
 
 import grader
 from grader.app.grade import read_exercises, wanted_files
-from grader.app.request import GradeRequest
+from grader.app.request import request_for
 from grader.classroom import store as kept
 from grader.classroom.local import Attempt, Task, failed_attempt
 from grader.classroom.messages import (
@@ -19,7 +19,6 @@ from grader.classroom.messages import (
     GradingJob,
     JobResult,
     Parcel,
-    SentBag,
     Terms,
     files_below,
     pack,
@@ -31,6 +30,7 @@ from grader.classroom.messages import (
 from grader.classroom.store import ResultStatus, State, refused
 from grader.classroom.worker import PARTS
 from grader.core.errors import HarnessError, RecordingError, RubricError, SubmissionError
+from grader.core.grading_options import GradingOptions, with_paths
 from grader.interfaces.definitions import files_in
 from grader.rubrics.draws import First
 from grader.rubrics.loader import side_files
@@ -42,15 +42,26 @@ _PARTS = frozenset(PARTS)
 def terms_of(task: Task) -> Terms:
     """Collect what the class of a task is graded with; raises GraderError if a file cannot be read."""
     return Terms(
-        conditions=replace(task.conditions, seed=None),  # each job has its own seed
-        exercises=task.exercises,
-        rubrics=tuple((travelling_name(path), _content(path)) for path in task.rubrics),
-        checks=(*checks_of(task.rubrics), *_definitions(task.interfaces)),
-        interfaces=tuple(map(travelling_name, task.interfaces)),
-        bags=tuple(SentBag(name, travelling_name(path), _recording(path)) for name, path in task.bags),
+        conditions=replace(task.conditions, options=_travelling(task.conditions.options)),
+        files=tuple(_files(task.conditions.options)),
         standalone=task.standalone,
         deadline_s=task.deadline_s,
     )
+
+
+def _travelling(options: GradingOptions) -> GradingOptions:
+    """Return the options as another machine reads them; each job has its own seed."""
+    return replace(with_paths(options, lambda path: Path(os.fsdecode(travelling_name(path)))), seed=None)
+
+
+def _files(options: GradingOptions) -> Iterator[tuple[bytes, bytes]]:
+    """Yield relative path and content of the files that the options name; the course key is not among them."""
+    yield from ((travelling_name(path), _content(path)) for path in options.rubrics)
+    yield from checks_of(options.rubrics)
+    yield from _definitions(options.interfaces)
+    for _, path in options.bags:
+        bag = travelling_name(path)
+        yield from ((b"/".join(filter(None, (bag, name))), content) for name, content in _recording(path))
 
 
 def checks_of(rubrics: Sequence[Path]) -> Iterator[tuple[bytes, bytes]]:
@@ -68,15 +79,12 @@ def _definitions(folders: Sequence[Path]) -> Iterator[tuple[bytes, bytes]]:
 
 def files_wanted(task: Task) -> Sequence[str]:
     """Return the names of the files that the class of a task has to hand in; all tasks of a class share them."""
-    return _files_wanted(task.exercises, task.rubrics, task.interfaces, every=task.conditions.every)
+    return _files_wanted(replace(task.conditions.options, bags=(), seed=None))
 
 
 @cache
-def _files_wanted(
-    exercises: tuple[str, ...], rubrics: tuple[Path, ...], interfaces: tuple[Path, ...], *, every: bool
-) -> Sequence[str]:
-    asked = GradeRequest("", exercises=exercises, every=every, rubrics=rubrics, interfaces=interfaces, draw=First())
-    return wanted_files(read_exercises(asked))
+def _files_wanted(options: GradingOptions) -> Sequence[str]:
+    return wanted_files(read_exercises(request_for("", options, draw=First())))
 
 
 def job_for(task: Task, wanted: Sequence[str]) -> GradingJob | Attempt:
@@ -94,7 +102,7 @@ def job_for(task: Task, wanted: Sequence[str]) -> GradingJob | Attempt:
         travelling_name(task.submission),
         pack_collected(collected),
         task.conditions.variants,
-        task.conditions.seed,
+        task.conditions.options.seed,
     )
 
 

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from grader.core.checkup import TIERS
 from grader.core.errors import GraderError
-from grader.core.limits import TIME_BUDGET_S
 from grader.core.rubric_files import rubric_file
-from grader.core.scenario import ODOMETRY
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -41,78 +36,6 @@ class RubricPath(click.Path):
 
 RUBRIC = RubricPath(path_type=Path)
 _Command = TypeVar("_Command", bound=Callable[..., object])
-
-
-#: How long all recordings of one submission may take together, in seconds.
-time_budget_option = click.option(
-    "--time-budget",
-    "time_budget_s",
-    type=click.FloatRange(min=1),
-    default=TIME_BUDGET_S,
-    show_default=True,
-    metavar="SECONDS",
-    help="Limit of real time for all recordings of one submission; criteria left by then are not met.",
-)
-
-
-#: Environment variable that chooses the sandbox of a machine, such as a container that can have one only.
-ISOLATION = "GRADER_ISOLATION"
-#: The values of `--isolation`.
-SANDBOXES = ("auto", *TIERS)
-isolation_option = click.option(
-    "--isolation",
-    type=click.Choice(SANDBOXES),
-    default="auto",
-    envvar=ISOLATION,
-    show_envvar=True,
-    help="auto: the strongest sandbox that holds here; none: run the student's code without one.",
-)
-
-
-def _parse_recordings(ctx: click.Context, param: click.Parameter, value: Sequence[str]) -> tuple[tuple[str, Path], ...]:
-    """Parse the values of `--recording TOPIC=BAG`; a click callback."""
-    del ctx, param
-    parsed = []
-    for text in value:
-        name, equals, path = text.partition("=")
-        if not (equals and path) or re.fullmatch(r"(/[A-Za-z_]\w*)+|[a-z]\w*/msg/[A-Za-z]\w*", name, re.ASCII) is None:
-            wanted = "/scan=BAG or sensor_msgs/msg/LaserScan=BAG"
-            raise click.BadParameter(
-                f"expected a topic or a message type with a recording such as {wanted}, found {text!r}"
-            )
-        parsed.append((name, Path(path)))
-    return tuple(parsed)
-
-
-def recording_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Add `--recording`, and its older form `--odom-bag`; the command gets both as `bags`."""
-
-    @wraps(command)
-    def called(*arguments: Any, bags: tuple[tuple[str, Path], ...], odom_bag: Path | None, **given: Any) -> int:
-        if odom_bag and ODOMETRY in dict(bags):
-            raise click.BadParameter(f"--odom-bag and --recording {ODOMETRY} exclude each other")
-        return command(*arguments, bags=(*([(ODOMETRY, odom_bag)] if odom_bag else []), *bags), **given)
-
-    recording = click.option(
-        "--recording",
-        "bags",
-        metavar="TOPIC=BAG",
-        multiple=True,
-        callback=_parse_recordings,
-        help="Play this recording on a topic, or on all topics of a message type, instead of the rubric's; repeatable.",
-    )
-    odom_bag = click.option("--odom-bag", type=PATH, help=f"The same as --recording {ODOMETRY}=PATH.")
-    return recording(odom_bag(called))
-
-
-#: Message definitions of a course.
-interfaces_option = click.option(
-    "--interfaces",
-    type=PATH,
-    metavar="FOLDER",
-    multiple=True,
-    help="Build the interface packages (msg, srv, action) in this folder for the nodes; repeatable.",
-)
 
 
 def audience_options(command: _Command) -> _Command:
@@ -183,18 +106,6 @@ def parse_percent(ctx: click.Context, param: click.Parameter, value: float | Non
     from fractions import Fraction
 
     return Fraction(str(value))
-
-
-def parse_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
-    """Parse the value of `--spot-checks P%` to a share from 0 to 1; a click callback."""
-    del ctx, param
-    try:
-        percent = float(value.removesuffix("%"))
-    except ValueError:
-        percent = -1.0
-    if not 0 <= percent <= 100:  # NaN loses
-        raise click.BadParameter(f"expected a share from 0% to 100%, found {value!r}")
-    return percent / 100
 
 
 def nearest(found: str, known: Sequence[str]) -> str:
