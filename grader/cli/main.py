@@ -226,22 +226,14 @@ class _Grading:
         """Grade, in a session if one is given, and return the exit code; the user waits since `started`."""
         from grader.app import start
         from grader.reporting.audience import told
-        from grader.reporting.delivery import deliver, early_delivery, load_formats
+        from grader.reporting.delivery import deliver, early_delivery
 
         remember = self.writer.remember if self.writer is not None else None
         early = early_delivery(self.outputs, self.readers)
         pictures = any(known(output.format).illustrated for output in self.outputs)
         with shown_progress(wanted=self.shows_progress) as progress:
             progress("starting")
-            report = start.grade(
-                self.request,
-                progress,
-                remember,
-                early,
-                pictures=pictures,
-                session=session,
-                under_way=partial(load_formats, self.outputs),
-            )
+            report = start.grade(self.request, progress, remember, early, pictures=pictures, session=session)
         report = replace(report, duration_s=time.monotonic() - started)
         self._warn(report)
         deliver(report, self.outputs, self.readers)

@@ -69,12 +69,6 @@ def prepared(outputs: Sequence[Output], *, verbose: bool = False) -> tuple[Outpu
     return tuple(replace(output, verbose=verbose) for output in (*files, *(printed or [Output("text")])))
 
 
-def load_formats(outputs: Sequence[Output]) -> None:
-    """Import what renders some reports, which takes as long as rendering them."""
-    for output in outputs:
-        known(output.format).load()
-
-
 def deliver(report: Report, outputs: Sequence[Output], readers: Readers = ANYBODY) -> None:
     """Deliver every report, also after one of them failed; then raise the first GraderError.
 
