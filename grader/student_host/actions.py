@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import weakref
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -120,17 +121,23 @@ class ActionEnd:
         handle: The handle that rclpy uses.
         name: Absolute name of the action.
         interface: e.g. `test_msgs/action/Fibonacci`.
+        freed: Called with this object when the program has freed the handle.
     """
 
-    def __init__(self, kind: str, handle: Any, name: str, interface: str) -> None:
+    def __init__(self, kind: str, handle: Any, name: str, interface: str, freed: Callable[[ActionEnd], None]) -> None:
         self.kind = kind
-        self.handle = handle
+        self._handle = weakref.ref(handle, lambda _: freed(self))
         self._interface = interface
         self._prefix = f"{name}/_action/"
         self.receivers = {
             method: Receiver(self, f"{channel} {self._prefix}{part}", number)
             for method, (channel, part, number) in TAKES[kind].items()
         }
+
+    @property
+    def handle(self) -> Any:
+        """The handle that rclpy uses; None once the program has freed it, as it may without destroying it."""
+        return self._handle()
 
     def channel(self, method: str) -> str:
         """Return the channel on which a method sends."""
@@ -174,19 +181,24 @@ def install_actions(
 
 def _register(kind: str, cls: Any, ledger: Ledger, settle: Callable[[], None], leave: Callable[[], None]) -> None:
     make, destroy = cls.__init__, cls.destroy_when_not_in_use
+    #: A server's timer reads the clock of its node, which a program frees at once with its node and server.
+    clocks: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
 
     def made(self: Any, node: Any, *arguments: Any) -> None:
         if ledger.removed:
             settle()
         make(self, node, *arguments)
         # the first argument of a server is the clock of its node
+        if kind == "service":
+            clocks[self] = arguments[0]
         interface, name = arguments[1:3] if kind == "service" else arguments[:2]
         resolved = _rclpy.rclpy_resolve_name(node, name, False, False)  # noqa: FBT003 - C++
-        ledger.add_action(ActionEnd(kind, self, resolved, type_name(interface)))
+        ledger.add_action(ActionEnd(kind, self, resolved, type_name(interface), ledger.forget_action))
 
     def destroyed(self: Any) -> None:
         leave()
-        ledger.forget_action(self)
+        if (end := ledger.action(self)) is not None:
+            ledger.forget_action(end)
         destroy(self)
 
     cls.__init__ = functools.wraps(make)(made)

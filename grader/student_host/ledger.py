@@ -200,10 +200,9 @@ class Ledger:
         """Return the action servers and clients that still exist, oldest first."""
         return list(self._actions)
 
-    def forget_action(self, handle: Any) -> None:
-        """Discard the expected messages of an action server or client that is being destroyed."""
-        end = self.action(handle)
-        if end is not None:
+    def forget_action(self, end: ActionEnd) -> None:
+        """Discard the expected messages of an action server or client that is being destroyed, or was freed."""
+        if end in self._actions:
             self._actions.remove(end)
             for receiver in end.receivers.values():
                 self._expected.pop(receiver, None)

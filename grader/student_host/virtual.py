@@ -288,6 +288,7 @@ class VirtualTime:
         self._move_to(answer["now_ns"])
         self._free_until_ns = answer["free_until_ns"]
         if self._ledger is not None and answer.get("arrivals"):
+            self.clock.busy()  # a busy loop polls what has arrived before it lets time pass again
             began_s = originals.perf_counter()
             self._ledger.expect(answer["arrivals"])
             if originals.perf_counter() - began_s > QUICK_S:  # until then, the grader counts it as the program's work

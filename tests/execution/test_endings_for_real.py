@@ -476,6 +476,41 @@ def test_an_action_server_that_leaves_has_told_everything(run: Callable[..., Tra
     assert len(trace.responses("/count/_action/get_result", "student")) == 1
 
 
+FREED = """
+from rclpy.action import ActionClient, ActionServer
+from test_msgs.action import Fibonacci
+rclpy.init()
+def both():
+    node = Node('both')
+    server = ActionServer(node, Fibonacci, '/count', lambda goal: Fibonacci.Result())
+    client = ActionClient(node, Fibonacci, '/count')
+    client.wait_for_server()
+    for _ in range(3):
+        client.send_goal_async(Fibonacci.Goal())
+both()
+gc.collect()
+"""
+
+
+@pytest.mark.parametrize(
+    ("ending", "code"),
+    [
+        ("", 0),
+        ("sys.exit(3)", 3),
+        ("os._exit(4)", 4),
+        ("time.sleep(1)\nother = Node('other')\nsys.exit(other.count_publishers('/count/_action/status'))", 0),
+    ],
+)
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+def test_an_action_that_is_freed_while_goals_wait_for_it_is_gone(
+    run: Callable[..., Trace], clock: str, ending: str, code: int
+) -> None:
+    """As without the grader: nobody destroys the server and its client, but Python frees them with their node."""
+    pytest.importorskip("test_msgs")
+    trace = run(FREED + ending, clock=clock)
+    assert [fault.text for fault in trace.faults()] == [f"exited with code {code}"]
+
+
 def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run: Callable[..., Trace]) -> None:
     """In a callback, at any moment: its publisher knows it before time goes on."""
     numbers = PlannedMessages(

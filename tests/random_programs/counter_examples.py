@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 from program_description import (
+    ActionClient,
+    ActionServer,
+    Ask,
     Await,
     Client,
     End,
     Ending,
     Every,
+    Finish,
     Fixed,
     Group,
     Heard,
+    Loop,
     Nap,
     Node,
     Process,
     Program,
     Publish,
+    Rest,
     Runs,
     Say,
+    SendGoal,
     Server,
     Spinning,
     Statement,
@@ -40,6 +47,13 @@ def raising(number: int, spinning: Spinning) -> Process:
     answers = Subscription(f"s{number}1", "b", 2, (Publish("d", Fixed(7)), Publish("d", Heard())))
     raises = Subscription(f"s{number}0", "d", 10, (Say(Heard()), Every(5, (End(Ending.RAISE),))))
     return Process((Node(f"n{number}", 1, (timer,), (raises, answers)),), spinning)
+
+
+def sending_goals(number: int, period_ms: int) -> Node:
+    """Return a node that sends goals, and says what becomes of them."""
+    send = SendGoal(f"g{number}0", Fixed(number), None, SAYS, SAYS)
+    client = ActionClient(f"g{number}0", "y")
+    return Node(f"n{number}", 1, (Timer(f"t{number}0", period_ms, (send,)),), (), action_clients=(client,))
 
 
 COUNTER_EXAMPLES: dict[str, Program] = {
@@ -101,4 +115,81 @@ COUNTER_EXAMPLES: dict[str, Program] = {
     ),
     # Both end at one instant: what the second had removed was waited for, while it was about to leave.
     "two_processes_that_end_at_one_instant": Program((raising(0, Spinning.SPIN), raising(1, Spinning.EXECUTOR)), 2000),
+    # The processes drew the same ids for their goals, so that the server rejected those of the second one.
+    "two_processes_that_send_goals": Program(
+        (
+            Process((sending_goals(0, 100),), Spinning.SPIN),
+            Process((sending_goals(1, 125),), Spinning.SPIN),
+            Process(
+                (
+                    Node(
+                        "n2",
+                        1,
+                        (),
+                        (),
+                        action_servers=(ActionServer("e20", "y", SAYS, Runs(), Finish.SUCCEED, cancels=False),),
+                    ),
+                ),
+                Spinning.SPIN,
+            ),
+        ),
+        500,
+    ),
+    # The model did not know that the middleware sends no response to a client that has left, and so wakes no other one.
+    "client_that_has_left_before_the_response": Program(
+        (
+            Process(
+                (
+                    Node(
+                        "n0",
+                        1,
+                        (Timer("t00", 100, (Ask("c00", Fixed(1), ()), End(Ending.RAISE))),),
+                        (),
+                        clients=(Client("c00", "q"),),
+                    ),
+                ),
+                Spinning.SPIN,
+            ),
+            Process(
+                (
+                    Node(
+                        "n1",
+                        1,
+                        (Timer("t10", 50, (Say(Runs()),)),),
+                        (),
+                        servers=(Server("v10", "q", (), Fixed(3)),),
+                        clients=(Client("c10", "q"),),
+                    ),
+                ),
+                Spinning.ASYNCIO,
+                timeout_ms=70,
+                loop=Loop("m", 3, (Rest(30),)),
+            ),
+        ),
+        2000,
+    ),
+    # rclpy's looks at the locks of a coroutine that waits made time pass before a busy loop had taken the response.
+    "coroutine_in_a_busy_loop": Program(
+        (
+            Process(
+                (Node("n0", 1, (), (), servers=(Server("v00", "p", (), Fixed(0), 1),), groups=(Group.REENTRANT,)),),
+                Spinning.MULTI,
+                threads=3,
+            ),
+            Process(
+                (
+                    Node(
+                        "n1",
+                        1,
+                        (Timer("t10", 100, (Await("c10", Fixed(4)), Ask("c10", Runs(), SAYS)), group=2),),
+                        (),
+                        clients=(Client("c10", "p", 1),),
+                        groups=(Group.EXCLUSIVE, Group.EXCLUSIVE),
+                    ),
+                ),
+                Spinning.ONCE,
+            ),
+        ),
+        2000,
+    ),
 }

@@ -26,6 +26,8 @@ SEVERAL = (Spinning.THREAD, Spinning.MULTI)
 AROUND = 3
 #: What Python says when a program fails; faults are compared instead.
 STDERR = "stderr"
+#: Where rclpy's warnings go on with the random id of a goal.
+GOAL_ID = " Goal ID"
 Entries = Mapping[str, Sequence[tuple[int, str]]]
 
 
@@ -75,12 +77,19 @@ def told_by_trace(trace: Trace) -> dict[str, list[tuple[int, str]]]:
 
 def _entry(seen: Any) -> tuple[str, str] | None:
     if isinstance(seen, Message):
-        return f"topic {seen.topic}", str(seen.value.get("data"))
+        return f"topic {seen.topic}", str(number_in(seen.value))
     if isinstance(seen, LogRecord):
-        return f"log of {seen.process}", seen.text
+        return f"log of {seen.process}", seen.text.partition(GOAL_ID)[0]
     if isinstance(seen, OutputLine) and seen.stream != STDERR:
         return f"output of {seen.process}", seen.text
     return (f"end of {seen.process}", f"{seen.kind.value}: {seen.text}") if isinstance(seen, Fault) else None
+
+
+def number_in(value: Mapping[str, Any]) -> Any:
+    """Return what a message holds: a number, that of a feedback, or the states of goals."""
+    if "status_list" in value:
+        return [goal["status"] for goal in value["status_list"]]
+    return sum(value["feedback"]["sequence"]) if "feedback" in value else value.get("data")
 
 
 def problems(trace: Trace) -> list[str]:

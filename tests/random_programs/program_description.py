@@ -7,6 +7,12 @@ from enum import Enum
 
 #: What a main thread that sends something does first, so that all processes have started by then.
 FIRST_NAP_MS = 20
+#: Numbers in goals, feedback and results are kept this small, as the action's type has no more than 32 bits for them.
+MOST_IN_ACTION = 999
+#: What a status of a goal counts in the number that its client is told in the end.
+OF_STATUS = 1000
+#: What a goal that is being cancelled counts in the number that its client is told.
+OF_CANCELLING = 10
 #: What a main thread beside another one does before the program ends, so that this is not an instant at which the other
 #: one has something to do.
 LAST_NAP_MS = 7
@@ -122,6 +128,43 @@ class Await:
 
 
 @dataclass(frozen=True, slots=True)
+class SendGoal:
+    """Send a goal without waiting, and ask for its result once it is accepted.
+
+    Attributes:
+        client: The client of the action.
+        value: The number in the goal; servers reject negative ones.
+        hears: Runs with the number in each feedback; None for a goal without a callback for it.
+        answered: Runs with 1 if the goal was accepted, else 0.
+        finished: Runs with the number in the result, plus 1000 for each step of the status.
+    """
+
+    client: str
+    value: Value
+    hears: tuple[Statement, ...] | None
+    answered: tuple[Statement, ...]
+    finished: tuple[Statement, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CancelGoal:
+    """Ask to cancel the last goal of a client that was accepted, if any.
+
+    `then` runs with the return code, plus 10 if the server cancels the goal.
+    """
+
+    client: str
+    then: tuple[Statement, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """In the execute callback of an action: publish a number as feedback."""
+
+    value: Value
+
+
+@dataclass(frozen=True, slots=True)
 class SetParameter:
     """Set the parameter of the node; its callback refuses negative numbers, and logs the others."""
 
@@ -184,6 +227,9 @@ Statement = (
     | Pace
     | Ask
     | Await
+    | SendGoal
+    | CancelGoal
+    | Feedback
     | SetParameter
     | CallAndWait
     | SleepRate
@@ -235,6 +281,37 @@ class Client:
     group: int = 0
 
 
+class Finish(Enum):
+    """What an execute callback does with its goal in the end."""
+
+    SUCCEED = "succeed"
+    ABORT = "abort"
+    CANCEL = "cancel if that was asked for, else succeed"
+    FORGET = "nothing, so that rclpy aborts it"
+
+
+@dataclass(frozen=True, slots=True)
+class ActionServer:
+    """The server of an action; its execute callback returns a number after its body. `cancels` accepts to cancel."""
+
+    name: str
+    action: str
+    body: tuple[Statement, ...]
+    answer: Value
+    finish: Finish
+    cancels: bool
+    group: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ActionClient:
+    """A client of an action."""
+
+    name: str
+    action: str
+    group: int = 0
+
+
 class Group(Enum):
     """A kind of callback group."""
 
@@ -253,6 +330,8 @@ class Node:
     servers: tuple[Server, ...] = ()
     clients: tuple[Client, ...] = ()
     groups: tuple[Group, ...] = ()
+    action_servers: tuple[ActionServer, ...] = ()
+    action_clients: tuple[ActionClient, ...] = ()
 
 
 class Spinning(Enum):

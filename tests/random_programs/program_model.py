@@ -16,6 +16,25 @@ from itertools import count
 from typing import Any
 
 import simpy
+from action_model import ClientModel, ServerModel
+from model_parts import (
+    NS_PER_MS,
+    SUSPENDED,
+    Ended,
+    Entity,
+    FutureModel,
+    GroupModel,
+    Leave,
+    Queue,
+    Resting,
+    ReturnedError,
+    Scope,
+    Steps,
+    Task,
+    TimerModel,
+    TimeUpError,
+    nothing,
+)
 from program_description import (
     FIRST_NAP_MS,
     LAST_NAP_MS,
@@ -23,10 +42,12 @@ from program_description import (
     Await,
     CallAndWait,
     Cancel,
+    CancelGoal,
     Client,
     End,
     Ending,
     Every,
+    Feedback,
     Fixed,
     Group,
     Heard,
@@ -43,6 +64,7 @@ from program_description import (
     Rest,
     Runs,
     Say,
+    SendGoal,
     Server,
     SetParameter,
     SleepRate,
@@ -54,11 +76,10 @@ from program_description import (
     Write,
 )
 
-NS_PER_MS = 1_000_000
-#: Steps of a SimPy process.
-Steps = Generator[simpy.Event, Any, Any]
-#: The priority of what the process that runs still has to do at an instant, and of the first process's next turn.
-CONTINUING, TURNS = 1, 10
+#: Who goes on first at an instant: in the process that runs, a thread that has let others go on after it has written
+#: something, but after those that another thread has started or woken, which have SimPy's usual priority; then an
+#: executor that looks for work, and a thread whose pause has ended. Then it is the next turn of the first process.
+LAST, LOOKING, DUE, TURNS = 2, 3, 4, 10
 #: How late a pause ends in a program that has looked at a clock. Every node has.
 LATE_NS = 1_000
 #: How much later each further look at a clock is within an instant, and how often rclpy looks while it makes a node: it
@@ -68,29 +89,14 @@ LOOK_NS, LOOKS_OF_A_NODE = 1_000, 3
 FLUSH = 8
 
 
-@dataclass(frozen=True, slots=True)
-class Ended:
-    """How a process ends: a kind of fault and its text."""
-
-    kind: str
-    text: str
-
-
 @dataclass(slots=True)
 class Expected:
     """What a program must do: numbers by topic, texts by process for its log and its output, ends by process."""
 
-    topics: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
+    topics: dict[str, list[tuple[int, Any]]] = field(default_factory=dict)
     logs: dict[int, list[tuple[int, str]]] = field(default_factory=dict)
     lines: dict[int, list[tuple[int, str]]] = field(default_factory=dict)
     ends: dict[int, tuple[int, Ended]] = field(default_factory=dict)
-
-
-class Leave(BaseException):
-    """Unwinds a process that ends."""
-
-    def __init__(self, ended: Ended, how: Ending) -> None:
-        self.ended, self.how = ended, how
 
 
 ENDINGS = {
@@ -99,19 +105,6 @@ ENDINGS = {
     Ending.EXIT_WELL: Ended("exited", "exited with code 0"),
     Ending.LEAVE_AT_ONCE: Ended("exited", "exited with code 4"),
 }
-
-
-@dataclass(eq=False, slots=True)
-class Queue:
-    """The receiving end of a subscription, server or client."""
-
-    owner: Any
-    process: ProcessModel
-    messages: deque[Any]
-
-    def put(self, message: Any) -> None:
-        self.messages.append(message)
-        self.process.turn_at(self.process.world.now)
 
 
 class World:
@@ -123,6 +116,8 @@ class World:
         self.subscribed: dict[str, list[Queue]] = {}
         self.served: dict[str, list[Queue]] = {}
         self.asked: dict[str, list[Queue]] = {}
+        #: Those of actions, by the action and what they receive.
+        self.acting: dict[tuple[str, str], list[Queue]] = {}
         self.processes = [ProcessModel(self, number, process) for number, process in enumerate(program.processes)]
         for process in self.processes:
             process.begin()
@@ -132,12 +127,27 @@ class World:
         """The time in nanoseconds since the start."""
         return int(self.environment.now)
 
-    def schedule(self, t_ns: int, priority: int, call: Callable[[], None]) -> None:
+    def schedule(self, t_ns: int, priority: int, call: Callable[[], object]) -> None:
         """Call something at a time; of one time, what has the lowest priority first."""
+
+        def happen(_: simpy.Event) -> None:
+            call()
+
         event = simpy.Event(self.environment)
+        event.callbacks.append(happen)
+        self.succeed(event, priority, t_ns - self.now)
+
+    def succeed(self, event: simpy.Event, priority: int, delay_ns: int = 0) -> None:
+        """Let an event happen with a priority, which SimPy's own method does not take."""
         event._ok, event._value = True, None
-        event.callbacks.append(lambda _: call())
-        self.environment.schedule(event, priority=priority, delay=t_ns - self.now)  # type: ignore[arg-type]
+        self.environment.schedule(event, priority=priority, delay=delay_ns)  # type: ignore[arg-type]
+
+
+@dataclass(slots=True)
+class ThreadModel:
+    """One thread: whether another one has started or woken it, and it has neither waited nor written anything since."""
+
+    is_new: bool
 
 
 class ProcessModel:
@@ -148,32 +158,86 @@ class ProcessModel:
         self.alarms: list[tuple[int, int, simpy.Event]] = []
         self.numbers = count()
         self.ok, self.ended, self.sent, self.shown = True, False, 0, -LOOK_NS
+        #: Whether it has left the graph, so that the middleware sends no response to its clients.
+        self.has_left = False
         self.turns: set[int] = set()
+        #: The thread that runs, how many others have been started or woken and have not gone on, and by which events:
+        #: whether the thread that woke one had not just been woken itself.
+        self.current: ThreadModel | None = None
+        self.runnable, self.woken = 0, dict[simpy.Event, bool]()
+        #: What the last thread waits for that lets others go on.
+        self.lets_others_go_on: simpy.Event | None = None
+        #: When it sent anything last.
+        self.sent_at = -1
+        #: What a thread waits for that lets the other processes run. No other thread of its process runs until then.
+        self.settling: simpy.Event | None = None
 
     def begin(self) -> None:
         """Start the main thread, in the order of the processes."""
-        self.world.schedule(0, TURNS + self.number, lambda: self.start(self.main()))
+        self.world.schedule(0, TURNS + self.number, lambda: self.start(self.guarded(self.main()), is_new=False))
 
-    def start(self, steps: Steps) -> None:
-        """Run a thread."""
-        self.world.environment.process(self.guarded(steps))
+    def start(self, steps: Steps, *, is_new: bool = True) -> simpy.Event:
+        """Start a thread, and return what the one that starts it waits for."""
+        thread, started = ThreadModel(is_new), simpy.Event(self.world.environment)
+        self.runnable += 1
+        self.world.environment.process(self.run(thread, started, steps))
+        return started
+
+    def run(self, thread: ThreadModel, started: simpy.Event, steps: Steps) -> Steps:
+        """Run a thread, but not while another one waits until the other processes have taken its messages."""
+        self.runnable -= 1
+        self.current = thread
+        started.succeed()
+        for event in steps:
+            if event is not self.lets_others_go_on and event is not self.settling:
+                thread.is_new = False
+            yield event
+            while self.settling is not None and self.settling is not event:
+                yield self.settling
+            if event in self.woken:
+                self.runnable -= 1
+                thread.is_new = self.woken.pop(event)
+            self.current = thread
+
+    def wake_thread(self, event: simpy.Event) -> None:
+        """Let another thread go on that waits for this one."""
+        self.woken[event] = self.current is None or not self.current.is_new
+        self.runnable += 1
+        event.succeed()
+
+    def let_others_go_on(self) -> Steps:
+        """After the first text of a thread that another one has started or woken: let the others go on that can."""
+        assert self.current is not None
+        if self.current.is_new and self.runnable:
+            self.lets_others_go_on = event = simpy.Event(self.world.environment)
+            self.world.succeed(event, LAST)
+            yield event
+        self.current.is_new = False
 
     def guarded(self, steps: Steps) -> Steps:
         """Run the main thread until it ends, and note how."""
         try:
             yield from steps
-            self.end(Ended("exited", "exited with code 0"))
+            ended = Ended("exited", "exited with code 0")
         except Leave as leave:
-            self.end(leave.ended)
+            ended = leave.ended
+        yield from self.leave()
+        self.end(ended)
+
+    def leave(self) -> Steps:
+        """Let the others take what was sent at this instant, before its senders are gone."""
+        if self.sent_at == self.world.now:
+            yield from self.settle()
 
     def end(self, ended: Ended) -> None:
         """Note the end; no thread goes on."""
         if self.ended:
             return
-        self.ended, self.ok = True, False
+        self.ended, self.ok, self.has_left = True, False, ended != ENDINGS[Ending.LEAVE_AT_ONCE]
         self.world.expected.ends[self.number] = self.world.now, ended
         world = self.world
-        for queues in (*world.subscribed.values(), *world.served.values(), *world.asked.values()):
+        channels = (world.subscribed, world.served, world.asked, world.acting)
+        for queues in (queues for channel in channels for queues in channel.values()):
             queues[:] = [queue for queue in queues if queue.process is not self]
 
     def turn_at(self, t_ns: int) -> None:
@@ -191,9 +255,9 @@ class ProcessModel:
         while self.alarms and self.alarms[0][0] <= self.world.now:
             event = heapq.heappop(self.alarms)[2]
             if not event.triggered:
-                event.succeed()
+                self.world.succeed(event, DUE)
         if news is not None and not news.triggered:
-            news.succeed()
+            self.world.succeed(news, LOOKING)
 
     news: simpy.Event | None = None
 
@@ -207,7 +271,7 @@ class ProcessModel:
     def wake(self) -> None:
         """Let an executor of another thread look for work again."""
         if self.news is not None and not self.news.triggered:
-            self.news.succeed()
+            self.world.succeed(self.news, LOOKING)
             self.news = None
 
     def look(self) -> int:
@@ -234,9 +298,17 @@ class ProcessModel:
         self.sent += 1
         if self.sent >= FLUSH:
             self.sent = 0
-            yield from self.pause(self.world.now)
+            yield from self.settle()
         if not self.ended:
+            self.sent_at = self.world.now
             deliver()
+
+    def settle(self) -> Steps:
+        """Let the other processes run at this instant, but no other thread of this one."""
+        goes_on = self.settling = simpy.Event(self.world.environment)
+        self.world.schedule(self.world.now, TURNS + self.number, goes_on.succeed)
+        yield goes_on
+        self.settling = None
 
     def main(self) -> Steps:
         """Do what the main function of the file does."""
@@ -256,7 +328,7 @@ class ProcessModel:
                 yield from Executor(self, nodes).spin()
             case Spinning.MULTI:
                 yield from PoolExecutor(self, nodes).spin()
-        self.write("main 0")
+        yield from self.write("main 0")
 
     def in_turns(self, executor: Executor) -> Steps:
         """Call spin_once, which adds the node to the executor and removes it again, and so wakes the executor twice.
@@ -286,14 +358,14 @@ class ProcessModel:
                 yield from executor.spin_once(None, future)
             if not future.done:
                 raise AssertionError("a program that calls in turns has no other end")
-            self.write(f"until {future.value}")
+            yield from self.write(f"until {future.value}")
 
     def beside_a_thread(self, nodes: list[NodeModel]) -> Steps:
         loop, node = self.process.loop, nodes[0]
         assert loop is not None
         if loop.rate_ms:
             node.add_rate(loop.rate_ms)
-        self.world.environment.process(Executor(self, nodes).spin())
+        yield self.start(Executor(self, nodes).spin())
         yield from self.pause(self.end_of(FIRST_NAP_MS * NS_PER_MS))
         scope = Scope(loop.name, loop.name)
         for turn in range(loop.turns):
@@ -302,24 +374,37 @@ class ProcessModel:
         yield from self.pause(self.end_of(LAST_NAP_MS * NS_PER_MS))
 
     def in_coroutines(self, executor: Executor, node: NodeModel) -> Steps:
-        """Run the event loop of asyncio: coroutines in turn until all of them sleep, then the one that wakes first."""
+        """Run the event loop of asyncio: coroutines in turn until all of them sleep, then the one that wakes first.
+
+        An exception ends the loop three turns later, those of `gather`, of the coroutine that waits for it, and of the
+        loop itself. The coroutines that are ready go on until then.
+        """
         resting: list[tuple[int, int, Steps]] = []
         ready = deque([self.spin_and_rest(executor), self.work_and_rest(node)])
-        left = len(ready)
-        while left:
-            if not ready:
-                yield from self.pause(max(self.world.now, resting[0][0] + LATE_NS))
+        left, failed, more = len(ready), None, 3
+        while left and more:
+            if failed is not None:
+                more -= 1
+            elif not ready and resting[0][0] > max(self.world.now, self.shown):
+                yield from self.pause(resting[0][0] + LATE_NS)
             while resting and resting[0][0] <= max(self.world.now, self.shown):
                 ready.append(heapq.heappop(resting)[2])
             for _ in range(len(ready)):
                 steps = ready.popleft()
-                for event in steps:
-                    if isinstance(event, Resting):
-                        heapq.heappush(resting, (event.until_ns, next(self.numbers), steps))
-                        break
-                    yield event
-                else:
-                    left -= 1
+                try:
+                    for event in steps:
+                        if isinstance(event, Resting):
+                            heapq.heappush(resting, (event.until_ns, next(self.numbers), steps))
+                            break
+                        yield event
+                    else:
+                        left -= 1
+                except Leave as leave:
+                    if leave.how is not Ending.RAISE:
+                        raise
+                    failed = leave
+        if failed is not None:
+            raise failed
 
     def rest(self, ms: int) -> Steps:
         """Let the event loop of asyncio go on for some time."""
@@ -340,134 +425,15 @@ class ProcessModel:
             node.runs[loop.name] = turn + 1
             yield from node.run(loop.body, scope)
 
-    def say(self, text: str) -> None:
+    def say(self, text: str) -> Steps:
         if not self.ended:
             self.world.expected.logs.setdefault(self.number, []).append((self.world.now, text))
+        yield from self.let_others_go_on()
 
-    def write(self, text: str) -> None:
+    def write(self, text: str) -> Steps:
         if not self.ended:
             self.world.expected.lines.setdefault(self.number, []).append((self.world.now, text))
-
-
-class TimerModel:
-    """A timer of rcl."""
-
-    def __init__(self, world: World, period_ms: int, *, starts: bool = True) -> None:
-        self.world = world
-        self.period = period_ms * NS_PER_MS
-        self.next = world.now + self.period
-        self.cancelled = not starts
-
-    def is_ready(self) -> bool:
-        return not self.cancelled and self.next <= self.world.now
-
-    def call(self) -> None:
-        """Move on by a period, and beyond what has been missed."""
-        self.next += self.period
-        behind = self.world.now - self.next
-        if behind > 0:
-            self.next += -(-behind // self.period) * self.period
-
-    def reset(self) -> None:
-        self.next, self.cancelled = self.world.now + self.period, False
-
-
-class GroupModel:
-    """A callback group: an exclusive one runs one callback at a time."""
-
-    def __init__(self, kind: Group) -> None:
-        self.kind, self.active = kind, 0
-
-    @property
-    def is_free(self) -> bool:
-        return self.kind is Group.REENTRANT or not self.active
-
-
-class FutureModel:
-    """What a call of a service will be answered with.
-
-    Args:
-        executor: Whose tasks the callbacks become.
-    """
-
-    def __init__(self, executor: Executor | None = None) -> None:
-        self.executor = executor
-        self.done, self.value = False, 0
-        #: The first one is of the client itself, which forgets the request.
-        self.callbacks: list[Callable[[], Steps]] = [nothing]
-
-    def set(self, executor: Executor, value: int) -> None:
-        self.done, self.value = True, value
-        for callback in self.callbacks:
-            executor.add_task(Task(callback()))
-
-
-def nothing() -> Steps:
-    """Do nothing, as a task."""
-    return
-    yield
-
-
-@dataclass(frozen=True, slots=True)
-class Resting:
-    """What a coroutine of asyncio yields when it sleeps."""
-
-    until_ns: int
-
-
-#: What a coroutine yields when it waits for a future.
-SUSPENDED = object()
-
-
-@dataclass(eq=False, slots=True)
-class Task:
-    """A callback or coroutine that an executor runs, perhaps in several parts."""
-
-    steps: Steps
-    done: bool = False
-    running: bool = False
-
-    def advance(self) -> Steps:
-        """Run it until it has ended or waits for a future."""
-        if self.done or self.running:
-            return
-        self.running = True
-        for event in self.steps:
-            if event is SUSPENDED:
-                self.running = False
-                return
-            yield event
-        self.done, self.running = True, False
-
-
-@dataclass(eq=False, slots=True)
-class Entity:
-    """What an executor waits for.
-
-    Attributes:
-        group: Its callback group.
-        is_ready: Whether there is anything to do.
-        take: Takes what there is to do, and returns how it is done.
-        claimed: Whether an executor is about to take it.
-    """
-
-    group: GroupModel
-    is_ready: Callable[[], bool]
-    take: Callable[[], Steps]
-    is_timer: bool = False
-    claimed: bool = False
-
-    def can_run(self) -> bool:
-        return not self.claimed and self.group.is_free
-
-
-@dataclass(slots=True)
-class Scope:
-    """The callback that runs: its name, what it logs under, and the number that it was called with."""
-
-    name: str
-    label: str
-    heard: int = 0
+        yield from self.let_others_go_on()
 
 
 class NodeModel:
@@ -491,6 +457,10 @@ class NodeModel:
             self.world.served.setdefault(queue.owner.service, []).append(queue)
         for queue in self.clients.values():
             self.world.asked.setdefault(queue.owner.service, []).append(queue)
+        #: Servers and clients of actions: an executor goes through those of all nodes before anything else.
+        self.action_servers = {server.name: ServerModel(self, server) for server in node.action_servers}
+        self.action_clients = {client.name: ClientModel(self, client) for client in node.action_clients}
+        self.waitables = [end.entity for end in (*self.action_servers.values(), *self.action_clients.values())]
         self.executor: Executor | None = None
         self.rate: TimerModel | None = None
         self.rate_set = False
@@ -526,7 +496,7 @@ class NodeModel:
             rate.call()
             self.rate_set = True
             if self.waiting is not None:
-                self.waiting.succeed()
+                self.process.wake_thread(self.waiting)
                 self.waiting = None
             return nothing()
 
@@ -565,7 +535,7 @@ class NodeModel:
 
             def deliver() -> None:
                 # The middleware wakes every client of the service; those that have not asked find nothing.
-                for each in self.world.asked.get(server.service, ()):
+                for each in () if client.process.has_left else self.world.asked.get(server.service, ()):
                     each.put((client, future, answer))
 
             yield from self.process.send(deliver)
@@ -614,20 +584,26 @@ class NodeModel:
                 self.leave(how)
             case Ask() | Await() | CallAndWait():
                 yield from self.ask(one, scope)
+            case SendGoal(client, value):
+                yield from self.action_clients[client].send_goal(one, scope, self.value(value, scope))
+            case CancelGoal(client):
+                yield from self.action_clients[client].cancel(one, scope)
+            case Feedback(value):
+                yield from self.action_servers[scope.name].feed(scope.goal, self.value(value, scope))
             case _:
-                self.do_at_once(one, scope)
+                yield from self.do_at_once(one, scope)
 
-    def do_at_once(self, one: Statement, scope: Scope) -> None:
-        """Do one statement that neither waits nor sends."""
+    def do_at_once(self, one: Statement, scope: Scope) -> Steps:
+        """Do one statement that takes no time and sends nothing."""
         match one:
             case Say(value):
-                self.process.say(f"{scope.label} {self.value(value, scope)}")
+                yield from self.process.say(f"{scope.label} {self.value(value, scope)}")
             case Write(value):
-                self.process.write(f"{scope.label} {self.value(value, scope)}")
+                yield from self.process.write(f"{scope.label} {self.value(value, scope)}")
             case Keep(slot, value, adds):
                 self.kept[slot] = self.value(value, scope) + (self.kept[slot] if adds else 0)
             case SetParameter(value):
-                self.set_parameter(self.value(value, scope))
+                yield from self.set_parameter(self.value(value, scope))
             case Cancel(timer):
                 self.timers[timer].cancelled = True
             case Reset(timer):
@@ -637,10 +613,10 @@ class NodeModel:
             case _:
                 raise AssertionError(one)
 
-    def set_parameter(self, number: int) -> None:
+    def set_parameter(self, number: int) -> Steps:
         """Ask the callback, and keep the number; rclpy stamps an event of each change."""
         if number >= 0:
-            self.process.say(f"parameter {number}")
+            yield from self.process.say(f"parameter {number}")
             self.parameter = number
             self.process.look()
 
@@ -679,7 +655,7 @@ class NodeModel:
             arrived = simpy.Event(self.world.environment)
 
             def unblock() -> Steps:
-                arrived.succeed()
+                self.process.wake_thread(arrived)
                 yield from nothing()
 
             future.callbacks.append(unblock)
@@ -691,14 +667,6 @@ class NodeModel:
             self.process.ok = False
             raise ReturnedError
         raise Leave(ENDINGS[how], how)
-
-
-class ReturnedError(Exception):
-    """A callback returns before its end."""
-
-
-class TimeUpError(Exception):
-    """An executor has waited long enough."""
 
 
 class Executor:
@@ -780,8 +748,9 @@ class Executor:
         return min([*moments, *([deadline] if deadline is not None else [])], default=None)
 
     def ready(self) -> list[Entity]:
-        """Return what is ready now, in the order of rclpy: by node, and of a node by the kind of entity."""
-        return [e for node in self.nodes for e in node.entities if e.can_run() and e.is_ready()]
+        """Return what is ready now, in the order of rclpy: waitables, then by node and by the kind of entity."""
+        kinds = ([e for node in self.nodes for e in node.waitables], [e for node in self.nodes for e in node.entities])
+        return [entity for entities in kinds for entity in entities if entity.can_run() and entity.is_ready()]
 
     def claim(self, entity: Entity) -> Task:
         """Make a task of what an entity has to do."""
@@ -819,11 +788,10 @@ class PoolExecutor(Executor):
     def execute(self, task: Task) -> Steps:
         self.submitted.append(task)
         if self.idle:
-            self.idle.pop().succeed()
+            self.process.wake_thread(self.idle.pop())
         elif self.started < self.process.process.threads:
             self.started += 1
-            self.world.environment.process(self.work())
-        yield from nothing()
+            yield self.process.start(self.work())
 
     def left_by(self, task: Task) -> Generator[simpy.Event, Any, Leave | None]:
         """Run a task, and return how it would end the program; of a thread of a pool, sys.exit ends the task only."""
@@ -839,6 +807,7 @@ class PoolExecutor(Executor):
             while self.submitted:
                 left = yield from self.left_by(self.submitted.popleft())
                 if left is not None and left.how is Ending.LEAVE_AT_ONCE:
+                    yield from self.process.leave()
                     self.process.end(left.ended)
                     return
             event = simpy.Event(self.world.environment)

@@ -1,26 +1,34 @@
 """Draws random programs, in which nothing depends on what rclpy leaves open.
 
 What sends to whom has no circle: a callback that something on one channel starts sends on later channels only. Topics
-come before services.
+come before services; one action comes before both, one after. Nodes of a `MultiThreadedExecutor` have no actions: the
+execute callbacks of several goals would share a name, a topic of feedback and one of states, and run at one instant. No
+action has clients in two nodes.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from hypothesis import strategies as st
 from program_description import (
     LAST_NAP_MS,
+    ActionClient,
+    ActionServer,
     Ask,
     Await,
     CallAndWait,
     Cancel,
+    CancelGoal,
     Client,
     End,
     Ending,
     Every,
+    Feedback,
+    Finish,
     Fixed,
     Group,
     Heard,
@@ -38,6 +46,7 @@ from program_description import (
     Rest,
     Runs,
     Say,
+    SendGoal,
     Server,
     SetParameter,
     SleepRate,
@@ -50,6 +59,11 @@ from program_description import (
 )
 
 TOPICS, SERVICES = "abcd", "pq"
+#: Those that come before topics, and so let execute callbacks send what they like, and those that come after services,
+#: and so may be used by whatever a message or request starts.
+EARLY_ACTIONS, LATE_ACTIONS = "x", "y"
+#: All channels, in the order in which one may start what sends on another.
+CHANNELS = EARLY_ACTIONS + TOPICS + SERVICES + LATE_ACTIONS
 #: Short ones that coincide, and ones that do not.
 PERIODS = (50, 100, 100, 125, 200, 250, 300, 470)
 NAPS = (7, 30, 50, 100, 120, 260)
@@ -83,6 +97,8 @@ class Room:
         awaits: Whether they may be coroutines.
         waits: Whether they may wait in the main thread while another one spins.
         rests: Whether they run in a coroutine of asyncio.
+        actors: The clients of actions that they send goals with.
+        executes: Whether they are the execute callback of an action.
     """
 
     topics: str
@@ -94,6 +110,8 @@ class Room:
     awaits: bool = True
     waits: bool = False
     rests: bool = False
+    actors: tuple[ActionClient, ...] = ()
+    executes: bool = False
 
     def value(self, draw: st.DrawFn, *, heard: bool) -> Value:
         """Draw a value; with a number that was heard only where there is one."""
@@ -114,8 +132,11 @@ class Room:
         kinds += [Cancel, Reset, Pace] if self.timers else []
         kinds += [*([] if self.shared else [SetParameter]), *([SleepRate] * 2 if rate else [])]
         kinds += [Rest] * 2 if self.rests else []
+        kinds += [Feedback] * 2 if self.executes else []
+        acted = [client.name for client in self.actors if client.action in channels]
         if deep:
             kinds += [*([Ask] * 2 if asked else []), *([Await] * 2 if asked and self.awaits else [])]
+            kinds += [*([SendGoal] * 5 if acted else []), *([CancelGoal] * 2 if acted else [])]
             kinds += [*([CallAndWait] * 4 if asked and self.waits else []), Every, *([End] if self.ends else [])]
 
         def nested() -> tuple[Statement, ...]:
@@ -130,6 +151,20 @@ class Room:
         def ask() -> Ask:
             client = of(asked)
             return Ask(client, number(), self.then(draw, client, channels))
+
+        def send_goal() -> SendGoal:
+            client, then = of(acted), functools.partial(self.then, draw, channels=channels)
+            return SendGoal(
+                client,
+                number(),
+                then(client) if draw(st.booleans()) else None,
+                then(client),
+                then(client),
+            )
+
+        def cancel_goal() -> CancelGoal:
+            client = of(acted)
+            return CancelGoal(client, self.then(draw, client, channels))
 
         make: dict[type, Callable[[], Statement]] = {
             Say: lambda: Say(number()),
@@ -146,6 +181,9 @@ class Room:
             Ask: ask,
             Await: lambda: Await(of(asked), number()),
             CallAndWait: lambda: CallAndWait(of(asked), number()),
+            SendGoal: send_goal,
+            CancelGoal: cancel_goal,
+            Feedback: lambda: Feedback(number()),
             Every: lambda: Every(draw(FEW), nested()),
             End: lambda: Every(draw(FEW), (*nested(), *self.ending(draw))),
         }
@@ -157,19 +195,30 @@ class Room:
 
     def then(self, draw: st.DrawFn, name: str, channels: str) -> tuple[Statement, ...]:
         """Draw what is done with an answer."""
-        service = next(client.service for client in self.clients if client.name == name)
+        asked = {client.name: client.service for client in self.clients}
+        acted = {client.name: client.action for client in self.actors}
+        used = {**asked, **acted}[name]
         if self.shared:
-            alone = replace(self, topics="", slots=(), timers=())
+            alone = replace(self, topics="", slots=(), timers=(), executes=False)
             return alone.statements(draw, "", heard=True, deep=False)
-        return replace(self, rests=False).statements(
-            draw, channels[channels.index(service) + 1 :], heard=True, deep=False
-        )
+        alone = replace(self, rests=False, executes=False)
+        return alone.statements(draw, channels[channels.index(used) + 1 :], heard=True, deep=False)
 
 
 def after(channel: str) -> str:
     """Return the channels that a callback may send on that something on a channel starts."""
-    everything = TOPICS + SERVICES
-    return everything[everything.index(channel) + 1 :]
+    return CHANNELS[CHANNELS.index(channel) + 1 :]
+
+
+def acting(draw: st.DrawFn, number: int, taken: Taken, groups: int) -> tuple[list[str], list[ActionClient]]:
+    """Draw the actions that a node has a server of, and its clients of actions; no action has two servers."""
+    actions = EARLY_ACTIONS + LATE_ACTIONS
+    served = [a for a in actions if a not in taken.acted and draw(st.booleans())]
+    taken.acted |= set(served)
+    others = [a for a in actions if a not in served and a not in taken.actors]
+    wanted = draw(st.lists(st.sampled_from(others), max_size=2, unique=True)) if others else []
+    taken.actors |= set(wanted)
+    return served, [ActionClient(f"g{number}{n}", a, draw(st.integers(0, groups))) for n, a in enumerate(wanted)]
 
 
 @st.composite
@@ -193,7 +242,9 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
         Spinning.UNTIL: HARD_ENDS,
         Spinning.ASYNCIO: HARD_ENDS,
     }.get(spinning, tuple(Ending))
-    rooms = [Room(TOPICS, tuple(range(SLOTS)), tuple(name for name, _ in timers), tuple(clients), ends)]
+    to_act, actors = ([], []) if several else acting(draw, number, taken, len(groups))
+    timer_names = tuple(name for name, _ in timers)
+    rooms = [Room(TOPICS, tuple(range(SLOTS)), timer_names, tuple(clients), ends, actors=tuple(actors))]
     beside = Room("", (), (), ())
     kinds = (Group.EXCLUSIVE, *groups)
     if several:
@@ -220,11 +271,14 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
             )
             for side in (True, False)
         )
-        rooms = [Room(others[0], (0,), rooms[0].timers, others[1], (), shared=True)]
+        rooms = [Room(others[0], (0,), rooms[0].timers, others[1], (), shared=True, actors=tuple(actors))]
         beside = Room(own[0], (1,), (), own[1], MAIN_ENDS, shared=True, awaits=False, waits=True)
     elif spinning is Spinning.ASYNCIO:
         beside = replace(rooms[0], awaits=False, rests=True)
     room = rooms if several else rooms * (len(groups) + 1)
+
+    #: What an execute callback may do; after a shutdown, no state of a goal can be published.
+    executing = replace(rooms[0], executes=True, ends=tuple(how for how in ends if how is not Ending.SHUTDOWN))
 
     def callback(group: int, channels: str, *, heard: bool = True, answers: bool = False) -> tuple[Statement, ...]:
         its = room[group]
@@ -240,7 +294,7 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
             Timer(
                 name,
                 draw(st.sampled_from(PERIODS)),
-                callback(group, TOPICS + SERVICES, heard=False),
+                callback(group, CHANNELS, heard=False),
                 starts=draw(st.sampled_from((True, True, True, True, True, False))),
                 group=group,
             )
@@ -264,14 +318,27 @@ def nodes(draw: st.DrawFn, number: int, taken: Taken, spinning: Spinning) -> tup
         ),
         clients=tuple(clients),
         groups=groups,
+        action_servers=tuple(
+            ActionServer(
+                f"e{number}{n}",
+                action,
+                executing.statements(draw, after(action), heard=True),
+                executing.value(draw, heard=True),
+                draw(st.sampled_from(Finish)),
+                draw(st.booleans()),
+                draw(st.integers(0, len(groups))),
+            )
+            for n, action in enumerate(to_act)
+        ),
+        action_clients=tuple(actors),
     )
     if spinning is Spinning.ASYNCIO:
-        body = beside.statements(draw, TOPICS + SERVICES, heard=True)
+        body = beside.statements(draw, CHANNELS, heard=True)
         return node, Loop("m", draw(st.sampled_from((3, 12, 100))), (*body, Rest(draw(st.sampled_from(NAPS)))))
     if spinning is not Spinning.THREAD:
         return node, None
     rate = draw(st.sampled_from((0, 50, 100, 250)))
-    body = beside.statements(draw, TOPICS + SERVICES, heard=True, rate=bool(rate))
+    body = beside.statements(draw, CHANNELS, heard=True, rate=bool(rate))
     pause: Statement = SleepRate() if rate else Nap(draw(st.sampled_from(NAPS)))
     return node, Loop("m", draw(st.sampled_from((3, 12, 100))), (*body, pause), rate)
 
@@ -283,12 +350,16 @@ class Taken:
     Attributes:
         served: The services that have a server.
         asked: The services that have a client.
+        acted: The actions that have a server.
+        actors: The actions that have a client.
         several: Whether any process has several threads, so that the order of requests at one instant is open.
     """
 
     served: set[str]
     asked: set[str]
     several: bool
+    acted: set[str] = field(default_factory=set)
+    actors: set[str] = field(default_factory=set)
 
 
 @st.composite

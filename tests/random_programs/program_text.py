@@ -8,13 +8,20 @@ from typing import Any
 from program_description import (
     FIRST_NAP_MS,
     LAST_NAP_MS,
+    MOST_IN_ACTION,
+    OF_CANCELLING,
+    OF_STATUS,
+    ActionServer,
     Ask,
     Await,
     CallAndWait,
     Cancel,
+    CancelGoal,
     End,
     Ending,
     Every,
+    Feedback,
+    Finish,
     Fixed,
     Heard,
     Keep,
@@ -29,6 +36,7 @@ from program_description import (
     Rest,
     Runs,
     Say,
+    SendGoal,
     SetParameter,
     SleepRate,
     Spinning,
@@ -38,8 +46,8 @@ from program_description import (
 )
 
 INDENT = "    "
-WITH_VALUE = (Publish, Say, Write, Keep, Ask, Await, SetParameter, CallAndWait)
-HEAD = """import asyncio
+WITH_VALUE = (Publish, Say, Write, Keep, Ask, Await, SendGoal, Feedback, SetParameter, CallAndWait)
+HEAD = f"""import asyncio
 import os
 import sys
 import threading
@@ -47,12 +55,19 @@ import time
 
 import rclpy
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import Int64
+from test_msgs.action import Fibonacci
 from test_msgs.srv import BasicTypes
+
+
+def small(number):
+    return max(-{MOST_IN_ACTION}, min(number, {MOST_IN_ACTION}))
+
 """
 ENDINGS = {
     Ending.RAISE: 'raise RuntimeError("no more")',
@@ -76,8 +91,10 @@ def sent_on(statements: Iterable[Statement]) -> Iterator[str]:
     for one in statements:
         if isinstance(one, Publish):
             yield one.topic
-        elif isinstance(one, (Every, Ask)):
+        elif isinstance(one, (Every, Ask, CancelGoal)):
             yield from sent_on(one.then)
+        elif isinstance(one, SendGoal):
+            yield from sent_on((*(one.hears or ()), *one.answered, *one.finished))
 
 
 def bodies(node: Node, loop: Loop | None = None) -> Iterator[tuple[Statement, ...]]:
@@ -87,6 +104,7 @@ def bodies(node: Node, loop: Loop | None = None) -> Iterator[tuple[Statement, ..
     yield from (timer.body for timer in node.timers)
     yield from (sub.body for sub in node.subscriptions)
     yield from (server.body for server in node.servers)
+    yield from (server.body for server in node.action_servers)
 
 
 def class_of(node: Node, loop: Loop | None) -> Iterator[str]:
@@ -103,7 +121,30 @@ def class_of(node: Node, loop: Loop | None) -> Iterator[str]:
         answer = value_of(server.answer, server.name)
         result = (f"response.int64_value = {answer}", "return response")
         yield from method(server.name, "request, response", server.body, heard="request.int64_value", result=result)
+    for end in node.action_servers:
+        yield from of_action(end)
 
+
+def of_action(server: ActionServer) -> Iterator[str]:
+    """Yield the lines of the callbacks of an action's server."""
+    answer = f"result = Fibonacci.Result(sequence=[small({value_of(server.answer, server.name)})])"
+    result = (answer, *FINISHES[server.finish], "return result")
+    yield from method(server.name, "goal", server.body, heard="goal.request.order", result=result)
+    yield ""
+    yield f"{INDENT}def accept_{server.name}(self, goal):"
+    yield f"{INDENT * 2}return GoalResponse.ACCEPT if goal.order >= 0 else GoalResponse.REJECT"
+    yield ""
+    yield f"{INDENT}def cancel_{server.name}(self, goal):"
+    yield f'{INDENT * 2}self.get_logger().info(f"{server.name}.cancel {{goal.request.order}}")'
+    yield f"{INDENT * 2}return CancelResponse.{'ACCEPT' if server.cancels else 'REJECT'}"
+
+
+FINISHES = {
+    Finish.SUCCEED: ("goal.succeed()",),
+    Finish.ABORT: ("goal.abort()",),
+    Finish.CANCEL: ("if goal.is_cancel_requested:", f"{INDENT}goal.canceled()", "else:", f"{INDENT}goal.succeed()"),
+    Finish.FORGET: (),
+}
 
 ON_PARAMETER = (
     "fine = parameters[0].value >= 0",
@@ -122,6 +163,7 @@ def made_by(node: Node, loop: Loop | None) -> Iterator[str]:
     for number, group in enumerate(node.groups, 1):
         yield f"self.group{number} = {group.value}()"
     yield "self.runs = {}"
+    yield "self.goals = {}"
     topics = sorted({topic for body in bodies(node, loop) for topic in sent_on(body)})
     for topic in topics:
         yield f'self.to_{topic} = self.create_publisher(Int64, "/{topic}", 50)'
@@ -137,6 +179,18 @@ def made_by(node: Node, loop: Loop | None) -> Iterator[str]:
     for client in node.clients:
         given = in_group(client.group)
         yield f'self.{client.name} = self.create_client(BasicTypes, "/{client.service}"{given})'
+    yield from acting(node)
+
+
+def acting(node: Node) -> Iterator[str]:
+    """Yield the lines that make a node's servers and clients of actions."""
+    for server in node.action_servers:
+        callbacks = f"goal_callback=self.accept_{server.name}, cancel_callback=self.cancel_{server.name}"
+        given = f"self.on_{server.name}, {callbacks}{in_group(server.group)}"
+        yield f'self.{server.name} = ActionServer(self, Fibonacci, "/{server.action}", {given})'
+    for client in node.action_clients:
+        given = in_group(client.group)
+        yield f'self.{client.name} = ActionClient(self, Fibonacci, "/{client.action}"{given})'
 
 
 def in_group(group: int) -> str:
@@ -191,6 +245,9 @@ def statement(one: Statement, name: str, label: str) -> Iterator[str]:
         yield from (INDENT + line for line in ("heard = future.result().int64_value", *inner))
         yield f"self.{one.client}.call_async({request}).add_done_callback(answered)"
         return
+    if isinstance(one, (SendGoal, CancelGoal)):
+        yield from goal_statement(one, name, f"small({value})")
+        return
     texts: dict[type, Callable[[Any], str]] = {
         Publish: lambda s: f"self.to_{s.topic}.publish(Int64(data={value}))",
         Say: lambda s: f'self.get_logger().info(f"{label} {{{value}}}")',
@@ -201,6 +258,7 @@ def statement(one: Statement, name: str, label: str) -> Iterator[str]:
         Reset: lambda s: f"self.{s.timer}.reset()",
         Pace: lambda s: f"self.{s.timer}.timer_period_ns = {s.period_ms * 1_000_000}",
         Await: lambda s: f"heard = (await self.{s.client}.call_async({request})).int64_value",
+        Feedback: lambda s: f"goal.publish_feedback(Fibonacci.Feedback(sequence=[small({value})]))",
         CallAndWait: lambda s: f"heard = self.{s.client}.call({request}).int64_value",
         SetParameter: lambda s: f'self.set_parameters([Parameter("number", value={value})])',
         SleepRate: lambda s: "self.rate.sleep()",
@@ -208,6 +266,34 @@ def statement(one: Statement, name: str, label: str) -> Iterator[str]:
         End: lambda s: ENDINGS[s.how],
     }
     yield texts[type(one)](one)
+
+
+def goal_statement(one: SendGoal | CancelGoal, name: str, order: str) -> Iterator[str]:
+    """Yield the lines of a statement that sends or cancels a goal."""
+    label = f"{name}.{one.client}"
+
+    def function(of: str, argument: str, heard: str, then: tuple[Statement, ...]) -> Iterator[str]:
+        yield f"def {of}({argument}):"
+        yield from (INDENT + line for line in (heard, *lines_of(then, name, f"{label}.{of}")))
+
+    if isinstance(one, CancelGoal):
+        yield f'if "{one.client}" in self.goals:'
+        told = f"heard = {OF_CANCELLING} * len(future.result().goals_canceling) + future.result().return_code"
+        yield from (INDENT + line for line in function("cancelled", "future", told, one.then))
+        yield f'{INDENT}self.goals["{one.client}"].cancel_goal_async().add_done_callback(cancelled)'
+        return
+    given = ""
+    if one.hears is not None:
+        yield from function("hears", "message", "heard = sum(message.feedback.sequence)", one.hears)
+        given = ", feedback_callback=hears"
+    yield from function("answered", "future", "heard = int(future.result().accepted)", one.answered)
+    yield f"{INDENT}if heard:"
+    yield f'{INDENT * 2}self.goals["{one.client}"] = future.result()'
+    told = f"heard = {OF_STATUS} * future.result().status + sum(future.result().result.sequence)"
+    yield from (INDENT * 2 + line for line in function("finished", "future", told, one.finished))
+    yield f"{INDENT * 2}future.result().get_result_async().add_done_callback(finished)"
+    goal = f"Fibonacci.Goal(order={order})"
+    yield f"self.{one.client}.send_goal_async({goal}{given}).add_done_callback(answered)"
 
 
 def main_of(process: Process) -> Iterator[str]:
