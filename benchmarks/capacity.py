@@ -39,9 +39,9 @@ from distributed import LocalCluster
 
 from grader.app.grade import read_exercises, wanted_files
 from grader.app.request import GradeRequest
+from grader.classroom import receiving as remote
 from grader.classroom import store as kept
 from grader.classroom.class_run import grade_class
-from grader.classroom.cluster import jobs as remote
 from grader.classroom.cluster.dispatcher import connected
 from grader.classroom.grading import ALL, CHANGED, ClassRequest, digest_of
 from grader.classroom.intake import HandedInEntry
@@ -145,9 +145,9 @@ def dask_scheduler(graded: Path) -> Iterator[MakeScheduler]:
     remote.grade_job = grade_job
     with (
         LocalCluster(n_workers=4, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
-        connected(cluster.scheduler_address, None, lambda _: None) as make,
+        connected(cluster.scheduler_address, None, lambda _: None) as scheduler,
     ):
-        yield make
+        yield lambda _: scheduler
 
 
 def serve(graded: Path) -> None:

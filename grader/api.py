@@ -14,6 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from grader.classroom.local import Attempt as Attempt
+    from grader.classroom.local import ClassScheduler as ClassScheduler
+    from grader.classroom.local import failed_attempt as failed_attempt
+    from grader.classroom.receiving import UnwantedError as UnwantedError
+    from grader.classroom.receiving import grade_packed as grade_packed
+    from grader.classroom.schedulers import Connect as Connect
+    from grader.classroom.sending import pack_task as pack_task
+    from grader.classroom.sending import store_answer as store_answer
     from grader.core.chart import Band as Band
     from grader.core.chart import Chart as Chart
     from grader.core.chart import Level as Level
@@ -204,6 +212,11 @@ if TYPE_CHECKING:
     from grader.judging.wording import numbers as numbers
     from grader.judging.wording import quote as quote
     from grader.judging.wording import span as span
+    from grader.reporting.escape import csv_cell as csv_cell
+    from grader.reporting.escape import shown as shown
+    from grader.reporting.escape import shown_lines as shown_lines
+    from grader.reporting.formats import Format as Format
+    from grader.reporting.json_report import report_to_json as report_to_json
     from grader.simulation import DifferentialDrive as DifferentialDrive
     from grader.simulation import Moment as Moment
     from grader.simulation import Output as Output
@@ -297,6 +310,17 @@ CONTENTS: dict[str, dict[str, str]] = {
             "message_classes value_of number_in_code text_in_code elsewhere_because goes_to head_of "
             "python_loggers waits_for_ever"
         ),
+    },
+    "Report formats": {
+        "grader.reporting.formats": "Format",
+        "grader.reporting.json_report": "report_to_json",
+        "grader.reporting.escape": "shown shown_lines csv_cell",
+    },
+    "Class schedulers": {
+        "grader.classroom.schedulers": "Connect",
+        "grader.classroom.local": "ClassScheduler Attempt failed_attempt",
+        "grader.classroom.sending": "pack_task store_answer",
+        "grader.classroom.receiving": "grade_packed UnwantedError",
     },
     "Simulations": {
         "grader.simulation": "Simulation Moment Output DifferentialDrive Turtle Unicycle",

@@ -45,7 +45,6 @@ class Session:
         *,
         pictures: bool = True,
         session: object = None,
-        under_way: object = None,
     ) -> Report:
         self.requests.append(request)
         self.pictures = pictures

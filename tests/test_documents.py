@@ -95,6 +95,7 @@ _STAND_INS = {
     "P": "60",
     "P%": "5%",
     "FORMAT=PATH": "json=report.json",
+    "badge=badge.svg": "json=badge.svg",
     "OWNER/NAME@COMMIT": f"school/grader@{'0' * 40}",
 }
 _GRADE = re.compile(r"^(?:\$ )?(?:\S+/bin/)?grade (.*)$")

@@ -35,6 +35,7 @@ from grader.app.request import GradeRequest
 from grader.app.start import grade
 from grader.classroom.store import Conditions
 from grader.cli import main
+from grader.core.grading_options import GradingOptions
 from grader.core.report import Report
 from grader.core.submission import Submission
 from grader.execution import confined_build
@@ -339,7 +340,7 @@ def test_other_definitions_are_other_conditions(tmp_path: Path) -> None:
     before = offered_digest([tmp_path / "interfaces"], ())
     (tmp_path / "interfaces" / "lab_msgs" / "msg" / "Battery.msg").write_text("float64 voltage\n")
     after = offered_digest([tmp_path / "interfaces"], ())
-    none = Conditions("1", (), "", 7, "auto", "auto")
+    none = Conditions("1", (), "", GradingOptions(seed=7))
     keys = [replace(none, interfaces=digest).recorded("sha256:0") for digest in ("", before, after)]
     assert len(set(keys)) == 3
     assert offered_digest((), ()) == ""

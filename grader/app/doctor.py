@@ -10,6 +10,7 @@ from pathlib import Path
 from grader.app.grade import Progress
 from grader.app.interface_packages import described
 from grader.app.observe import ObserveRequest, observe
+from grader.core import entry_points
 from grader.core.checkup import NO_SANDBOX, Checkup, Exchange, Fact, TierReport
 from grader.core.errors import EnvironmentFault, GraderError
 from grader.core.limits import Limits
@@ -21,6 +22,7 @@ from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.bubblewrap import ENTERABLE
 from grader.execution.sandbox.choose import inspect_tiers, sandbox_memory
 from grader.execution.sandbox.tiers import is_for_others, isolation_from_name
+from grader.reporting.formats import EVIDENCE, FORMATS, format_of
 from grader.submissions.foreign_archives import install_command, is_installed
 
 #: Messages that the trial node sends, one every 0.1 s starting at 0.1 s, and how long it is observed.
@@ -43,7 +45,7 @@ def examine(progress: Progress) -> Checkup:
     """Find out what this machine can do; takes a few seconds."""
     progress("looking for ROS 2")
     ros, lack = _ros()
-    facts = (*software(ros), *lack, *system(), *weaknesses(ros), _archives(), *_interfaces(ros))
+    facts = (*software(ros), *lack, *system(), *weaknesses(ros), _archives(), *_interfaces(ros), *_added())
     if ros is None:
         return Checkup(facts, None, (), "", "", Limits())
     progress("looking at the byte code")
@@ -94,6 +96,38 @@ def _interfaces(ros: RosInstallation | None) -> tuple[Fact, ...]:
         return (Fact("interfaces", f"packages cannot be built here: {text}", fits=False, remedy=hint),)
     text = "built from their definitions, without a compiler"
     return (Fact("interfaces", f"{text}; ready: {', '.join(ready)}" if ready else text),)
+
+
+def _added() -> tuple[Fact, ...]:
+    """Report what other packages add to the grader, and why some of it cannot be used."""
+    try:
+        formats = [_added_format(*each) for each in entry_points.added(entry_points.FORMATS)]
+        schedulers = [_added_scheduler(*each) for each in entry_points.added(entry_points.SCHEDULERS)]
+    except EnvironmentFault as fault:
+        return (Fact("other packages", fault.message, remedy=fault.hint),)
+    return (*formats, *schedulers)
+
+
+def _added_format(name: str, package: str) -> Fact:
+    if name in (*FORMATS, EVIDENCE):
+        text = f"{name} of {package} is not used: the grader has its own"
+        return Fact("report format", text, remedy=f"give the format of {package.partition(' ')[0]} another name")
+    try:
+        format_of(name)
+    except EnvironmentFault as fault:
+        return Fact("report format", fault.message, remedy=fault.hint)
+    return Fact("report format", f"{name} of {package}")
+
+
+def _added_scheduler(name: str, package: str) -> Fact:
+    if name in entry_points.own(entry_points.SCHEDULERS):
+        text = f"{name} of {package} is not used: the grader has its own"
+        return Fact("class scheduler", text, remedy=f"give the scheduler of {package.partition(' ')[0]} another name")
+    try:
+        entry_points.load(entry_points.SCHEDULERS, name, object, "a scheduler")
+    except EnvironmentFault as fault:
+        return Fact("class scheduler", fault.message, remedy=fault.hint)
+    return Fact("class scheduler", f"{name} of {package}")
 
 
 def _remedy(tiers: Sequence[TierReport]) -> str:

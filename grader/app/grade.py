@@ -10,7 +10,6 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 import grader
 from grader.app.bags import Recordings, read_given, read_recordings, recordings_digest, refuse_unplayed
@@ -30,13 +29,12 @@ from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
 from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
+from grader.judging.beginnings import BeginningJudge
+from grader.judging.judge_run import judge_run
 from grader.rubrics.builtin import builtin_exercises, exercise_ids
 from grader.submissions.collected import listed, shown
 from grader.submissions.sources import HASHES, read_reaches, read_sources
 from grader.submissions.submission import stage_collected, stage_submission
-
-if TYPE_CHECKING:
-    from grader.judging.beginnings import BeginningJudge
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
@@ -72,7 +70,7 @@ class EarlyReports:
         if pending and key[0] not in pending:
             duration_s = self._run.duration_s + time.perf_counter() - self._started
             run = replace(self._run, traces=dict(self._traces), duration_s=duration_s)
-            self._on_report(_judge()(self._exercises, run, pictures=False, pending=pending))
+            self._on_report(judge_run(self._exercises, run, pictures=False, pending=pending))
 
 
 def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
@@ -84,14 +82,13 @@ def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
     *,
     pictures: bool = True,
     started: float | None = None,
-    under_way: Callable[[], None] = lambda: None,
 ) -> Report:
     """Grade one submission in a session, which others may use before and after it.
 
     Raises a GraderError whose class tells who must act. The complete recording and its exercises are passed to
     `on_recorded`; a partial report to `on_partial_report`, whenever one exercise is done and others are not. Pictures
     are charts, which only some formats show. The duration in the report begins at `started`, a reading of
-    `time.perf_counter`; now if it is None. While nodes are recorded, `under_way` is called once.
+    `time.perf_counter`; now if it is None.
     """
     started = time.perf_counter() if started is None else started
     with prepared(session, request, progress, started) as ready:
@@ -100,13 +97,8 @@ def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
         checks = SpotChecks(request.spot_checks, run.seed, submission.digest, ready.reaches)
         later = request.clock == AUTO and checks.certain
         first = None if later else take
-
-        def meanwhile() -> None:
-            _judge()
-            under_way()
-
         budget = RealTimeBudget(request.time_budget_s, spent_s=ready.provided.spent_s)
-        traces = session.record(ready.jobs, request.clock, progress, first, budget=budget, under_way=meanwhile)
+        traces = session.record(ready.jobs, request.clock, progress, first, budget=budget)
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
@@ -116,7 +108,7 @@ def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
         run = replace(run, definitions=definitions(run.traces.values(), ready.provided))
         if on_recorded is not None:
             on_recorded(run, exercises)
-        return _judge()(exercises, run, pictures=pictures)
+        return judge_run(exercises, run, pictures=pictures)
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,19 +175,10 @@ def prepared(
         yield Prepared(exercises, submission, provided, reaches, jobs, run)
 
 
-def _judge() -> Callable[..., Report]:
-    """Return `judge_run`; the first call imports it, which takes as long as the start of a node."""
-    from grader.judging.judge_run import judge_run  # noqa: PLC0415
-
-    return judge_run
-
-
 def _judge_of(
     exercises: Sequence[Exercise], submission: Submission, sources: Mapping[str, str], key: Key
 ) -> BeginningJudge:
     """Return what judges the beginnings of the recordings of a scenario."""
-    from grader.judging.beginnings import BeginningJudge  # noqa: PLC0415 - as `judge_run`
-
     exercise = next(exercise for exercise in exercises if exercise.id == key[0])
     return BeginningJudge(exercise, key[1], submission, sources)
 

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.app.ros_packages import LENDABLE, Lent, copied, lent_to
-from grader.compiled import compiled, state_of, state_of_package
 from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault, RubricError
 from grader.core.exercise import Exercise
@@ -33,7 +32,7 @@ from grader.execution.recording_session import RecordingSession
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.temp_dirs import kept_interfaces, make_room
 from grader.interfaces.build import BuiltInterfaces, build
-from grader.interfaces.definitions import SHIPPED, InterfacePackage, digest, files_in, find_packages, shipped_packages
+from grader.interfaces.definitions import InterfacePackage, digest, files_in, find_packages, shipped_packages
 from grader.interfaces.program import needed
 from grader.submissions.collected import listed, shown
 
@@ -138,19 +137,13 @@ def known_interfaces(course: tuple[Path, ...] = ()) -> Interfaces | None:
         ros = find_ros()
     except EnvironmentFault:
         return None
-    ready = [package for package in _shipped() if not is_installed(package.name, ros)]
+    ready = [package for package in shipped_packages() if not is_installed(package.name, ros)]
 
     def looked_in(folders: Sequence[Path]) -> Sequence[Path]:
         own = [offer.package for offer in offers(folders, (), ros)]
         return [built(needed(own, [*_of_class(course, ros), *ready]), ros).share] if own else []
 
     return Interfaces(ros.share, [built(ready, ros).share] if ready else [], looked_in).including(course)
-
-
-@cache
-def _shipped() -> tuple[InterfacePackage, ...]:
-    files = [os.path.join(home, name) for home, _, names in os.walk(SHIPPED) for name in names]  # noqa: PTH118 - faster
-    return compiled("interfaces", state_of(files) + state_of_package(), shipped_packages)
 
 
 def _of_class(course: tuple[Path, ...], ros: RosInstallation) -> list[InterfacePackage]:
@@ -164,7 +157,7 @@ def described(course: tuple[Path, ...], *, ready: bool = True) -> list[Described
     """
     ros = find_ros()
     given = [(package, CLASS) for package in packages_in(dict.fromkeys(course))]
-    given += [(package, GRADER) for package in _shipped() if ready]
+    given += [(package, GRADER) for package in shipped_packages() if ready]
     lacking = [package for package, _ in given if not is_installed(package.name, ros)]
     found = []
     for package, origin in given:
@@ -199,7 +192,7 @@ def provide(
     ros, root = session.ros, submission.root
     given = offers((Path(folder) for e in exercises for folder in e.interfaces), course, ros)
     taken = {offer.package.name for offer in given}
-    ready = [p for p in _shipped() if p.name not in taken and not is_installed(p.name, ros)]
+    ready = [p for p in shipped_packages() if p.name not in taken and not is_installed(p.name, ros)]
     texts = chain([repr(exercises).encode("utf-8", "replace")], _programs(root))
     names = {*(package.name for package in ready), *LENDABLE}
     mentioned = _named_in(texts, names)

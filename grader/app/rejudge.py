@@ -33,7 +33,7 @@ from grader.execution.evidence.store import (
 from grader.judging.judge_run import judge_run
 from grader.reporting.audience import ANYBODY, Readers, told
 from grader.reporting.delivery import Output, write_report
-from grader.reporting.formats import FORMATS
+from grader.reporting.formats import known
 from grader.reporting.json_report import ReportData, dumps, report_to_json
 from grader.reporting.rejudged import RejudgedResult, ReportChange, change
 from grader.rubrics.draws import First
@@ -200,7 +200,7 @@ def _result(name: str, folder: Path, how: Judgement, wanted: Wanted) -> Rejudged
 def _write(name: str, report: Report, wanted: Wanted) -> None:
     for output in wanted.files:
         if output.path is not None:
-            path = output.path / f"{name}{FORMATS[output.format].suffix}"
+            path = output.path / f"{name}{known(output.format).suffix}"
             path.parent.mkdir(parents=True, exist_ok=True)
             write_report(report, Output(output.format, path), wanted.readers)
 

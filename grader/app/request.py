@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.app.seeds import PRACTICE, SeedKey
 from grader.core.dataclass import dataclass
 from grader.core.exercise import Drawn, Exercise
-from grader.core.limits import TIME_BUDGET_S
+from grader.core.grading_options import GradingOptions, option_words, options_of_json, options_to_json, values
 from grader.core.report import JsonObject, Reproduction
-from grader.core.scenario import ODOMETRY
 from grader.rubrics.draws import Draw, Recorded
 
 if TYPE_CHECKING:
@@ -20,34 +20,25 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class GradeRequest:
-    """What to grade, and how."""
+class GradeRequest(GradingOptions):
+    """What to grade, and how: the options of the run, and what is known of the submission."""
 
     submission: str  # path as the user typed it
-    # Exercises to grade, by id, number or file; empty for all exercises of the rubrics, except built-in ones that are
-    # only graded by request.
-    exercises: tuple[str, ...] = ()
-    every: bool = False  # whether to grade exactly the exercises that the submission has a file for
-    rubrics: tuple[Path, ...] = ()  # rubric files; empty for the built-in ones
-    seed: int | None = None  # seed of all drawn values; None derives it from the submission and the seed key
-    seed_key: SeedKey = PRACTICE  # the key to derive the seed with
-    # Recordings to play instead of those of the rubrics: `(name, path)`, where the name is a topic or a message type
-    bags: tuple[tuple[str, Path], ...] = ()
-    clock: str = "auto"  # `virtual`, `wall` or `auto`
-    isolation: str = "auto"  # `auto`, `none` or the name of a tier
-    time_budget_s: float = TIME_BUDGET_S  # real time that all recordings together may take
+    seed_key: SeedKey = field(default=PRACTICE, kw_only=True)  # the key to derive the seed with
     # Most scenarios recorded in parallel; None for one per processor. Does not affect the result.
-    workers: int | None = None
-    spot_checks: float = 0.0  # share of submissions, from 0 to 1, that are also recorded on the wall clock
+    workers: int | None = field(default=None, kw_only=True)
     # The files of the submission if they were read before, perhaps on another machine; None to read them now
-    collected: Collected | None = None
+    collected: Collected | None = field(default=None, kw_only=True)
     # Evidence of the same submission, graded under the same conditions by perhaps another rubric; its recordings of
     # unchanged exercises are used instead of a run. None to record everything.
-    recordings: Path | None = None
-    student: str = ""  # id of the student whose variant is graded; empty if nothing varies
-    variant_key: Path | None = None  # file with the course key, as the user typed it; None if not given
-    interfaces: tuple[Path, ...] = ()  # folders with interface packages for the whole class
-    draw: Draw | None = None  # supplies variant values; if None, rubrics with variants are refused
+    recordings: Path | None = field(default=None, kw_only=True)
+    # Supplies variant values; if None, rubrics with variants are refused
+    draw: Draw | None = field(default=None, kw_only=True)
+
+
+def request_for(submission: str, options: GradingOptions, **known: Any) -> GradeRequest:
+    """Return the request to grade a submission with these options; `known` are the other fields."""
+    return GradeRequest(submission, **values(options), **known)
 
 
 def reproduction(request: GradeRequest, exercises: Sequence[Exercise], played: str, seed: int) -> Reproduction:
@@ -64,31 +55,7 @@ def reproduction(request: GradeRequest, exercises: Sequence[Exercise], played: s
 
 def command_words(request: GradeRequest, seed: int) -> tuple[str, ...]:
     """Return the words of the command, with the seed and every option that affects the result."""
-    words = ["grade", _unambiguous_path(request.submission)]
-    for exercise in request.exercises:
-        words += ["--exercise", exercise]
-    if request.every:
-        words.append("--all")
-    for rubric in request.rubrics:
-        words += ["--rubric", str(rubric)]
-    words += ["--seed", str(seed)]
-    if request.student:
-        words += ["--student", request.student]
-    if request.variant_key is not None:
-        words += ["--variant-key", str(request.variant_key)]
-    for name, path in request.bags:
-        words += ["--odom-bag", str(path)] if name == ODOMETRY else ["--recording", f"{name}={path}"]
-    for folder in request.interfaces:
-        words += ["--interfaces", str(folder)]
-    if request.clock != "auto":
-        words += ["--clock", request.clock]
-    if request.isolation != "auto":
-        words += ["--isolation", request.isolation]
-    if request.time_budget_s != TIME_BUDGET_S:
-        words += ["--time-budget", f"{request.time_budget_s:g}"]
-    if request.spot_checks:
-        words += ["--spot-checks", f"{request.spot_checks:.6%}".rstrip("%").rstrip("0").rstrip(".") + "%"]
-    return tuple(words)
+    return ("grade", _unambiguous_path(request.submission), *option_words(replace(request, seed=seed)))
 
 
 def _unambiguous_path(path: str) -> str:
@@ -98,34 +65,13 @@ def _unambiguous_path(path: str) -> str:
 
 def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -> JsonObject:
     """Convert to JSON what reproduces a report besides path, seed and rubrics, and add the variant values."""
-    bags = dict(request.bags)
     return {
-        "exercises": list(request.exercises),
-        "odom_bag": str(bags.pop(ODOMETRY)) if ODOMETRY in bags else None,
-        **({"recordings": {name: str(path) for name, path in bags.items()}} if bags else {}),
-        "clock": request.clock,
-        "isolation": request.isolation,
-        "student": request.student,
-        "variant_key": None if request.variant_key is None else str(request.variant_key),
-        **({"interfaces": [str(folder) for folder in request.interfaces]} if request.interfaces else {}),
+        **options_to_json(request),
         "variants": {e.id: dict(e.variant.values) for e in exercises if e.variant is not None},
     }
 
 
 def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> GradeRequest:
     """Return the request that would record a kept run again and judge it by these rubrics."""
-    bag, key, student = data.get("odom_bag"), data.get("variant_key"), str(data.get("student", ""))
-    bags = {**({ODOMETRY: bag} if bag is not None else {}), **data.get("recordings", {})}
-    return GradeRequest(
-        submission=submission,
-        exercises=tuple(str(id_) for id_ in data.get("exercises", ())),
-        rubrics=rubrics,
-        seed=seed,
-        bags=tuple((str(name), Path(str(path))) for name, path in bags.items()),
-        clock=str(data.get("clock", "auto")),
-        isolation=str(data.get("isolation", "auto")),
-        student=student,
-        variant_key=None if key is None else Path(str(key)),
-        interfaces=tuple(Path(str(folder)) for folder in data.get("interfaces", ())),
-        draw=Recorded(Drawn(student, data.get("variants", {}))),
-    )
+    asked = options_of_json(data, GradeRequest(submission, rubrics=rubrics, seed=seed))
+    return replace(asked, draw=Recorded(Drawn(asked.student, data.get("variants", {}))))

@@ -37,7 +37,6 @@ def grade(  # noqa: PLR0913  what to grade, and where progress goes
     *,
     pictures: bool = True,
     session: RecordingSession | None = None,
-    under_way: Callable[[], None] = lambda: None,
 ) -> Report:
     """Grade one submission, in a session of its own unless one is given; see `grade_in`."""
     started = time.perf_counter()
@@ -45,7 +44,7 @@ def grade(  # noqa: PLR0913  what to grade, and where progress goes
         from grader.app.grade import grade_in  # noqa: PLC0415 - takes as long as the worker takes to start
 
         told = (on_recorded, on_partial_report)
-        return grade_in(used, request, progress, *told, pictures=pictures, started=started, under_way=under_way)
+        return grade_in(used, request, progress, *told, pictures=pictures, started=started)
 
 
 def _own_session(request: GradeRequest, progress: Progress) -> AbstractContextManager[RecordingSession]:
@@ -69,7 +68,8 @@ def opened_early(
 def may_run(submission: str, rubrics: Sequence[Path] = ()) -> bool:
     """Return whether a submission may hold a file to run, judged by names and texts alone; True in doubt.
 
-    If not, no worker is started in advance. Reading the rubrics instead would take as long as the start of a worker.
+    If not, no worker is started in advance, which saves 80 ms of real time and more where nothing can run. Reading the
+    rubrics instead would take as long as the start of a worker.
     """
     place, is_folder = Path(submission), os.path.isdir(submission)  # noqa: PTH112 - False for any unusable name
     if rubrics or not (is_folder or place.suffix == ".py"):

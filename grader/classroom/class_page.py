@@ -59,14 +59,14 @@ def run_facts(book: Gradebook, run: RunOfClass) -> RunFacts:
 
 
 def _rows(book: Gradebook, run: RunOfClass, reports: Sequence[ReportData]) -> Iterator[tuple[str, str]]:
-    conditions = run.conditions
-    seed = conditions.seed
+    conditions, options = run.conditions, run.conditions.options
+    seed = options.seed
     yield "grader", _counted(_versions(report) for report in reports) or conditions.grader
     yield "rubrics", ", ".join(f"{id_} {digest}" for id_, digest in conditions.rubrics)
     if conditions.recording:
         yield "recording", conditions.recording
-    yield "clock", _clock(conditions.clock, reports)
-    yield "isolation", f"requested: {conditions.isolation}; {_counted(_isolation(r) for r in reports) or 'nothing ran'}"
+    yield "clock", _clock(options.clock, reports)
+    yield "isolation", f"requested: {options.isolation}; {_counted(_isolation(r) for r in reports) or 'nothing ran'}"
     yield (
         "seed",
         f"{seed} for all submissions" if seed is not None else "from the seed key and the submitted files",

@@ -45,6 +45,7 @@ from grader.classroom.watching import Watcher
 from grader.classroom.worker import GRADESCOPE, HANDED_BACK, HANDED_BACK_PAGE, PAGE
 from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError
 from grader.core.exercise import Exercise
+from grader.core.grading_options import GradingOptions, values
 from grader.execution.temp_dirs import scratch_folder
 from grader.reporting.class_page.contents import PageLink
 from grader.reporting.escape import json_value
@@ -152,12 +153,7 @@ def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Condi
         grader=grader.__version__,
         rubrics=tuple((exercise.id, exercise.digest) for exercise in exercises),
         recording=recordings_digest(read_given(grading, read_recordings(grading, exercises))),
-        seed=grading.seed,
-        clock=grading.clock,
-        isolation=grading.isolation,
-        time_budget_s=grading.time_budget_s,
-        spot_checks=grading.spot_checks,
-        every=grading.every,
+        options=GradingOptions(**values(grading)),
         interfaces=offered_digest(grading.interfaces, exercises),
     )
 
@@ -172,7 +168,7 @@ def _seeded(own: Mapping[str, Conditions], digests: Mapping[str, str], course: C
     if course.grading.seed is not None:
         return dict(own)
     key = course.seed_key or kept_key(course.results / SEED_KEY)
-    return {name: replace(conditions, seed=key.seed(digests[name])) for name, conditions in own.items()}
+    return {name: each.of_submission(key.seed(digests[name]), each.variants) for name, each in own.items()}
 
 
 def _book(  # noqa: PLR0913  each comes from a different source

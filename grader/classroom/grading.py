@@ -228,19 +228,13 @@ class ClassRun:
         return replaced
 
     def _task(self, entry: HandedInEntry) -> Task:
-        grading = self.course.grading
         kept = self.recordings.get(entry.name)
         return Task(
             name=entry.name,
             label=entry.label,
             submission=entry.path,
             into=self.store.fresh(entry.name).resolve(),
-            exercises=grading.exercises,
-            rubrics=grading.rubrics,
-            bags=grading.bags,
             conditions=self.conditions[entry.name],
-            variant_key=grading.variant_key,
-            interfaces=grading.interfaces,
             workers=workers_for(len(os.sched_getaffinity(0)) // self._jobs, MORE_IN_CLASS),
             standalone=self.course.standalone,
             deadline_s=deadline_s(self.course.grading.time_budget_s),
@@ -264,7 +258,7 @@ def _graded_by(
     """Return the exercises of one submission: of its student's variant, and with `every` only those with a file."""
     if conditions.variants is not None:
         exercises = read_exercises(replace(course.grading, draw=Recorded(conditions.variants)), course.sources)
-    if not conditions.every:
+    if not conditions.options.every:
         return exercises
     with scratch_folder() as scratch:
         staged = stage_submission(str(entry.path), wanted_files(exercises), scratch)

@@ -35,17 +35,11 @@ class Task:
     label: str  # its name in the source
     submission: Path
     into: Path  # destination folder for the files of `worker.PARTS`; must not exist yet
-    exercises: tuple[str, ...]  # exercise ids to grade; empty for all exercises of the rubrics
-    rubrics: tuple[Path, ...]  # rubric files; empty for the built-in ones
-    bags: tuple[tuple[str, Path], ...]  # recordings to play instead of those of the rubrics; see `GradeRequest`
-    conditions: Conditions  # what the result depends on besides the submission
+    conditions: Conditions  # what the result depends on besides the submission, the options of the run among it
     workers: int  # most scenarios recorded in parallel
     standalone: bool  # whether the HTML report includes its scripts, instead of sharing them with the class
     deadline_s: float  # real time after which the attempt is killed
     collected: Path | None = None  # file with the submission as read on another machine; None to read it now
-    # Path of the course key for the command that reproduces the run; the file is not read
-    variant_key: Path | None = None
-    interfaces: tuple[Path, ...] = ()  # folders with interface packages for the whole class
     recordings: Path | None = None  # evidence whose recordings of unchanged exercises are used; None to record all
     spot_check: bool = False  # whether it is drawn for a check on the wall clock, which takes long
 
@@ -148,7 +142,7 @@ class LocalScheduler:
             try:
                 process = self._start()
             except OSError as error:
-                return failed(task, f"the grader cannot be started: {error.strerror}")
+                return failed_attempt(task, f"the grader cannot be started: {error.strerror}")
             return self._attempt(process, task, on_step, place, waiting)
 
     @contextmanager
@@ -189,8 +183,8 @@ class LocalScheduler:
         if status is not None:
             return Attempt(task, status)
         if overdue.is_set():
-            return failed(task, f"the grader was not done after {task.deadline_s:.0f} s")
-        return failed(task, f"the grader ended without a result (exit code {process.returncode})")
+            return failed_attempt(task, f"the grader was not done after {task.deadline_s:.0f} s")
+        return failed_attempt(task, f"the grader ended without a result (exit code {process.returncode})")
 
     def _idle_one(self) -> subprocess.Popen[bytes] | None:
         with self._lock:
@@ -231,7 +225,8 @@ class LocalScheduler:
                 return kept.load(json.dumps(message["done"]).encode())
             if "step" in message:
                 on_step(task.name, str(message["step"]))
-            if "wall_clock" in message and task.conditions.clock != WALL:  # with `--clock wall`, all would be recorded
+            # With `--clock wall`, all would be recorded
+            if "wall_clock" in message and task.conditions.options.clock != WALL:
                 place.leave()
         return None
 
@@ -308,6 +303,6 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
             os.killpg(process.pid, signal.SIGKILL)
 
 
-def failed(task: Task, problem: str, hint: str = AGAIN) -> Attempt:
+def failed_attempt(task: Task, problem: str, hint: str = AGAIN) -> Attempt:
     """Build a failed attempt, which is never the student's fault."""
     return Attempt(task, ResultStatus(State.FAILED, "", "", task.label, problem, hint))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -22,30 +22,17 @@ MAX_ANSWER_FILES = 1_000
 
 # File names are bytes, because a student's file name need not be valid text.
 Files = tuple[tuple[bytes, bytes], ...]
-_Message = TypeVar("_Message", "Terms", "GradingJob", "JobResult", "Fitness", "_Reading")
-
-
-@dataclass(frozen=True, slots=True)
-class SentBag:
-    """A recording to play instead of that of a rubric."""
-
-    name: str  # the topic or message type whose recording it replaces
-    path: bytes  # its relative path
-    files: Files  # its files, by their paths below it; a recording in a single file has an empty path
+_Message = TypeVar("_Message", "Terms", "GradingJob", "JobResult", "Fitness", "Parcel", "_Reading")
 
 
 @dataclass(frozen=True, slots=True)
 class Terms:
     """What all submissions of a class are graded with."""
 
-    conditions: Conditions  # what the results depend on
-    exercises: tuple[str, ...]  # exercise ids to grade; empty for all exercises of the rubrics
-    rubrics: Files  # relative path and content of each rubric file; empty for the built-in ones
-    bags: tuple[SentBag, ...]  # recordings to play instead of those of the rubrics
+    conditions: Conditions  # what the results depend on; the paths in their options are relative
+    files: Files  # relative path and content of each file that the options name, or that rubrics bring
     standalone: bool  # whether each HTML report includes its scripts
     deadline_s: float  # real time after which an attempt is killed
-    checks: Files = ()  # relative path and content of the files that rubrics and class bring
-    interfaces: tuple[bytes, ...] = ()  # relative paths of the folders with interface packages for the whole class
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +45,15 @@ class GradingJob:
     collected: bytes  # the submission; see `pack_collected`
     variants: Drawn | None = None  # the student's variant values; None if nothing varies
     seed: int | None = None  # seed of all drawn values; the seed key itself is never sent
+
+
+@dataclass(frozen=True, slots=True)
+class Parcel:
+    """One submission with all that another machine needs to grade it."""
+
+    version: str  # of the grader that asks
+    terms: bytes  # packed `Terms`
+    job: bytes  # packed `GradingJob`
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,17 +83,23 @@ class _Reading:
     notes: tuple[bytes, ...]
 
 
-def pack(message: Terms | GradingJob | JobResult | Fitness) -> bytes:
+def pack(message: Terms | GradingJob | JobResult | Fitness | Parcel) -> bytes:
     """Encode a message."""
-    return msgspec.msgpack.encode(message)
+    return msgspec.msgpack.encode(message, enc_hook=os.fsencode)  # a path, which need not be valid text
 
 
 def unpack(data: bytes, kind: type[_Message]) -> _Message:
     """Decode a message; raises HarnessError for anything else."""
     try:
-        return msgspec.msgpack.decode(data, type=kind)
+        return msgspec.msgpack.decode(data, type=kind, dec_hook=_path)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError, ValueError):
         raise HarnessError(f"{kind.__name__.lower()}: expected what a grader packs, found something else") from None
+
+
+def _path(kind: type[Any], value: Any) -> Any:
+    if kind is not Path or not isinstance(value, bytes):
+        raise ValueError(kind)
+    return Path(os.fsdecode(value))
 
 
 def pack_collected(collected: Collected) -> bytes:

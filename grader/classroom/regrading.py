@@ -13,9 +13,9 @@ from pathlib import Path
 from grader.app.kept_recordings import PlannedRun, recorded_alike
 from grader.app.rejudge import WORTH_A_POOL, judged_again
 from grader.app.request import request_to_json
-from grader.classroom.local import Attempt, Task, failed
+from grader.classroom.local import Attempt, Task, failed_attempt
 from grader.classroom.store import Conditions, ResultStatus, State
-from grader.classroom.worker import EVIDENCE, request_for, status_of, write_reports
+from grader.classroom.worker import EVIDENCE, request_of_task, status_of, write_reports
 from grader.core.dataclass import dataclass
 from grader.core.errors import EvidenceError, GraderError
 from grader.core.exercise import Exercise
@@ -47,7 +47,7 @@ def kept_recordings(
     The earlier result must be of the same files, seed, clock, sandbox, limits and version of the grader; rubrics are
     compared by their scenarios.
     """
-    if result is None or result.state not in (State.GRADED, State.UNDECIDED) or conditions.seed is None:
+    if result is None or result.state not in (State.GRADED, State.UNDECIDED) or conditions.options.seed is None:
         return None
     if not digest or result.recorded != conditions.recorded(digest):
         return None
@@ -55,7 +55,7 @@ def kept_recordings(
         evidence = open_evidence(place / EVIDENCE)
     except EvidenceError:
         return None
-    planned = PlannedRun(digest, conditions.seed, conditions.recording, conditions.interfaces)
+    planned = PlannedRun(digest, conditions.options.seed, conditions.recording, conditions.interfaces)
     reused = frozenset(exercise.id for exercise in recorded_alike(evidence, exercises, planned))
     return KeptRecordings(place / EVIDENCE, tuple(exercises), reused) if reused else None
 
@@ -94,16 +94,16 @@ def _attempt(task: Task, kept: KeptRecordings) -> Attempt:
     try:
         status = _judged(task, kept)
     except GraderError as error:
-        return failed(task, error.message)
+        return failed_attempt(task, error.message)
     except OSError as error:
-        return failed(task, f"the result cannot be written: {error.strerror}")
+        return failed_attempt(task, f"the result cannot be written: {error.strerror}")
     except Exception as error:  # as in `worker.attempt`; the submission is run then
-        return failed(task, f"the grader failed: {type(error).__name__}: {error}")
+        return failed_attempt(task, f"the grader failed: {type(error).__name__}: {error}")
     return Attempt(task, replace(status, duration_s=round(time.perf_counter() - began_s, 3)))
 
 
 def _judged(task: Task, kept: KeptRecordings) -> ResultStatus:
-    request = request_for(task)
+    request = request_of_task(task)
     evidence = open_evidence(kept.evidence)
     report = judged_again(evidence, kept.exercises, request, task.conditions.recording)
     task.into.mkdir()

@@ -10,7 +10,7 @@ import secrets
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, field
+from dataclasses import asdict, field, replace
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from grader.app.spot_checks import is_drawn
 from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError
 from grader.core.exercise import Drawn
-from grader.core.limits import TIME_BUDGET_S
+from grader.core.grading_options import GradingOptions, key_values
 from grader.files import write_whole
 from grader.reporting.escape import json_value
 
@@ -286,35 +286,33 @@ class Conditions:
     grader: str
     rubrics: tuple[tuple[str, str], ...]  # exercise id and digest of its rubric, in grading order
     recording: str  # digest of the recordings that are played; empty if there are none
-    seed: int | None  # seed of all drawn values; None for a whole class in which each submission has its own
-    clock: str
-    isolation: str
-    every: bool = False  # whether only exercises count that the submission has a file for
+    options: GradingOptions  # their seed is that of the submission; None for a whole class in which each has its own
     variants: Drawn | None = None  # the student's variant values; None if nothing varies
-    time_budget_s: float = TIME_BUDGET_S  # real time that all recordings of a submission may take together
-    spot_checks: float = 0.0  # share of the class that is checked on the wall clock, from 0 to 1
     interfaces: str = ""  # digest of the interface packages of rubrics and class; empty if there are none
 
     def key(self, submission: str) -> str:
         """Return the cache key of a result, given the digest of the submission."""
-        return self._digest({**asdict(self), "submission": submission}, submission)
+        variants = None if self.variants is None else asdict(self.variants)
+        whole = {"rubrics": self.rubrics, "recording": self.recording, "variants": variants}
+        return self._digest(key_values(self.options) | whole, submission)
 
     def recorded(self, submission: str) -> str:
         """Return the key of the recordings of a submission: of all that they depend on besides the scenarios."""
-        depends_on = {**asdict(self), "submission": submission}
-        for scenarios in ("rubrics", "variants", "every", "recording"):
-            del depends_on[scenarios]
-        return self._digest(depends_on, submission)
+        return self._digest(key_values(self.options, recordings=True), submission)
 
     def draws(self, submission: str) -> bool:
         """Return whether a submission is drawn for a spot check, given its digest."""
-        return is_drawn(self.spot_checks, self.seed or 0, submission)
+        return is_drawn(self.options.spot_checks, self.options.seed or 0, submission)
+
+    def of_submission(self, seed: int | None, variants: Drawn | None) -> Conditions:
+        """Return the conditions of one submission: with its own seed and variant."""
+        return replace(self, options=replace(self.options, seed=seed), variants=variants)
 
     def _digest(self, depends_on: dict[str, Any], submission: str) -> str:
-        if not self.interfaces:
-            del depends_on["interfaces"]  # results of earlier versions do not have it
+        depends_on |= {"grader": self.grader, "submission": submission}
+        if self.interfaces:  # results of earlier versions do not have it
+            depends_on["interfaces"] = self.interfaces
         # A changed share affects only submissions that are drawn with one share and not with the other.
-        del depends_on["spot_checks"]
         if self.draws(submission):
             depends_on["spot_check"] = True
         text = json.dumps(depends_on, sort_keys=True)

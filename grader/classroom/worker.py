@@ -18,7 +18,7 @@ import msgspec
 
 from grader.app.grade import Progress, grade_in
 from grader.app.keeping import EvidenceWriter
-from grader.app.request import GradeRequest
+from grader.app.request import GradeRequest, request_for
 from grader.classroom import store as kept
 from grader.classroom.local import Task
 from grader.classroom.messages import read_collected
@@ -117,7 +117,7 @@ def attempt(task: Task, progress: Progress, grade: Grade, ended_s: Callable[[], 
 
 
 def _graded(task: Task, progress: Progress, grade: Grade) -> ResultStatus:
-    request = request_for(task)
+    request = request_of_task(task)
     task.into.mkdir()
     writer = EvidenceWriter([task.into / EVIDENCE], request)
     report = grade(request, progress, writer.remember)
@@ -127,25 +127,15 @@ def _graded(task: Task, progress: Progress, grade: Grade) -> ResultStatus:
     return status_of(report, task)
 
 
-def request_for(task: Task) -> GradeRequest:
+def request_of_task(task: Task) -> GradeRequest:
     """Return the request to grade the submission of a task."""
-    conditions, own = task.conditions, task.conditions.variants
-    return GradeRequest(
-        submission=str(task.submission),
-        exercises=task.exercises,
-        every=conditions.every,
-        rubrics=task.rubrics,
-        seed=conditions.seed,
-        bags=task.bags,
-        clock=conditions.clock,
-        isolation=conditions.isolation,
-        time_budget_s=conditions.time_budget_s,
-        spot_checks=conditions.spot_checks,
+    options, own = task.conditions.options, task.conditions.variants
+    student, key = (own.student, options.variant_key) if own is not None else ("", None)
+    return request_for(
+        str(task.submission),
+        replace(options, student=student, variant_key=key),
         workers=task.workers,
         collected=None if task.collected is None else read_collected(task.collected.read_bytes()),
-        student=own.student if own is not None else "",
-        variant_key=task.variant_key if own is not None else None,
-        interfaces=task.interfaces,
         draw=Recorded(own) if own is not None else None,
         recordings=task.recordings,
     )
@@ -173,7 +163,7 @@ def status_of(report: Report, task: Task) -> ResultStatus:
 
 def _used(conditions: Conditions, given: Reproduction) -> Conditions:
     """Return the conditions with the digests that were read; those of skipped exercises are kept as they were."""
-    if not conditions.every:
+    if not conditions.options.every:
         return replace(conditions, rubrics=given.rubrics, recording=given.recording)
     read = dict(given.rubrics)
     rubrics = tuple((id_, read.get(id_, digest)) for id_, digest in conditions.rubrics)

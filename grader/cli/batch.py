@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from grader.cli.completion import complete_exercise
 from grader.cli.options import (
     PATH,
-    RUBRIC,
     complain,
     drawn_with,
-    interfaces_option,
-    parse_share,
     print_result,
-    recording_options,
-    require,
-    time_budget_option,
 )
 from grader.cli.remembered import RepeatingCommand, is_left_out, options_to_keep
-from grader.core.checkup import TIERS
+from grader.cli.run_options import run_options
 from grader.core.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED, UNUSABLE
+from grader.core.extras import require
+from grader.core.grading_options import BATCH, GradingOptions
 
 if TYPE_CHECKING:
-    from grader.classroom.local import MakeScheduler
     from grader.classroom.outputs import Graded
 
 _LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "canvas")
@@ -47,38 +40,16 @@ _RERUNS = ("changed", "failed", "undecided", "all")
     help="Late days, scores, comments; else RESULTS/adjust.yaml.",
 )
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Submissions at a time; by default one a core.")
-@click.option("--scheduler", metavar="ADDRESS", help="Grade on the Dask cluster of this scheduler, or scheduler file.")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Grade on the Dask cluster of this scheduler, or scheduler file; NAME=PLACE for one of another package.",
+)
 @click.option(
     "--rerun", type=click.Choice(_RERUNS), default="changed", help="Which submissions to grade again, besides new ones."
 )
-@click.option(
-    "--exercise",
-    "exercises",
-    metavar="ID",
-    multiple=True,
-    shell_complete=complete_exercise,
-    help="Grade only this exercise; repeatable.",
-)
-@click.option("--all", "every", is_flag=True, help="Grade every exercise and project for which a student has a file.")
-@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
-@interfaces_option
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw everybody's values from N.")
+@run_options(BATCH)
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key, not by the one kept in RESULTS.")
-@recording_options
-@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As in `grade`.")
-@click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As in `grade`.")
-@time_budget_option
-@click.option(
-    "--spot-checks",
-    metavar="P%",
-    default="100%",
-    show_default=True,
-    callback=parse_share,
-    help="Share of the class to check on the wall clock too, drawn at random; 5% is faster.",
-)
-@click.option(
-    "--variant-key", type=PATH, metavar="FILE", help="The course key; the roster says which variant each student has."
-)
 @click.option("--standalone", is_flag=True, help="Make each HTML report a single file that can be sent away.")
 @click.option("--canvas", metavar="NUMBER", help="Write canvas.csv for the assignment of this number.")
 @click.option("--canvas-gradebook", type=PATH, metavar="CSV", help="The gradebook that Canvas exported.")
@@ -106,8 +77,7 @@ def command(  # noqa: PLR0913  one parameter an option
     jobs: int | None,
     scheduler: str | None,
     rerun: str,
-    exercises: tuple[str, ...],
-    seed: int | None,
+    options: GradingOptions,
     seed_key: Path | None,
     standalone: bool,
     canvas: str | None,
@@ -118,7 +88,6 @@ def command(  # noqa: PLR0913  one parameter an option
     templates: tuple[Path, ...],
     as_json: bool,
     no_progress: bool,
-    **as_given: Any,  # options that are fields of a request for one submission
 ) -> int:
     """Grade a class: every submission in SOURCE, a folder of submissions or a bulk download.
 
@@ -129,14 +98,13 @@ def command(  # noqa: PLR0913  one parameter an option
     Exit codes: 0 everybody was graded, 1 a submission cannot be used, 2 the command or something it was given cannot be
     used, or a rubric has a mistake, 3 something failed or was undecided through no fault of a student, 130 interrupted.
     """
-    if scheduler is not None:
-        require("--scheduler", "distributed", "dask")
     if similarity:
         require("--similarity", "copydetect", "similarity")
-    from grader.app.request import GradeRequest
+    from grader.app.request import request_for
     from grader.classroom.class_run import grade_class
     from grader.classroom.grading import ClassRequest
     from grader.classroom.outputs import platforms, render_summary, summary_json
+    from grader.classroom.schedulers import opened
     from grader.classroom.watching import shown_watcher
     from grader.core.shipped import shipped
     from grader.similarity.finding import read_given
@@ -155,17 +123,17 @@ def command(  # noqa: PLR0913  one parameter an option
         adjustments=adjustments,
         no_adjustments=is_left_out(ctx, "adjustments"),
         options=options_to_keep(ctx),
-        grading=GradeRequest("", exercises=tuple(dict.fromkeys(exercises)), seed=seed, **as_given),
+        grading=request_for("", options),
         jobs=jobs,
         rerun=rerun,
         runs_here=scheduler is None,
-        seed_key=drawn_with(seed, seed_key),
+        seed_key=drawn_with(options.seed, seed_key),
         standalone=standalone,
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
         given=read_given(templates or (shipped("student_template"),)) if similarity else None,
     )
     try:
-        with _scheduler_factory(scheduler, jobs) as make, shown_watcher(wanted=not no_progress) as watcher:
+        with opened(scheduler, jobs, complain) as make, shown_watcher(wanted=not no_progress) as watcher:
             graded = grade_class(course, watcher, complain, make)
     except KeyboardInterrupt:
         click.echo("interrupted: what was graded is kept; run the same command again to continue", err=True)
@@ -176,17 +144,6 @@ def command(  # noqa: PLR0913  one parameter an option
         complain(f"the rubric has a mistake: {mistake} ({count})", kind="error")
         complain("correct it, and run the same command again", kind="hint")
     return _code(graded)
-
-
-def _scheduler_factory(scheduler: str | None, jobs: int | None) -> AbstractContextManager[MakeScheduler]:
-    """Return a scheduler factory for this machine, or for a cluster, which stays connected in the context."""
-    if scheduler is None:
-        from grader.classroom.local import LocalScheduler
-
-        return nullcontext(LocalScheduler)
-    from grader.classroom.cluster.dispatcher import connected
-
-    return connected(scheduler, jobs, complain)
 
 
 def _code(graded: Graded) -> int:

@@ -12,11 +12,11 @@ from pathlib import Path
 import click
 from click.shell_completion import BashComplete, CompletionItem, add_completion_class, get_completion_class
 
-from grader.cli.options import EVIDENCE, print_for_programs
+from grader.cli.options import print_for_programs
 from grader.core.errors import ALL_MET
 from grader.core.rubric_files import rubrics_in
 from grader.core.shipped import shipped
-from grader.reporting.formats import FORMATS
+from grader.reporting.formats import EVIDENCE, FORMATS, added_formats
 
 _Items = list[CompletionItem[str]]
 _VARIABLE = "_GRADE_COMPLETE"
@@ -96,6 +96,8 @@ def complete_output(ctx: click.Context, param: click.Parameter, incomplete: str)
     """Complete FORMAT=PATH: a format with a usual file name, and paths after the `=`."""
     del ctx, param
     usual = {name: f"report{format_.suffix}" for name, format_ in FORMATS.items()} | {EVIDENCE: "evidence"}
+    # What is pressed often imports no other package to learn its suffix
+    usual |= {name: f"report.{name}" for name in added_formats()}
     name, equals, path = incomplete.partition("=")
     if not equals:
         return _starting(incomplete, (f"{name}={file}" for name, file in usual.items()))

@@ -18,29 +18,22 @@ import click
 
 import grader
 from grader.cli import batch, completion, export, interfaces, rejudge, rubric, upload, verify
-from grader.cli.completion import complete_criterion, complete_exercise, complete_file, complete_output
+from grader.cli.completion import complete_criterion, complete_file
 from grader.cli.options import (
-    EVIDENCE,
-    ISOLATION,
     PATH,
     RUBRIC,
-    SANDBOXES,
     audience_options,
     complain,
     drawn_by,
     drawn_with,
     inputs_options,
-    interfaces_option,
-    isolation_option,
-    parse_outputs,
     parse_percent,
-    parse_share,
     print_result,
     readers,
-    recording_options,
     shown_progress,
-    time_budget_option,
 )
+from grader.cli.outputs import outputs_option
+from grader.cli.run_options import run_options
 from grader.core.dataclass import dataclass
 from grader.core.errors import (
     ALL_MET,
@@ -52,7 +45,8 @@ from grader.core.errors import (
     RubricError,
     exit_code,
 )
-from grader.reporting.formats import FORMATS
+from grader.core.grading_options import GRADE, OBSERVE, GradingOptions
+from grader.reporting.formats import EVIDENCE, known
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -116,31 +110,10 @@ class _Default(click.Command):
 
 @click.command(cls=_Default, epilog=_EPILOG, hidden=True)
 @click.argument("submission", required=False, shell_complete=complete_file)
-@click.option(
-    "--exercise",
-    "exercises",
-    metavar="ID",
-    multiple=True,
-    shell_complete=complete_exercise,
-    help="Grade only this exercise, named by its id, number or file; repeatable.",
-)
-@click.option("--all", "every", is_flag=True, help="Grade every exercise and project for which there is a file.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, as a report names it.")
+@run_options(GRADE)
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key and the files handed in.")
-@recording_options
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON, and nothing else.")
-@click.option(
-    "-o",
-    "--output",
-    "outputs",
-    metavar="FORMAT=PATH",
-    multiple=True,
-    callback=parse_outputs,
-    shell_complete=complete_output,
-    help=f"Write a report ({', '.join(FORMATS)}), `-` is standard output; or keep evidence=FOLDER; repeatable.",
-)
-@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
-@interfaces_option
+@outputs_option("Write a report ({formats}), `-` is standard output; or keep evidence=FOLDER; repeatable.")
 @click.option(
     "--min-score",
     type=float,
@@ -148,31 +121,13 @@ class _Default(click.Command):
     callback=parse_percent,
     help="Exit with 0 if the score is at least P percent.",
 )
-@click.option(
-    "--clock",
-    type=click.Choice(["virtual", "wall", "auto"]),
-    default="auto",
-    help="The clock of the student's nodes; auto: virtual, or wall where virtual time does not work.",
-)
-@isolation_option
-@time_budget_option
-@click.option(
-    "--spot-checks",
-    metavar="P%",
-    default="0%",
-    show_default=True,
-    callback=parse_share,
-    help="Share of submissions to check on the wall clock too, drawn at random.",
-)
-@click.option("--student", metavar="ID", default="", help="Grade with the variant of this student; see --variant-key.")
-@click.option("--variant-key", type=PATH, metavar="FILE", help="The course key that rubrics draw variants from.")
 @audience_options
 @click.option("-v", "--verbose", is_flag=True, help="Print every reason, hint and call, the graph, and versions.")
 @click.option("--watch", is_flag=True, help="Grade again whenever a .py file is saved, until Ctrl-C.")
 @click.option("--open", "opens", is_flag=True, help="Write the HTML page and open it in a browser.")
 @click.option("--no-progress", is_flag=True, help="Show no progress while grading.")
 @click.version_option(grader.__version__, prog_name="grade", message="%(prog)s %(version)s")
-def _grade(*, submission: str | None, watch: bool, no_progress: bool, **as_given: Any) -> int:
+def _grade(*, submission: str | None, options: GradingOptions, watch: bool, no_progress: bool, **as_given: Any) -> int:
     """Grade a SUBMISSION (a folder, an archive or a .py file) and explain the score.
 
     Without one, the current folder is graded if it holds exercise files. A folder with the name of a command is graded
@@ -188,9 +143,10 @@ def _grade(*, submission: str | None, watch: bool, no_progress: bool, **as_given
         session = None
         if submission is not None and not watch:  # before the rest is imported, which takes as long as a worker's start
             with shown_progress(wanted=not no_progress) as progress:
-                early = start.opened_early(submission, as_given["rubrics"], as_given["isolation"], progress)
+                early = start.opened_early(submission, options.rubrics, options.isolation, progress)
                 session = stack.enter_context(early)
-        return _graded(started, session, submission=submission, watch=watch, no_progress=no_progress, **as_given)
+        given = {"options": options, "watch": watch, "no_progress": no_progress, **as_given}
+        return _graded(started, session, submission=submission, **given)
 
 
 def _check_submission(submission: str, others: Sequence[str]) -> None:
@@ -210,21 +166,17 @@ def _graded(  # noqa: PLR0913  one parameter an option
     session: RecordingSession | None,
     *,
     submission: str | None,
-    exercises: tuple[str, ...],
-    seed: int | None,
+    options: GradingOptions,
     seed_key: Path | None,
     as_json: bool,
     outputs: tuple[Output, ...],
     min_score: Fraction | None,
-    student: str,
-    variant_key: Path | None,
     audience: str | None,
     as_of: str,
     verbose: bool,
     watch: bool,
     opens: bool,
     no_progress: bool,
-    **as_given: Any,  # options that are fields of a request
 ) -> int:
     """Check the options, grade, and return the exit code."""
     from grader.cli import interactive
@@ -239,22 +191,15 @@ def _graded(  # noqa: PLR0913  one parameter an option
         rendered = (*rendered, Output("html", interactive.PAGE))
     wanted = prepared((*rendered, Output("json")) if as_json else rendered, verbose=verbose)
     for_whom = readers(audience, as_of)
-    from grader.app.request import GradeRequest
+    from grader.app.request import request_for
     from grader.app.seeds import PRACTICE
 
-    key = drawn_with(seed, seed_key)
-    submission = interactive.folder_at_hand(as_given["rubrics"]) if submission is None else submission
+    key = drawn_with(options.seed, seed_key)
+    submission = interactive.folder_at_hand(options.rubrics) if submission is None else submission
     if submission is None:
         return UNUSABLE
-    request = GradeRequest(
-        submission=submission,
-        exercises=tuple(dict.fromkeys(exercises)),
-        seed=seed,
-        seed_key=key or PRACTICE,
-        student=student.strip(),
-        variant_key=variant_key,
-        draw=drawn_by(student, variant_key),
-        **as_given,
+    request = request_for(
+        submission, options, seed_key=key or PRACTICE, draw=drawn_by(options.student, options.variant_key)
     )
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
     wanted = tuple(replace(output, evidence=next(iter(folders), None)) for output in wanted)
@@ -281,22 +226,14 @@ class _Grading:
         """Grade, in a session if one is given, and return the exit code; the user waits since `started`."""
         from grader.app import start
         from grader.reporting.audience import told
-        from grader.reporting.delivery import deliver, early_delivery, load_formats
+        from grader.reporting.delivery import deliver, early_delivery
 
         remember = self.writer.remember if self.writer is not None else None
         early = early_delivery(self.outputs, self.readers)
-        pictures = any(FORMATS[output.format].illustrated for output in self.outputs)
+        pictures = any(known(output.format).illustrated for output in self.outputs)
         with shown_progress(wanted=self.shows_progress) as progress:
             progress("starting")
-            report = start.grade(
-                self.request,
-                progress,
-                remember,
-                early,
-                pictures=pictures,
-                session=session,
-                under_way=partial(load_formats, self.outputs),
-            )
+            report = start.grade(self.request, progress, remember, early, pictures=pictures, session=session)
         report = replace(report, duration_s=time.monotonic() - started)
         self._warn(report)
         deliver(report, self.outputs, self.readers)
@@ -354,22 +291,16 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
 @click.command(name="observe")
 @click.argument("files", metavar="PROGRAM...", nargs=-1, required=True, type=PATH)
 @click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
-@recording_options
-@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As in `grade`.")
-@click.option("--isolation", type=click.Choice(SANDBOXES), default="auto", envvar=ISOLATION, help="As in `grade`.")
+@run_options(OBSERVE)
 @inputs_options
-@interfaces_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
 def _observe(  # noqa: PLR0913  one parameter an option
     *,
     files: tuple[Path, ...],
     duration: float,
-    bags: tuple[tuple[str, Path], ...],
-    clock: str,
-    isolation: str,
+    options: GradingOptions,
     sent: tuple[str, ...],
     simulations: tuple[str, ...],
-    interfaces: tuple[Path, ...],
     as_json: bool,
 ) -> int:
     """Run nodes together, without a rubric, and say what they do.
@@ -385,10 +316,10 @@ def _observe(  # noqa: PLR0913  one parameter an option
     request = observe.ObserveRequest(
         files,
         round(duration * 1e9),
-        bags,
-        clock,
-        isolation,
-        interfaces,
+        options.bags,
+        options.clock,
+        options.isolation,
+        options.interfaces,
         read_simulations(simulations),
         read_sent(sent),
     )

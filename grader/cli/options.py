@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
-import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from grader.core.checkup import TIERS
-from grader.core.errors import EnvironmentFault, GraderError
-from grader.core.limits import TIME_BUDGET_S
+from grader.core.errors import GraderError
 from grader.core.rubric_files import rubric_file
-from grader.core.scenario import ODOMETRY
-from grader.reporting.formats import FORMATS
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -27,12 +20,9 @@ if TYPE_CHECKING:
     from grader.app.grade import Progress
     from grader.app.seeds import ByKey, SeedKey
     from grader.reporting.audience import Readers
-    from grader.reporting.delivery import Output
     from grader.reporting.formats import PageLayout
 
 
-#: The format name in `-o evidence=FOLDER`, which keeps the recordings of a run.
-EVIDENCE = "evidence"
 PATH = click.Path(path_type=Path)
 
 
@@ -46,78 +36,6 @@ class RubricPath(click.Path):
 
 RUBRIC = RubricPath(path_type=Path)
 _Command = TypeVar("_Command", bound=Callable[..., object])
-
-
-#: How long all recordings of one submission may take together, in seconds.
-time_budget_option = click.option(
-    "--time-budget",
-    "time_budget_s",
-    type=click.FloatRange(min=1),
-    default=TIME_BUDGET_S,
-    show_default=True,
-    metavar="SECONDS",
-    help="Limit of real time for all recordings of one submission; criteria left by then are not met.",
-)
-
-
-#: Environment variable that chooses the sandbox of a machine, such as a container that can have one only.
-ISOLATION = "GRADER_ISOLATION"
-#: The values of `--isolation`.
-SANDBOXES = ("auto", *TIERS)
-isolation_option = click.option(
-    "--isolation",
-    type=click.Choice(SANDBOXES),
-    default="auto",
-    envvar=ISOLATION,
-    show_envvar=True,
-    help="auto: the strongest sandbox that holds here; none: run the student's code without one.",
-)
-
-
-def _parse_recordings(ctx: click.Context, param: click.Parameter, value: Sequence[str]) -> tuple[tuple[str, Path], ...]:
-    """Parse the values of `--recording TOPIC=BAG`; a click callback."""
-    del ctx, param
-    parsed = []
-    for text in value:
-        name, equals, path = text.partition("=")
-        if not (equals and path) or re.fullmatch(r"(/[A-Za-z_]\w*)+|[a-z]\w*/msg/[A-Za-z]\w*", name, re.ASCII) is None:
-            wanted = "/scan=BAG or sensor_msgs/msg/LaserScan=BAG"
-            raise click.BadParameter(
-                f"expected a topic or a message type with a recording such as {wanted}, found {text!r}"
-            )
-        parsed.append((name, Path(path)))
-    return tuple(parsed)
-
-
-def recording_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Add `--recording`, and its older form `--odom-bag`; the command gets both as `bags`."""
-
-    @wraps(command)
-    def called(*arguments: Any, bags: tuple[tuple[str, Path], ...], odom_bag: Path | None, **given: Any) -> int:
-        if odom_bag and ODOMETRY in dict(bags):
-            raise click.BadParameter(f"--odom-bag and --recording {ODOMETRY} exclude each other")
-        return command(*arguments, bags=(*([(ODOMETRY, odom_bag)] if odom_bag else []), *bags), **given)
-
-    recording = click.option(
-        "--recording",
-        "bags",
-        metavar="TOPIC=BAG",
-        multiple=True,
-        callback=_parse_recordings,
-        help="Play this recording on a topic, or on all topics of a message type, instead of the rubric's; repeatable.",
-    )
-    odom_bag = click.option("--odom-bag", type=PATH, help=f"The same as --recording {ODOMETRY}=PATH.")
-    return recording(odom_bag(called))
-
-
-#: Message definitions of a course.
-interfaces_option = click.option(
-    "--interfaces",
-    type=PATH,
-    metavar="FOLDER",
-    multiple=True,
-    help="Build the interface packages (msg, srv, action) in this folder for the nodes; repeatable.",
-)
 
 
 def audience_options(command: _Command) -> _Command:
@@ -164,15 +82,6 @@ def drawn_with(seed: int | None, path: Path | None) -> SeedKey | None:
     return seed_key(path)
 
 
-def require(what: str, library: str, extra: str) -> None:
-    """Raise EnvironmentFault, with the command to install it, if the library of an optional extra is missing."""
-    if importlib.util.find_spec(library) is None:
-        from grader.core.extras import install_command
-
-        message = f"{what}: expected the package {library} of the extra {extra!r}, found none"
-        raise EnvironmentFault(message, install_command(library))
-
-
 def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
     del ctx, param
     from datetime import date
@@ -187,29 +96,6 @@ def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) ->
     raise click.BadParameter(f"expected a date such as 2026-12-01, found {value!r}")
 
 
-def parse_outputs(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[Output, ...]:
-    """Parse the values of `-o FORMAT=PATH`; a click callback."""
-    del ctx, param
-    return tuple(_parse_output(value) for value in values)
-
-
-def _parse_output(value: str) -> Output:
-    format_, equals, path = value.partition("=")
-    if not equals or not path or not format_:
-        from grader.cli.near_misses import output_meant
-
-        meant = output_meant(value)
-        likely = f"; did you mean {meant}" if meant else ""
-        raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}{likely}")
-    if format_ not in (*FORMATS, EVIDENCE):
-        raise click.BadParameter(f"{format_!r} is not a format{nearest(format_, [*FORMATS, EVIDENCE])}")
-    if format_ == EVIDENCE and path == "-":
-        raise click.BadParameter("evidence is a folder: expected evidence=FOLDER, found evidence=-")
-    from grader.reporting.delivery import Output
-
-    return Output(format_, None if path == "-" else Path(path))
-
-
 def parse_percent(ctx: click.Context, param: click.Parameter, value: float | None) -> Fraction | None:
     """Parse the value of `--min-score P`; a click callback."""
     del ctx, param
@@ -220,18 +106,6 @@ def parse_percent(ctx: click.Context, param: click.Parameter, value: float | Non
     from fractions import Fraction
 
     return Fraction(str(value))
-
-
-def parse_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
-    """Parse the value of `--spot-checks P%` to a share from 0 to 1; a click callback."""
-    del ctx, param
-    try:
-        percent = float(value.removesuffix("%"))
-    except ValueError:
-        percent = -1.0
-    if not 0 <= percent <= 100:  # NaN loses
-        raise click.BadParameter(f"expected a share from 0% to 100%, found {value!r}")
-    return percent / 100
 
 
 def nearest(found: str, known: Sequence[str]) -> str:

@@ -9,21 +9,20 @@ from typing import TYPE_CHECKING
 
 import click
 
-from grader.cli.completion import complete_exercise, complete_output
+from grader.cli.completion import complete_exercise
 from grader.cli.options import (
-    EVIDENCE,
     PATH,
     RUBRIC,
     audience_options,
     complain,
-    parse_outputs,
     parse_percent,
     print_result,
     readers,
     write_file,
 )
+from grader.cli.outputs import outputs_option
 from grader.core.errors import exit_code
-from grader.reporting.formats import FORMATS
+from grader.reporting.formats import EVIDENCE, FORMATS, known
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,16 +49,7 @@ PAGE = "html"
 )
 @click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
-@click.option(
-    "-o",
-    "--output",
-    "outputs",
-    metavar="FORMAT=PATH",
-    multiple=True,
-    callback=parse_outputs,
-    shell_complete=complete_output,
-    help=f"Write a report ({', '.join(FORMATS)}); of a class, one file a submission in the folder PATH; repeatable.",
-)
+@outputs_option("Write a report ({formats}); of a class, one file a submission in the folder PATH; repeatable.")
 @click.option(
     "--min-score",
     type=float,
@@ -110,7 +100,7 @@ def command(  # noqa: PLR0913  one parameter an option
     how = rejudge.judgement(
         tuple(dict.fromkeys(exercises)),
         rubrics,
-        pictures=any(FORMATS[output.format].illustrated for output in outputs),
+        pictures=any(known(output.format).illustrated for output in outputs),
         verify=verify,
     )
     one = len(evidence) == 1 and is_evidence(evidence[0])

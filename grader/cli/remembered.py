@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from grader.cli.options import complain
+from grader.core.grading_options import BATCH, names
 from grader.core.rubric_files import rubric_file
 
 if TYPE_CHECKING:
@@ -24,19 +25,9 @@ KEPT = (
     "pattern",
     "roster",
     "adjustments",
-    "exercises",
-    "every",
-    "rubrics",
-    "interfaces",
-    "seed",
-    "seed_key",
-    _BAGS,
+    *names(BATCH),
     "odom_bag",
-    "clock",
-    "isolation",
-    "time_budget_s",
-    "spot_checks",
-    "variant_key",
+    "seed_key",
     "standalone",
     "canvas",
     "canvas_gradebook",

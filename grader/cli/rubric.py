@@ -12,15 +12,15 @@ from grader.cli.options import (
     RUBRIC,
     complain,
     inputs_options,
-    interfaces_option,
     print_for_programs,
     print_result,
-    require,
     shown_progress,
     write_file,
 )
-from grader.core.checkup import TIERS
+from grader.cli.run_options import run_option
 from grader.core.errors import ALL_MET, NOT_ALL_MET, UNUSABLE, GraderError, RubricError
+from grader.core.extras import require
+from grader.core.grading_options import BATCH, GRADE
 from grader.core.rubric_files import notes_on, rubric_files, rubric_of
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def command() -> None:
 
 @command.command(name="check")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=RUBRIC, callback=_all_rubrics)
-@interfaces_option
+@run_option("interfaces", GRADE)
 def _check(*, files: tuple[Path, ...], interfaces: tuple[Path, ...]) -> int:
     """Say whether rubrics can be used, with line and column of every mistake, and what is odd about them.
 
@@ -124,8 +124,8 @@ def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
 )
 @inputs_options
 @click.option("--duration", type=click.FloatRange(4, 600), default=10.0, show_default=True, help="Seconds observed.")
-@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As in `grade`.")
-@click.option("--isolation", type=click.Choice(("auto", *TIERS)), default="auto", help="As in `grade`.")
+@run_option("clock", BATCH)
+@run_option("isolation", BATCH)
 def _new(  # noqa: PLR0913  one parameter an option
     *,
     files: tuple[Path, ...],
@@ -187,8 +187,8 @@ def _new(  # noqa: PLR0913  one parameter an option
     "--sample", type=click.IntRange(min=1), metavar="N", help="Only N mutants for each rubric, of many kinds."
 )
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw the sample and all values from N.")
-@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As in `grade`.")
-@click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As in `grade`.")
+@run_option("clock", BATCH)
+@run_option("isolation", BATCH)
 @click.option("--write-notes", is_flag=True, help="Add what is not explained to the notes, with a reason to fill in.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 @click.option("--no-progress", is_flag=True, help="Show no progress while testing.")

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from grader.cli.options import PATH, complain, print_result, require
+from grader.cli.options import PATH, complain, print_result
 from grader.core.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET
+from grader.core.extras import require
 
 if TYPE_CHECKING:
     from grader.classroom.uploading.marks import Platform

@@ -7,21 +7,19 @@ from typing import TYPE_CHECKING
 
 import click
 
-from grader.cli.completion import complete_exercise, complete_file
+from grader.cli.completion import complete_file
 from grader.cli.options import (
     PATH,
-    RUBRIC,
     complain,
     drawn_by,
     drawn_with,
-    interfaces_option,
-    isolation_option,
     print_result,
-    recording_options,
     shown_progress,
 )
+from grader.cli.run_options import run_options
 from grader.core.conditions import CONDITIONS, TOGETHER
 from grader.core.errors import ALL_MET, NOT_ALL_MET, UNDECIDED
+from grader.core.grading_options import VERIFY, GradingOptions
 
 if TYPE_CHECKING:
     from grader.core.verification import Verification
@@ -43,25 +41,11 @@ _EPILOG = (
     help=f"Try only this condition ({', '.join(CONDITIONS)}); repeatable. By default all but {TOGETHER}.",
 )
 @click.option("--quick", is_flag=True, help="Try only together: order, processors, folder, zone, hashes and executed.")
-@click.option(
-    "--exercise",
-    "exercises",
-    metavar="ID",
-    multiple=True,
-    shell_complete=complete_exercise,
-    help="Record only this exercise; repeatable. By default each for which there is a file.",
-)
-@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
+@run_options(VERIFY)
 @click.option(
     "--evidence", type=PATH, metavar="FOLDER", help="Compare with this evidence too, and keep the result in it."
 )
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, as a report names it.")
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key and the files handed in.")
-@recording_options
-@interfaces_option
-@isolation_option
-@click.option("--student", metavar="ID", default="", help="Use the variant of this student; see --variant-key.")
-@click.option("--variant-key", type=PATH, metavar="FILE", help="The course key that rubrics draw variants from.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 @click.option("--no-progress", is_flag=True, help="Show no progress while recording.")
 def command(  # noqa: PLR0913  one parameter an option
@@ -69,16 +53,9 @@ def command(  # noqa: PLR0913  one parameter an option
     submissions: tuple[str, ...],
     conditions: tuple[str, ...],
     quick: bool,
-    exercises: tuple[str, ...],
-    rubrics: tuple[Path, ...],
+    options: GradingOptions,
     evidence: Path | None,
-    seed: int | None,
     seed_key: Path | None,
-    bags: tuple[tuple[str, Path], ...],
-    interfaces: tuple[Path, ...],
-    isolation: str,
-    student: str,
-    variant_key: Path | None,
     as_json: bool,
     no_progress: bool,
 ) -> int:
@@ -94,29 +71,18 @@ def command(  # noqa: PLR0913  one parameter an option
         raise click.BadParameter("--quick and --condition exclude each other")
     if evidence is not None and len(submissions) != 1:
         raise click.BadParameter("--evidence is that of one submission: expected one SUBMISSION, found several")
-    if evidence is not None and (seed is not None or seed_key is not None or exercises or bags or student):
+    drawn = options.seed is not None or seed_key is not None or options.student
+    if evidence is not None and (drawn or options.exercises or options.bags):
         raise click.BadParameter("--evidence says what was recorded, and with which seed: leave out the other options")
-    key = drawn_with(seed, seed_key)
-    draw = drawn_by(student, variant_key)
-    from grader.app.request import GradeRequest
+    key = drawn_with(options.seed, seed_key)
+    draw = drawn_by(options.student, options.variant_key)
+    from grader.app.request import request_for
     from grader.app.seeds import PRACTICE
     from grader.app.verify import VerifyRequest, verify
     from grader.core.verification import State
     from grader.reporting.verified import render_verification, verification_to_json
 
-    how = GradeRequest(
-        submission="",
-        exercises=tuple(dict.fromkeys(exercises)),
-        rubrics=rubrics,
-        seed=seed,
-        seed_key=key or PRACTICE,
-        bags=bags,
-        isolation=isolation,
-        student=student.strip(),
-        variant_key=variant_key,
-        interfaces=interfaces,
-        draw=draw,
-    )
+    how = request_for("", options, seed_key=key or PRACTICE, draw=draw)
     wanted = (TOGETHER,) if quick else conditions
     with shown_progress(wanted=not no_progress) as progress:
         found = verify(VerifyRequest(submissions, how, wanted, evidence), progress)

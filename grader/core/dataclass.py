@@ -1,8 +1,8 @@
 """The decorator `dataclass` of the standard library, but a class compiles its `__init__` when that is first looked up.
 
 The standard library compiles up to six methods for each class, while its module is imported; most classes are then not
-used in one run. Here every method but `__init__` is a closure. Fields, slots, and what both say of inheritance are made
-by the standard library.
+used in one run. That takes 90 ms of processor time more, of the 350 ms of a short `grade`. Here every method but
+`__init__` is a closure. Fields, slots, and what both say of inheritance are made by the standard library.
 """
 
 from __future__ import annotations

@@ -79,7 +79,6 @@ class RecordingSession:
         finished: Callable[[Key, Trace], None] | None = None,
         *,
         budget: RealTimeBudget | None = None,
-        under_way: Callable[[], None] = lambda: None,
         on_wall: bool = True,
     ) -> dict[Key, Trace]:
         """Record jobs and return their traces, in the same order.
@@ -95,7 +94,6 @@ class RecordingSession:
             progress: Called with the title of each job that starts.
             finished: Called with each trace once it is final, while others are still being recorded.
             budget: Real time that all jobs may take together; None for any.
-            under_way: Called once while jobs are being recorded, for work that need not wait for them.
             on_wall: Whether to record on the wall clock at all. If not, what `auto` would record there is the beginning
                 in virtual time, with the reason.
         """
@@ -108,7 +106,6 @@ class RecordingSession:
         first = [Job(job.title, replace(job.plan, stop_when_unfit=clock == AUTO), budget) for job in to_run.values()]
         traces: dict[Key, Trace] = {}
         recorded = zip(to_run, self.recorder.each(first, progress), strict=True)
-        under_way()
 
         def tell(key: Key, trace: Trace) -> None:
             traces[key] = with_newer(trace, jobs[key].plan.root, self.ros.distro) if trace.faults() else trace

@@ -13,6 +13,7 @@ import math
 import re
 import sys
 from collections.abc import Collection, Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 from grader.core.dataclass import dataclass
@@ -178,6 +179,7 @@ def find_packages(folder: Path) -> tuple[InterfacePackage, ...]:
     return tuple(found[name] for name in sorted(found))
 
 
+@cache
 def shipped_packages() -> tuple[InterfacePackage, ...]:
     """The packages that come with the grader: those that courses use and no wheel holds, as ROS 2 Jazzy has them."""
     return find_packages(SHIPPED)

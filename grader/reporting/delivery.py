@@ -18,7 +18,7 @@ from grader.core.report import Report
 from grader.files import beside, is_special, target_of, write_whole
 from grader.reporting.audience import ANYBODY, Readers
 from grader.reporting.escape import encoded
-from grader.reporting.formats import FORMATS, PageLayout, check_surroundings, rendered
+from grader.reporting.formats import FORMATS, PageLayout, check_surroundings, known, rendered
 
 
 def check_writable(path: Path) -> None:
@@ -69,17 +69,18 @@ def prepared(outputs: Sequence[Output], *, verbose: bool = False) -> tuple[Outpu
     return tuple(replace(output, verbose=verbose) for output in (*files, *(printed or [Output("text")])))
 
 
-def load_formats(outputs: Sequence[Output]) -> None:
-    """Import what renders some reports, which takes as long as rendering them."""
-    for output in outputs:
-        FORMATS[output.format].load()
-
-
 def deliver(report: Report, outputs: Sequence[Output], readers: Readers = ANYBODY) -> None:
-    """Deliver every report, also after one of them failed; then raise the first GraderError."""
-    problems = [problem for output in outputs if (problem := _delivered(report, output, readers))]
+    """Deliver every report, also after one of them failed; then raise the first GraderError.
+
+    If a format of another package cannot print the report, its text goes to standard error: no mark is lost.
+    """
+    problems = [(output, problem) for output in outputs if (problem := _delivered(report, output, readers))]
+    if any(output.path is None and output.format not in FORMATS for output, _ in problems):
+        text = Output("text", verbose=any(output.verbose for output in outputs))
+        with suppress(OSError):
+            write_report(report, text, readers, sys.stderr)
     if problems:
-        raise problems[0]
+        raise problems[0][1]
 
 
 def early_delivery(outputs: Sequence[Output], readers: Readers = ANYBODY) -> Callable[[Report], None] | None:
@@ -87,7 +88,7 @@ def early_delivery(outputs: Sequence[Output], readers: Readers = ANYBODY) -> Cal
 
     A report that cannot be written is ignored: delivery of the final one will raise the error.
     """
-    files = [output for output in outputs if output.path is not None and FORMATS[output.format].written_early]
+    files = [output for output in outputs if output.path is not None and known(output.format).written_early]
 
     def write(report: Report) -> None:
         with suppress(GraderError):
@@ -96,16 +97,17 @@ def early_delivery(outputs: Sequence[Output], readers: Readers = ANYBODY) -> Cal
     return write if files else None
 
 
-def show(render: Callable[[PageLayout], str], *, for_people: bool) -> None:
-    """Print text on standard output, rendered for its width and colour; a closed pipe is not an error.
+def show(render: Callable[[PageLayout], str], *, for_people: bool, stream: TextIO | None = None) -> None:
+    """Print text on standard output, or another stream, rendered for its width and colour; a closed pipe is no error.
 
     For people, characters that the terminal's encoding lacks are replaced; programs read UTF-8.
     """
-    if sys.stdout is not None:
+    stream = stream or sys.stdout
+    if stream is not None:
         columns = shutil.get_terminal_size().columns
         width = columns if os.environ.get("COLUMNS") == str(columns) else min(columns, _WIDEST)
-        layout = PageLayout(width, _coloured(sys.stdout))
-        _print(encoded(render(layout), sys.stdout.encoding if for_people else "utf-8"))
+        layout = PageLayout(width, _coloured(stream))
+        _print(encoded(render(layout), stream.encoding if for_people else "utf-8"), stream)
 
 
 def _refuse_twins(paths: Sequence[Path]) -> None:
@@ -128,6 +130,8 @@ def _delivered(report: Report, output: Output, readers: Readers) -> GraderError 
         write_report(report, output, readers)
     except OSError as error:
         return _unwritable(output, error)
+    except GraderError as error:  # of a format of another package
+        return error
     return None
 
 
@@ -136,8 +140,8 @@ def _unwritable(output: Output, error: OSError) -> GraderError:
     return GraderError(f"{where}: the {output.format} report cannot be written: {error.strerror or error}")
 
 
-def write_report(report: Report, output: Output, readers: Readers) -> None:
-    """Write a report to its destination; raises OSError if that fails."""
+def write_report(report: Report, output: Output, readers: Readers, stream: TextIO | None = None) -> None:
+    """Write a report to its file, or to a stream, standard output if None; raises OSError if that fails."""
     if output.path is not None:
         recordings = os.path.relpath(output.evidence, output.path.parent) if output.evidence else ""
         layout = PageLayout(_FILE_WIDTH, colour=False, verbose=output.verbose, recordings=recordings)
@@ -147,7 +151,7 @@ def write_report(report: Report, output: Output, readers: Readers) -> None:
     def render(layout: PageLayout) -> str:
         return rendered(output.format, report, replace(layout, verbose=output.verbose), readers)
 
-    show(render, for_people=output.format == "text")
+    show(render, for_people=output.format == "text", stream=stream)
 
 
 def _coloured(stream: TextIO) -> bool:
@@ -158,14 +162,14 @@ def _coloured(stream: TextIO) -> bool:
     return stream.isatty() and os.environ.get("TERM") != "dumb"
 
 
-def _print(data: bytes) -> None:
+def _print(data: bytes, stream: TextIO) -> None:
     try:
-        sys.stdout.buffer.write(data)
-        sys.stdout.flush()
+        stream.buffer.write(data)
+        stream.flush()
     except OSError as error:
         # Prevent a second failure when Python flushes the buffer at exit.
         nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
+        os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
         # A closed pipe, as after `head`, is not an error.
         if not isinstance(error, BrokenPipeError):

@@ -1,15 +1,18 @@
-"""The formats of reports, one row each; a renderer is imported at its first use."""
+"""The formats of reports, one row each, and those of other packages; a renderer is imported at its first use."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
+from grader.core import entry_points
 from grader.core.dataclass import dataclass
+from grader.core.errors import EnvironmentFault
 
 if TYPE_CHECKING:
     from grader.core.report import Report
@@ -27,40 +30,61 @@ class PageLayout:
     recordings: str = ""  # folder of the kept evidence, relative to the report; empty if none is kept
 
 
+#: What a renderer may need besides the report, and the names of the arguments that it is then called with.
+NEEDS: Mapping[str, tuple[str, ...]] = {
+    "layout": ("width", "colour", "verbose"),  # of the page: columns, whether colours are shown, whether to show all
+    "folder": ("folder",),  # the submission's folder in its repository; see `repository_folder`
+    "recordings": ("recordings",),  # the folder of the kept evidence, relative to the report; empty if none is kept
+    "handed_in": ("handed_in",),  # what Classroom 50 says of the submission
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A format of reports."""
+    """A format of reports; a package registers one as an entry point of `rclpy_grader.formats`."""
 
-    renderer: str  # the rendering function: `module:function` in `grader.reporting`
+    # The function that returns the text of a report, called with the `Report`, and with what it needs by name;
+    # `module:function` to import it when it is first used
+    renderer: str | Callable[..., str]
     suffix: str  # file name suffix of this format
     for_students: bool = False  # whether students read it unless an option says otherwise: a platform shows it to them
-    needs: str = ""  # what its renderer is given besides the report: `layout`, `folder`, `handed_in` or `recordings`
-    # Whether the renderer itself hides what students must not see yet, because its platform shows it later
+    needs: tuple[str, ...] = ()  # what the renderer is given besides the report: `layout`, `folder` or `recordings`
+    # Whether the renderer itself hides what students must not see yet, because its platform shows it later: where
+    # students read the report, it is then given the whole one and the `day`; else it gets what they may see
     withholds: bool = False
     illustrated: bool = False  # whether it shows figures, which take about as long to draw as judging takes
     # Whether its platform ends a run that takes too long, and then uses the file that exists
     written_early: bool = False
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for what no format can need."""
+        if not isinstance(self.needs, tuple) or not set(self.needs) <= set(NEEDS):
+            raise ValueError(f"needs: expected a tuple of {', '.join(NEEDS)}, found {self.needs!r}")
+
     def __call__(self, report: Report, layout: PageLayout, **arguments: object) -> str:
         """Return the text of a report."""
-        text: str = self.load()(report, **_arguments(self.needs, report, layout), **arguments)
-        return text
+        return self.load()(report, **_arguments(self.needs, report, layout), **arguments)
 
     def load(self) -> Callable[..., str]:
-        """Import the rendering function and return it."""
+        """Return the rendering function, imported if it was named."""
+        if not isinstance(self.renderer, str):
+            return self.renderer
         module, _, function = self.renderer.partition(":")
-        render: Callable[..., str] = getattr(import_module(f"grader.reporting.{module}"), function)
+        render: Callable[..., str] = getattr(import_module(module), function)
         return render
 
 
-def _arguments(needs: str, report: Report, layout: PageLayout) -> Mapping[str, object]:
-    if needs == "layout":
-        return {"width": layout.width, "colour": layout.colour, "verbose": layout.verbose}
-    if needs == "recordings":
-        return {"recordings": layout.recordings}
-    if needs == "folder":
-        return {"folder": repository_folder(report.path, os.environ)}
-    return {"handed_in": _handed_in()} if needs else {}
+def _arguments(needs: tuple[str, ...], report: Report, layout: PageLayout) -> Mapping[str, object]:
+    found: dict[str, object] = {}
+    if "layout" in needs:
+        found |= {"width": layout.width, "colour": layout.colour, "verbose": layout.verbose}
+    if "recordings" in needs:
+        found["recordings"] = layout.recordings
+    if "folder" in needs:
+        found["folder"] = repository_folder(report.path, os.environ)
+    if "handed_in" in needs:
+        found["handed_in"] = _handed_in()
+    return found
 
 
 def _handed_in() -> HandedIn:
@@ -69,35 +93,91 @@ def _handed_in() -> HandedIn:
     return handed_in(os.environ)
 
 
-#: Every format of reports, by name.
+#: What stands in place of a format in `-o evidence=FOLDER`, which keeps the recordings of a run.
+EVIDENCE = "evidence"
+_HERE = "grader.reporting"
+#: The formats that come with the grader, by name; `format_of` finds those of other packages as well.
 FORMATS: dict[str, Format] = {
-    "json": Format("json_report:dumps", ".json"),
-    "text": Format("text:render_text", ".txt", needs="layout"),
-    "html": Format("html.render:render_html", ".html", illustrated=True, needs="recordings"),
-    "markdown": Format("markdown:render_markdown", ".md"),
-    "junit": Format("junit:render_junit", ".xml", needs="folder"),
-    "github": Format("platforms.github:render_github", ".txt", for_students=True, needs="folder"),
+    "json": Format(f"{_HERE}.json_report:dumps", ".json"),
+    "text": Format(f"{_HERE}.text:render_text", ".txt", needs=("layout",)),
+    "html": Format(f"{_HERE}.html.render:render_html", ".html", illustrated=True, needs=("recordings",)),
+    "markdown": Format(f"{_HERE}.markdown:render_markdown", ".md"),
+    "junit": Format(f"{_HERE}.junit:render_junit", ".xml", needs=("folder",)),
+    "github": Format(f"{_HERE}.platforms.github:render_github", ".txt", for_students=True, needs=("folder",)),
     "gradescope": Format(
-        "platforms.gradescope:render_gradescope", ".json", for_students=True, withholds=True, written_early=True
+        f"{_HERE}.platforms.gradescope:render_gradescope",
+        ".json",
+        for_students=True,
+        withholds=True,
+        written_early=True,
     ),
-    "prairielearn": Format("platforms.prairielearn:render_prairielearn", ".json", for_students=True),
-    "classroom50": Format("platforms.classroom50:render_classroom50", ".json", for_students=True, needs="handed_in"),
-    "classroom": Format("platforms.classroom:render_classroom", ".json", for_students=True),
+    "prairielearn": Format(f"{_HERE}.platforms.prairielearn:render_prairielearn", ".json", for_students=True),
+    "classroom50": Format(
+        f"{_HERE}.platforms.classroom50:render_classroom50", ".json", for_students=True, needs=("handed_in",)
+    ),
+    "classroom": Format(f"{_HERE}.platforms.classroom:render_classroom", ".json", for_students=True),
 }
+
+
+def added_formats() -> list[str]:
+    """Return the names of the formats that other packages add; names of the grader's own formats stay its own."""
+    return [name for name in entry_points.names(entry_points.FORMATS) if name not in (*FORMATS, EVIDENCE)]
+
+
+@cache
+def format_of(name: str) -> Format | None:
+    """Return the format of this name: one of `FORMATS`, or one of another package, then ready to render.
+
+    Return None if there is none. Raises EnvironmentFault if the package that registers it cannot be used.
+    """
+    if name in FORMATS:
+        return FORMATS[name]
+    found = entry_points.load(entry_points.FORMATS, name, Format, "a Format of grader.api")
+    if found is None:
+        return None
+    added, where = found
+    with entry_points.faults(f"{where}: {added.renderer} cannot be imported", "update the package, or uninstall it"):
+        render = added.load()
+    return replace(added, renderer=_guarded(render, where))
+
+
+def _guarded(render: Callable[..., object], where: str) -> Callable[..., str]:
+    """Return a renderer of another package that raises EnvironmentFault, whatever it does wrong."""
+    from grader.reporting.escape import valid_unicode  # noqa: PLC0415  only for formats of other packages
+
+    def guarded(report: Report, **arguments: object) -> str:
+        with entry_points.faults(f"{where} failed", _ANOTHER):
+            text = render(report, **arguments)
+        if not isinstance(text, str):
+            raise EnvironmentFault(f"{where}: expected a text, found {type(text).__name__}", _ANOTHER)
+        return valid_unicode(text)
+
+    return guarded
+
+
+#: What helps whoever needs the result now.
+_ANOTHER = "ask for another format, and report this to the authors of the package"
+
+
+def known(name: str) -> Format:
+    """Return a format that `format_of` has found before, or that comes with the grader."""
+    found = format_of(name)
+    assert found is not None, name
+    return found
 
 
 def check_surroundings(name: str) -> None:
     """Raise GraderError if the environment lacks a value that a format needs."""
-    if FORMATS[name].needs == "handed_in":
+    if "handed_in" in known(name).needs:
         _handed_in()
 
 
 def rendered(name: str, report: Report, layout: PageLayout, readers: Readers) -> str:
-    """Return a report in one of `FORMATS`, limited to what its reader may see."""
+    """Return a report in the format of this name, limited to what its reader may see."""
     from grader.core.exercise import Audience  # noqa: PLC0415  only after a run, not for --help
     from grader.reporting.audience import for_student  # noqa: PLC0415  only after a run, not for --help
 
-    format_ = FORMATS[name]
+    format_ = known(name)
     if readers.of(Audience.STUDENT if format_.for_students else Audience.INSTRUCTOR) is Audience.INSTRUCTOR:
         return format_(report, layout)
     report = replace(report, audience=Audience.STUDENT)

@@ -19,14 +19,15 @@ from ruamel.yaml import YAML
 
 from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest
-from grader.classroom.cluster.jobs import write_task
-from grader.classroom.cluster.sending import checks_of
 from grader.classroom.messages import GradingJob, Terms
+from grader.classroom.receiving import write_task
+from grader.classroom.sending import checks_of
 from grader.classroom.store import Conditions
 from grader.cli import main
 from grader.core.author_files import run
 from grader.core.errors import RubricError
 from grader.core.exercise import Location, Outcome
+from grader.core.grading_options import GradingOptions
 from grader.core.report import Verdict
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import Trace
@@ -240,11 +241,11 @@ def test_it_travels_to_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     rubric = Path("course/pump.yaml")
     checks = tuple(checks_of([rubric]))
     assert checks == ((b"course/pump_checks.py", CHECKS_FILE.encode()),)
-    conditions = Conditions("0", (), "", None, "auto", "auto")
-    terms = Terms(conditions, (), ((b"course/pump.yaml", RUBRIC.encode()),), (), False, 1.0, checks)
+    conditions = Conditions("0", (), "", GradingOptions(rubrics=(Path("course/pump.yaml"),)))
+    terms = Terms(conditions, ((b"course/pump.yaml", RUBRIC.encode()), *checks), standalone=False, deadline_s=1.0)
     task = write_task(terms, GradingJob("ada", b"ada", b"class/ada", b""), tmp_path / "there")
     (found,) = (tmp_path / "there").rglob("pump.yaml")
-    assert (task.rubrics, read_rubric(found).digest) == ((rubric,), before)
+    assert (task.conditions.options.rubrics, read_rubric(found).digest) == ((rubric,), before)
 
 
 def test_the_examples_on_the_page_about_own_checks_work() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from own_check_samples import CHECKS_FILE, RUBRIC, write_rubric
 
-from grader.classroom.cluster.sending import checks_of
+from grader.classroom.sending import checks_of
 from grader.core.errors import RubricError
 from grader.core.exercise import Location, Outcome
 from grader.core.report import ExerciseReport

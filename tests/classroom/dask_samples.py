@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,13 +14,16 @@ from grader.classroom import store as kept
 from grader.classroom.local import Task
 from grader.classroom.messages import Fitness, GradingJob, JobResult, pack, unpack
 from grader.classroom.store import Conditions, ResultStatus, State
+from grader.core.grading_options import GradingOptions
 
-CONDITIONS = Conditions("0", (("velocity_publisher", "sha256:1"),), "", None, "auto", "auto")
+CONDITIONS = Conditions(
+    "0", (("velocity_publisher", "sha256:1"),), "", GradingOptions(exercises=("velocity_publisher",))
+)
 ONE, TWO = "tcp://10.0.0.1:1", "tcp://10.0.0.2:1"
 
 
-def task(folder: Path, name: str = "ada", **changes: Any) -> Task:
-    """Return a task for a submission that lies in `folder/name` and holds one program."""
+def task(folder: Path, name: str = "ada", *, options: Mapping[str, Any] | None = None, **changes: Any) -> Task:
+    """Return a task for a submission that lies in `folder/name` and holds one program; other options may be given."""
     place = folder / name
     place.mkdir(exist_ok=True)
     (place / "velocity_publisher.py").write_text("pass\n", encoding="utf-8")
@@ -28,10 +32,7 @@ def task(folder: Path, name: str = "ada", **changes: Any) -> Task:
         "label": name,
         "submission": place,
         "into": folder / f"{name} result",
-        "exercises": ("velocity_publisher",),
-        "rubrics": (),
-        "bags": (),
-        "conditions": CONDITIONS,
+        "conditions": replace(CONDITIONS, options=replace(CONDITIONS.options, **(options or {}))),
         "workers": 2,
         "standalone": False,
         "deadline_s": 60.0,

@@ -181,7 +181,7 @@ def test_results_survive_in_every_state(tmp_path: Path) -> None:
 
 def seeds(scheduler: FakeScheduler) -> dict[str, int | None]:
     """Return the seed that each submission was graded with."""
-    return {name: task.conditions.seed for name, task in scheduler.tasks.items()}
+    return {name: task.conditions.options.seed for name, task in scheduler.tasks.items()}
 
 
 def test_a_class_keeps_a_key_of_its_own(tmp_path: Path) -> None:

@@ -16,8 +16,9 @@ import pytest
 
 from grader.classroom.local import WAITING_PER_JOB, LocalScheduler, Task
 from grader.classroom.store import Conditions, ResultStatus, State, dump
+from grader.core.grading_options import GradingOptions
 
-CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
+CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", GradingOptions())
 DONE = json.loads(dump(ResultStatus(State.GRADED, "k", "d", "l", score=1.0, max_score=2.0)))
 
 #: What stands in for the grader: does as the label of its task says.
@@ -48,7 +49,7 @@ print(done)
 
 
 def task(tmp_path: Path, label: str, deadline_s: float = 600.0) -> Task:
-    return Task(label, label, tmp_path, tmp_path / label, (), (), (), CONDITIONS, 1, False, deadline_s)
+    return Task(label, label, tmp_path, tmp_path / label, CONDITIONS, 1, False, deadline_s)
 
 
 def scheduler(jobs: int = 2) -> LocalScheduler:
@@ -174,7 +175,8 @@ def test_a_class_that_is_graded_on_the_wall_clock_keeps_to_its_jobs(tmp_path: Pa
     """Recordings in real time disturb each other, so only single ones have others beside them."""
     program = WAITING.replace("< 4", "< 2") if clock == "auto" else WAITING.replace("< 4", "< 1")
     here = LocalScheduler(1, (sys.executable, "-c", program))
-    tasks = [replace(task(tmp_path, label), conditions=replace(CONDITIONS, clock=clock)) for label in ("waits", "b")]
+    conditions = replace(CONDITIONS, options=GradingOptions(clock=clock))
+    tasks = [replace(task(tmp_path, label), conditions=conditions) for label in ("waits", "b")]
     heard: dict[str, str] = {}
     assert all(a.status.state is State.GRADED for a in here.run(tasks, lambda name, step: heard.update({name: step})))
     assert heard["waits"] == {"wall": "1", "auto": "2"}[clock]
@@ -225,7 +227,7 @@ def test_tasks_reach_the_process_as_they_are(tmp_path: Path, odd: str) -> None:
     )
     heard = []
     here = LocalScheduler(1, (sys.executable, "-c", program))
-    one = Task("x", odd, tmp_path / odd, tmp_path / "into", (), (), (), CONDITIONS, 1, False, 600.0)
+    one = Task("x", odd, tmp_path / odd, tmp_path / "into", CONDITIONS, 1, False, 600.0)
     list(here.run([one], lambda name, step: heard.append(step)))
     assert heard[-1] == str(tmp_path / odd)
 

@@ -18,6 +18,7 @@ from grader.classroom.outputs import Graded
 from grader.classroom.store import Conditions, State
 from grader.core.errors import ClassError, HarnessError, VariantError
 from grader.core.exercise import Drawn
+from grader.core.grading_options import GradingOptions
 from grader.core.report import Report
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.draws import Recorded
@@ -92,9 +93,9 @@ def test_the_process_that_grades_gets_the_values_and_not_the_key(tmp_path: Path)
         raise HarnessError("enough")
 
     own = Drawn("17", {"velocity_publisher": {"rate": "7 Hz"}})
-    conditions = Conditions("0", (), "", None, "auto", "auto", variants=own)
-    task = Task("x", "x", tmp_path, tmp_path / "into", (), (), (), conditions, 1, False, 60.0)
-    status = worker.attempt(replace(task, variant_key=tmp_path / "course.key"), lambda step: None, refuse)
+    conditions = Conditions("0", (), "", GradingOptions(variant_key=tmp_path / "course.key"), variants=own)
+    task = Task("x", "x", tmp_path, tmp_path / "into", conditions, 1, False, 60.0)
+    status = worker.attempt(task, lambda step: None, refuse)
     (request,) = heard
     assert isinstance(request.draw, Recorded)
     assert (request.student, request.variant_key, request.draw.drawn) == ("17", tmp_path / "course.key", own)

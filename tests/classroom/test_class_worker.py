@@ -16,10 +16,11 @@ from grader.classroom.local import Task
 from grader.classroom.store import REPORT, Conditions, ResultStatus, State
 from grader.core.errors import EnvironmentFault, HarnessError, SubmissionError
 from grader.core.exercise import Feedback, Outcome, Shows
+from grader.core.grading_options import GradingOptions
 from grader.core.report import Environment, ExerciseReport, Report, Reproduction, Verdict
 from grader.core.trace import ClockKind
 
-CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
+CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", GradingOptions())
 
 
 def attempt(tmp_path: Path, error: Any) -> ResultStatus:
@@ -29,7 +30,7 @@ def attempt(tmp_path: Path, error: Any) -> ResultStatus:
         raise error
 
     into = tmp_path / f"into {len(list(tmp_path.iterdir()))}"
-    task = Task("x", "label", tmp_path, into, (), (), (), CONDITIONS, 1, False, 60.0)
+    task = Task("x", "label", tmp_path, into, CONDITIONS, 1, False, 60.0)
     return worker.attempt(task, lambda step: None, grade)
 
 
@@ -64,14 +65,14 @@ def test_the_same_reason_to_refuse_has_the_same_key(tmp_path: Path) -> None:
 def test_a_result_of_some_exercises_has_the_key_that_is_looked_for(tmp_path: Path) -> None:
     """Where only exercises count of which there is a file, the others do not make it look changed."""
     rubrics = (("a", "sha256:1"), ("e", "sha256:2"))
-    every = Conditions("0", rubrics, "sha256:9", None, "auto", "auto", every=True)
+    every = Conditions("0", rubrics, "sha256:9", GradingOptions(every=True))
     verdict = Verdict("b", "B", Outcome.MET, Fraction(2), Fraction(2), "fine")
     exercise = ExerciseReport("e", "1", "E", True, ClockKind.VIRTUAL, "", (verdict,))
     environment = Environment("0", "jazzy", "7", "rmw", "3.11", "none")
     digest = "sha256:" + "0" * 64
     given = Reproduction(rubrics=rubrics[1:])
     report = Report("x", "x", digest, environment, 1, (exercise,), 0.1, reproduce=given)
-    task = Task("x", "x", tmp_path, tmp_path / "into", (), (), (), every, 1, False, 60.0)
+    task = Task("x", "x", tmp_path, tmp_path / "into", every, 1, False, 60.0)
     assert worker.attempt(task, lambda step: None, lambda *_: report).key == every.key(digest)
     changed = dataclasses.replace(report, reproduce=Reproduction(rubrics=(("e", "sha256:3"),)))
     task = dataclasses.replace(task, into=tmp_path / "again")
@@ -87,7 +88,7 @@ def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path: Path) ->
     environment = Environment("0", "jazzy", "7", "rmw", "3.11", "none")
     report = Report("x", "x", "sha256:" + "0" * 64, environment, 1, (exercise,), 0.1)
     into = tmp_path / "into"
-    task = Task("x", "x", tmp_path, into, (), (), (), CONDITIONS, 1, False, 60.0)
+    task = Task("x", "x", tmp_path, into, CONDITIONS, 1, False, 60.0)
     worker.attempt(task, lambda step: None, lambda *_: report)
     found = {path.name for path in into.iterdir() if "hushhush" in path.read_text(encoding="utf-8")}
     assert found == {REPORT, worker.PAGE}

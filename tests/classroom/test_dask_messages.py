@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 import pickle
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from dask_samples import CONDITIONS, graded, task
 
-from grader.classroom.cluster.jobs import write_task
-from grader.classroom.cluster.sending import job_for, store_result, terms_of
-from grader.classroom.local import Attempt, Task, failed
-from grader.classroom.messages import GradingJob, JobResult, SentBag, Terms, pack, read_collected, unpack, write_answer
+from grader.classroom.local import Attempt, Task, failed_attempt
+from grader.classroom.messages import GradingJob, JobResult, Terms, pack, read_collected, unpack, write_answer
+from grader.classroom.receiving import write_task
+from grader.classroom.sending import job_for, store_result, terms_of
 from grader.classroom.store import State
 from grader.core.errors import HarnessError, RecordingError, RubricError
 from grader.submissions.submission import stage_collected, stage_submission
@@ -48,10 +50,12 @@ def test_no_place_of_this_machine_travels(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "rubric.yaml").write_text("id: velocity_publisher\n", encoding="utf-8")
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag" / "metadata.yaml").write_text("x", encoding="utf-8")
-    one = task(tmp_path, rubrics=(tmp_path / "rubric.yaml",), bags=(("/scan", tmp_path / "bag"),))
+    one = task(tmp_path, options={"rubrics": (tmp_path / "rubric.yaml",), "bags": (("/scan", tmp_path / "bag"),)})
     terms, errand = sent(one)
     assert str(tmp_path).encode() not in pack(terms) + pack(errand)
-    assert (terms.rubrics[0][0], terms.bags[0].path, errand.path) == (b"rubric.yaml", b"bag", b"ada")
+    assert terms.conditions.options.rubrics == (Path("rubric.yaml"),)
+    assert terms.conditions.options.bags == (("/scan", Path("bag")),)
+    assert ([name for name, _ in terms.files], errand.path) == ([b"rubric.yaml", b"bag/metadata.yaml"], b"ada")
 
 
 @pytest.mark.parametrize("place", ["rubrics/mine.yaml", "../mine.yaml", "../../a/mine.yaml"])
@@ -62,23 +66,29 @@ def test_files_lie_where_reports_say_they_do(tmp_path: Path, monkeypatch: pytest
     monkeypatch.chdir(start)
     Path(place).parent.mkdir(parents=True, exist_ok=True)
     Path(place).write_text("mine", encoding="utf-8")
-    terms, errand = sent(task(tmp_path, rubrics=(Path(place),)))
+    terms, errand = sent(task(tmp_path, options={"rubrics": (Path(place),)}))
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     laid = write_task(terms, errand, scratch)
     there = next(scratch.rglob("mine.yaml"))
-    assert [str(path) for path in laid.rubrics] == [place]
+    assert [str(path) for path in laid.conditions.options.rubrics] == [place]
     assert there.read_text(encoding="utf-8") == "mine"
-    assert laid.conditions == CONDITIONS
+    assert replace(laid.conditions, options=CONDITIONS.options) == CONDITIONS
 
 
 @pytest.mark.parametrize(
-    ("rubric", "bag", "part"), [(b"/etc/x", b"", b""), (b"a", b"/etc", b"x"), (b"a", b"bag", b"../../x")]
+    ("file", "options"),
+    [
+        (b"/etc/x", {}),
+        (b"../../../x/../../../../x/a", {"rubrics": (Path("/etc/x"),)}),
+        (b"a", {"bags": (("/scan", Path("/etc")),)}),
+        (b"a", {"interfaces": (Path("/etc"),)}),
+    ],
 )
-def test_nothing_is_laid_out_elsewhere(tmp_path: Path, rubric: bytes, bag: bytes, part: bytes) -> None:
-    """A path that leads out is refused before it is written."""
-    bags = (SentBag("/scan", bag, ((part, b"x"),)),)
-    terms = Terms(CONDITIONS, (), ((rubric, b"x"),), bags, standalone=False, deadline_s=1.0)
+def test_nothing_is_laid_out_or_read_elsewhere(tmp_path: Path, file: bytes, options: dict[str, Any]) -> None:
+    """A path that leads out is refused, of a file and of an option."""
+    conditions = replace(CONDITIONS, options=replace(CONDITIONS.options, **options))
+    terms = Terms(conditions, ((file, b"x"),), standalone=False, deadline_s=1.0)
     with pytest.raises(HarnessError, match="expected paths that stay inside"):
         write_task(terms, GradingJob("a", b"a", b"a", b""), tmp_path)
 
@@ -89,12 +99,12 @@ def test_a_recording_travels_with_its_files(tmp_path: Path, monkeypatch: pytest.
     Path("bag").mkdir()
     Path("bag/b.mcap").write_bytes(b"b")
     Path("one.mcap").write_bytes(b"one")
-    assert terms_of(task(tmp_path, bags=(("/scan", Path("bag")),))).bags[0].files == ((b"b.mcap", b"b"),)
-    assert terms_of(task(tmp_path, bags=(("/scan", Path("one.mcap")),))).bags[0].files == ((b"", b"one"),)
+    assert terms_of(task(tmp_path, options={"bags": (("/scan", Path("bag")),)})).files == ((b"bag/b.mcap", b"b"),)
+    assert terms_of(task(tmp_path, options={"bags": (("/scan", Path("one.mcap")),)})).files == ((b"one.mcap", b"one"),)
     with pytest.raises(RecordingError, match=r"no\.mcap: cannot be read"):
-        terms_of(task(tmp_path, bags=(("/scan", Path("no.mcap")),)))
+        terms_of(task(tmp_path, options={"bags": (("/scan", Path("no.mcap")),)}))
     with pytest.raises(RubricError, match=r"no\.yaml: cannot be read"):
-        terms_of(task(tmp_path, rubrics=(Path("no.yaml"),)))
+        terms_of(task(tmp_path, options={"rubrics": (Path("no.yaml"),)}))
 
 
 def test_what_cannot_be_used_is_refused_here(tmp_path: Path) -> None:
@@ -137,7 +147,7 @@ def test_another_rubric_is_no_result(tmp_path: Path) -> None:
 @pytest.mark.parametrize("data", [b"", b"\xc1", b"\x81\xa1a\x01", pickle.dumps({}), pack(JobResult("w", b"[]"))])
 def test_nonsense_is_no_result(tmp_path: Path, data: bytes) -> None:
     """Whatever comes back, it is read as data, never run, and never a mark."""
-    from grader.classroom.cluster.sending import answer_in
+    from grader.classroom.sending import answer_in
 
     assert store_result(task(tmp_path), answer_in(data, "cluster")).status.state is State.FAILED
 
@@ -146,7 +156,7 @@ def test_a_full_disk_is_a_failure(tmp_path: Path) -> None:
     """The result is tried again when there is room."""
     one = task(tmp_path, into=tmp_path / "no" / "such" / "folder")
     assert store_result(one, graded()).status.problem == "the result cannot be written: No such file or directory"
-    assert failed(one, "x").status.hint == "run the same command again"
+    assert failed_attempt(one, "x").status.hint == "run the same command again"
 
 
 def test_too_many_files_are_no_result(tmp_path: Path) -> None:

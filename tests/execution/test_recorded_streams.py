@@ -19,7 +19,7 @@ from grader.app.bags import observed, read_given, read_recordings, recordings_di
 from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest, command_words, request_of, request_to_json
 from grader.authoring.checking import check_rubric
-from grader.classroom.cluster.sending import checks_of
+from grader.classroom.sending import checks_of
 from grader.core.errors import RecordingError, RubricError
 from grader.core.quantities import NS_PER_S
 from grader.core.scenario import ODOMETRY, RecordedStream

@@ -18,10 +18,11 @@ from pathlib import Path
 from distributed import Client, Future, KilledWorker, Security
 
 import grader
-from grader.classroom.cluster import jobs as remote
-from grader.classroom.cluster.sending import answer_in, files_wanted, job_for, store_result, terms_of
-from grader.classroom.local import Attempt, MakeScheduler, OnStep, Task, failed
+from grader.classroom.cluster import workers as remote
+from grader.classroom.local import Attempt, ClassScheduler, OnStep, Task, failed_attempt
 from grader.classroom.messages import Fitness, Terms, pack, unpack
+from grader.classroom.receiving import other_version
+from grader.classroom.sending import answer_in, files_wanted, job_for, store_result, terms_of
 from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault, HarnessError
 
@@ -117,8 +118,8 @@ class WorkerPool:
         except importlib.metadata.PackageNotFoundError:
             found = ""
         if found != self._version:
-            problem = remote.other_version(self._version, found)
-            raise EnvironmentFault(f"scheduler of the cluster: {problem}", remote.remedy(self._version))
+            problem = other_version(self._version, found)
+            raise EnvironmentFault(f"scheduler of the cluster: {problem}", _remedy(self._version))
 
     def _ask(self, addresses: Collection[str]) -> None:
         """Ask workers for their version, which works without the grader; then inspect those with the right one."""
@@ -127,8 +128,8 @@ class WorkerPool:
             if found == self._version:
                 right.append(address)
             elif isinstance(found, (str, importlib.metadata.PackageNotFoundError)):
-                problem = remote.other_version(self._version, found if isinstance(found, str) else "")
-                self._known[address] = Fitness(f"worker {address}", problem, remote.remedy(self._version))
+                problem = other_version(self._version, found if isinstance(found, str) else "")
+                self._known[address] = Fitness(f"worker {address}", problem, _remedy(self._version))
         for address, reply in self._run(remote.inspect, self._isolation, right).items():
             if isinstance(reply, bytes):
                 self._known[address] = unpack(reply, Fitness)
@@ -150,6 +151,10 @@ def scheduler_lost() -> HarnessError:
         "cluster: the scheduler no longer answers",
         "what was graded is kept; run the same command again when the scheduler is back",
     )
+
+
+def _remedy(version: str) -> str:
+    return f"install rclpy-grader {version} with its extra dask there"
 
 
 def _problem(fitness: Fitness) -> str:
@@ -313,14 +318,14 @@ class Dispatcher:
     def _erred(self, sending: _Sending, error: BaseException | None) -> Attempt | None:
         if isinstance(error, KilledWorker):
             problem = f"{error.allowed_failures + 1} workers of the cluster ended while they graded it"
-            return failed(sending.task, problem, "check what ended them, such as a memory limit")
+            return failed_attempt(sending.task, problem, "check what ended them, such as a memory limit")
         self._worker_pool.forget(self._worker_pool.usable())  # one of them may have become unable to grade
         return self._once_more(sending, f"{_CLUSTER}: {type(error).__name__}")
 
     def _once_more(self, sending: _Sending, problem: str, hint: str = "") -> Attempt | None:
         if sending.tries < TRIES and self._worker_pool.usable():
             return None
-        return failed(sending.task, problem, *filter(None, [hint]))
+        return failed_attempt(sending.task, problem, *filter(None, [hint]))
 
     def _on_event(self, event: tuple[float, object]) -> None:
         """Report a step, unless its submission is already finished."""
@@ -371,7 +376,7 @@ _LOGGERS = ("distributed", "distributed.client")
 @contextmanager
 def connected(
     place: str, jobs: int | None, warn: Callable[[str], None], *, timeout_s: float = CONNECT_S
-) -> Iterator[MakeScheduler]:
+) -> Iterator[ClassScheduler]:
     """Connect to a cluster, and disconnect at the end; raises EnvironmentFault if no scheduler answers.
 
     The place is the address of the scheduler, such as `tcp://host:8786`, or a scheduler file; for `jobs` and `warn` see
@@ -383,7 +388,7 @@ def connected(
             logging.getLogger(name).setLevel(logging.CRITICAL)  # the grader reports errors itself
     client = _client(address, timeout_s)
     try:
-        yield lambda _: ClusterScheduler(client, jobs, warn)
+        yield ClusterScheduler(client, jobs, warn)
     finally:
         client.close(timeout=_CLOSE_S)
 

@@ -1,8 +1,7 @@
-"""Runs on the workers of a cluster: grades a submission sent as bytes, and answers in bytes."""
+"""Runs on another machine: grades a submission that was sent as bytes, and answers in bytes."""
 
 from __future__ import annotations
 
-import asyncio
 import fcntl
 import os
 import socket
@@ -10,9 +9,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
-
-from distributed import Worker, get_worker
+from pathlib import Path
 
 import grader
 from grader.classroom import store as kept
@@ -22,6 +19,7 @@ from grader.classroom.messages import (
     Fitness,
     GradingJob,
     JobResult,
+    Parcel,
     Terms,
     files_below,
     pack,
@@ -30,6 +28,7 @@ from grader.classroom.messages import (
 from grader.classroom.store import ResultStatus, State
 from grader.core.checkup import NO_SANDBOX, missing
 from grader.core.errors import EnvironmentFault, GraderError, HarnessError
+from grader.core.grading_options import paths
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import TierChoice, choose_isolation
 from grader.execution.temp_dirs import scratch_folder
@@ -53,7 +52,7 @@ def fitness(isolation: str, machine: str) -> Fitness:
 def grade_job(terms: Terms, job: GradingJob, machine: str, on_step: Callable[[str], None]) -> JobResult:
     """Grade a submission in its own process, in a sandbox chosen here; an exception of `on_step` aborts it."""
     try:
-        choice = choose_isolation(terms.conditions.isolation, find_ros())
+        choice = choose_isolation(terms.conditions.options.isolation, find_ros())
     except EnvironmentFault as fault:
         return JobResult(machine, unfit=fault.message, hint=fault.hint)
     try:
@@ -97,11 +96,12 @@ def write_task(terms: Terms, job: GradingJob, scratch: Path) -> Task:
     """
     start = _start(terms, scratch)
     start.mkdir(parents=True)
-    for name, content in (*terms.rubrics, *terms.checks):
-        _write(start, os.fsdecode(name), content, scratch)
-    for bag in terms.bags:
-        for name, content in bag.files:
-            _write(start, str(PurePosixPath(os.fsdecode(bag.path), os.fsdecode(name))), content, scratch)
+    for name, content in terms.files:
+        path = _inside(start, Path(os.fsdecode(name)), scratch)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    for path in paths(terms.conditions.options):
+        _inside(start, path, scratch)
     collected = scratch / "collected"
     collected.write_bytes(job.collected)
     return Task(
@@ -109,32 +109,28 @@ def write_task(terms: Terms, job: GradingJob, scratch: Path) -> Task:
         label=os.fsdecode(job.label),
         submission=Path(os.fsdecode(job.path)),
         into=scratch / "result",
-        exercises=terms.exercises,
-        rubrics=tuple(Path(os.fsdecode(name)) for name, _ in terms.rubrics),
-        bags=tuple((bag.name, Path(os.fsdecode(bag.path))) for bag in terms.bags),
-        conditions=replace(terms.conditions, variants=job.variants, seed=job.seed),
+        conditions=terms.conditions.of_submission(job.seed, job.variants),
         # The parallelism of a cluster is one submission per thread.
         workers=1,
         standalone=terms.standalone,
         deadline_s=terms.deadline_s,
         collected=collected,
-        interfaces=tuple(Path(os.fsdecode(name)) for name in terms.interfaces),
     )
 
 
 def _start(terms: Terms, scratch: Path) -> Path:
     """Return where relative paths start from: so deep that those which lead up stay inside."""
-    names = (*(name for name, _ in (*terms.rubrics, *terms.checks)), *(bag.path for bag in terms.bags))
-    up = max((name.split(b"/").count(b"..") for name in names), default=0)
+    named = (*(Path(os.fsdecode(name)) for name, _ in terms.files), *paths(terms.conditions.options))
+    up = max((path.parts.count("..") for path in named), default=0)
     return scratch.joinpath("files", *["up"] * up)
 
 
-def _write(start: Path, name: str, content: bytes, scratch: Path) -> None:
-    path = Path(os.path.normpath(start / name))
+def _inside(start: Path, named: Path, scratch: Path) -> Path:
+    """Return where a path leads from the start; raises HarnessError if that is outside of what was laid out here."""
+    path = Path(os.path.normpath(start / named))
     if not path.is_relative_to(scratch / "files"):
         raise HarnessError("terms: expected paths that stay inside, found one that does not")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(content)
+    return path
 
 
 def _one_at_a_time(choice: TierChoice) -> bool:
@@ -154,42 +150,35 @@ def _alone() -> Iterator[None]:
         os.close(lock)
 
 
-#: Keys of a progress event.
-NAME, STEP = "name", "step"
-_UNWANTED = ("cancelled", "released", "forgotten")
+class UnwantedError(Exception):
+    """The result is no longer wanted: raised by an `on_step`, it ends the grading and comes out."""
 
 
-class _UnwantedError(Exception):
-    """The result of this submission is no longer wanted."""
+def _unheard(step: str) -> None:
+    """Report steps to nobody."""
 
 
-async def inspect(isolation: str, dask_worker: Worker) -> bytes:
-    """Report whether this worker can grade, as a packed `Fitness`; Dask supplies it because of the parameter's name."""
-    return pack(await asyncio.to_thread(fitness, isolation, _machine(dask_worker)))
+def grade_packed(parcel: bytes, on_step: Callable[[str], None] = _unheard) -> bytes:
+    """Grade a submission that `pack_task` packed on another machine, and return the answer for `store_answer` there.
 
-
-def grade(version: str, terms: bytes, job: bytes, topic: str) -> bytes:
-    """Grade a submission, and return a packed `JobResult`.
-
-    The version is that of the requesting machine, terms and job are packed, and events of progress go to the topic.
+    Steps are passed to `on_step`, which may raise UnwantedError; nothing else is raised.
     """
-    worker = get_worker()
-    machine = _machine(worker)
+    machine = socket.gethostname()
+    try:
+        given = unpack(parcel, Parcel)
+    except HarnessError as error:
+        return pack(JobResult(machine, unfit=error.message, hint=error.hint))
+    return answer(given.version, given.terms, given.job, machine, on_step)
+
+
+def answer(version: str, terms: bytes, job: bytes, machine: str, on_step: Callable[[str], None]) -> bytes:
+    """Grade a submission for a grader of this version, and return a packed `JobResult`; see `grade_packed`."""
     if version != grader.__version__:
         return pack(JobResult(machine, unfit=other_version(version, grader.__version__), hint=remedy(version)))
-    key = worker.get_current_task()
-
-    def on_step(step: str) -> None:
-        task = worker.state.tasks.get(key)
-        if task is None or task.state in _UNWANTED:
-            raise _UnwantedError
-        worker.log_event(topic, {NAME: what.name, STEP: step})
-
     try:
-        what = unpack(job, GradingJob)
-        return pack(grade_job(unpack(terms, Terms), what, machine, on_step))
-    except _UnwantedError:
-        return b""
+        return pack(grade_job(unpack(terms, Terms), unpack(job, GradingJob), machine, on_step))
+    except UnwantedError:
+        raise
     except HarnessError as error:
         return pack(JobResult(machine, unfit=error.message, hint=error.hint))
     except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
@@ -203,8 +192,4 @@ def other_version(wanted: str, found: str) -> str:
 
 def remedy(version: str) -> str:
     """Return the hint that fixes a wrong version."""
-    return f"install rclpy-grader {version} with its extra dask there"
-
-
-def _machine(worker: Worker) -> str:
-    return f"worker {worker.address} on {socket.gethostname()}"
+    return f"install rclpy-grader {version} there"
