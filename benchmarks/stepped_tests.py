@@ -1,4 +1,4 @@
-"""Steps a node through ten virtual seconds again and again, as tests do, and says how long one such test takes.
+"""Steps a node through ten virtual seconds repeatedly, as tests do, and says how long one such test takes.
 
 Usage: python benchmarks/stepped_tests.py [TESTS]
 

@@ -1,4 +1,4 @@
-"""Packs submissions for other machines, and stores their answers; knows no way that these travel."""
+"""Packs submissions for other machines, and stores their answers; how both travel is up to the scheduler."""
 
 from __future__ import annotations
 

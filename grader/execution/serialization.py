@@ -38,7 +38,7 @@ def type_name(kind: Any) -> str:
 
 
 def serialized(message: Any, where: str) -> tuple[str, bytes]:
-    """Return type and bytes of a message; raises TypeError if it is none."""
+    """Return type and bytes of a message; raises TypeError for anything else."""
     if isinstance(message, type):
         raise TypeError(f"{where}: expected a message, found the class {message.__name__}; write {message.__name__}()")
     try:

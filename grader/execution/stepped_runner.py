@@ -62,7 +62,7 @@ class PublishNext(TopicEvent):
 
 
 class Stream:
-    """Messages that a command publishes on a topic, one after the other.
+    """Messages that a command publishes on a topic, in turn.
 
     Args:
         command: What to publish.

@@ -43,7 +43,7 @@ class Publish:
     Attributes:
         topic: Absolute name.
         type: Type of the messages.
-        messages: The serialized messages, one after the other; the last one is repeated. Empty to stop a stream.
+        messages: The serialized messages, in the order of sending; the last one is repeated. Empty to stop a stream.
         period_ns: Time between two messages; 0 to publish once.
         best_effort: Reliability of the publisher.
         latched: Whether it is transient-local.

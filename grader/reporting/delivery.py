@@ -98,7 +98,7 @@ def early_delivery(outputs: Sequence[Output], readers: Readers = ANYBODY) -> Cal
 
 
 def show(render: Callable[[PageLayout], str], *, for_people: bool, stream: TextIO | None = None) -> None:
-    """Print text on standard output, or another stream, rendered for its width and colour; a closed pipe is no error.
+    """Print text on standard output, or another stream, for its width and colour. A closed pipe is not an error.
 
     For people, characters that the terminal's encoding lacks are replaced; programs read UTF-8.
     """

@@ -16,4 +16,4 @@ class ParameterRejected(AssertionError):  # noqa: N818 - the same
 
 
 class NoMessage(IndexError):  # noqa: N818 - the same
-    """A message was asked for that has not come, such as the last one of a silent topic."""
+    """A message was asked for that has not arrived, such as the last one of a silent topic."""

@@ -14,7 +14,7 @@ from grader.world.world import World
 
 @dataclass(frozen=True, slots=True)
 class Worlds:
-    """What worlds run in, one after the other or at the same time.
+    """What worlds run in, in turn or at the same time.
 
     Attributes:
         session: The workers.

@@ -83,7 +83,7 @@ class Received:
 
 
 class Messages(list[Value]):
-    """The messages of a topic so far; asking for one that has not come says why there is none."""
+    """The messages of a topic so far; asking for one that has not arrived says why there is none."""
 
     def __init__(self, found: Sequence[Value], why: Callable[[], str]) -> None:
         super().__init__(found)
@@ -94,7 +94,7 @@ class Messages(list[Value]):
     @overload
     def __getitem__(self, index: slice) -> list[Value]: ...
     def __getitem__(self, index: int | slice) -> Value | list[Value]:
-        """Return a message or some of them; raises NoMessage for one that has not come."""
+        """Return a message or some of them; raises NoMessage for one that has not arrived."""
         __tracebackhide__ = True
         try:
             return super().__getitem__(index)
@@ -316,7 +316,7 @@ class World:
     def wait_until(self, condition: Callable[[], Value], timeout: float) -> Value:
         """Let time pass until a condition holds, and return its value.
 
-        It is looked at whenever something was observed. A message that has not come makes it false.
+        It is looked at whenever something was observed. A message that has not arrived makes it false.
 
         Args:
             condition: Called without arguments.
@@ -371,7 +371,7 @@ class World:
 
         Args:
             topic: Its name.
-            message: The message. With a rate also a list: one after the other, and the last one goes on.
+            message: The message. With a rate also a list: sent in turn, and the last one is repeated.
             rate: Messages per second; None to publish once.
             qos: Reliability and durability of the publisher; reliable and volatile by default.
         """
