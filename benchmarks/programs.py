@@ -36,7 +36,7 @@ from hostile import staging
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from program_comparison import compared, differences_of, on_the_wall_clock, plan_of
 from program_description import Program
-from program_strategy import programs
+from program_strategy import drawn, programs
 
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.supervisor import Job
@@ -63,26 +63,6 @@ def _note(name, _known=set()):
         posix.close(file)
 """
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
-
-
-def drawn(part_seed: int, count: int) -> list[Program]:
-    """Draw programs."""
-    found: list[Program] = []
-
-    @seed(part_seed)
-    @settings(
-        max_examples=count,
-        database=None,
-        deadline=None,
-        phases=[Phase.generate],
-        suppress_health_check=list(HealthCheck),
-    )
-    @given(programs())
-    def draw(program: Program) -> None:
-        found.append(program)
-
-    draw()
-    return found
 
 
 def used_s() -> float:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from program_description import (
     LAST_NAP_MS,
@@ -395,3 +396,23 @@ def programs(draw: st.DrawFn) -> Program:
             )
         )
     return Program(tuple(made), DURATION_MS)
+
+
+def drawn(part: int, count: int) -> list[Program]:
+    """Draw so many programs, the same ones for each part."""
+    found: list[Program] = []
+
+    @seed(part)
+    @settings(
+        max_examples=count,
+        database=None,
+        deadline=None,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(programs())
+    def draw(program: Program) -> None:
+        found.append(program)
+
+    draw()
+    return found
