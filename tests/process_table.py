@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
 import subprocess
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -53,3 +55,15 @@ def is_students(process: Path) -> bool:
     command = read(process / "cmdline")
     forked = b"/host/starter.py" in command and b" /submission " in read(process / "mountinfo")
     return forked or b"launcher.py" in command
+
+
+def segments_in_use() -> set[str]:
+    """Return what living processes have mapped or opened in /dev/shm: other tests use some at any time."""
+    used: set[bytes] = set()
+    for process in Path("/proc").glob("[0-9]*"):
+        used.update(re.findall(rb"/dev/shm/(\S*)", read(process / "maps")))
+        with contextlib.suppress(OSError):  # it has ended, or is another user's
+            for link in (process / "fd").iterdir():
+                with contextlib.suppress(OSError):
+                    used.add(str(link.readlink()).removeprefix("/dev/shm/").encode())
+    return {name.decode("utf-8", "replace") for name in used}

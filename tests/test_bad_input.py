@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import re
@@ -14,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
-from process_table import Running, read, running, students_of
+from process_table import Running, read, running, segments_in_use, students_of
 from sample_folders import folder_of
 
 GRADE = str(Path(sys.executable).with_name("grade"))
@@ -58,16 +57,9 @@ def shared_memory() -> set[str]:
 
 
 def orphaned_segments() -> set[str]:
-    """Return the segments of DDS that no living process has mapped or opened: other tests use some at any time."""
+    """Return the segments of DDS that no living process uses."""
     there = shared_memory()
-    used = set()
-    for process in Path("/proc").glob("[0-9]*"):
-        used.update(re.findall(rb"/dev/shm/(\S*)", read(process / "maps")))
-        with contextlib.suppress(OSError):  # it has ended, or is another user's
-            for link in (process / "fd").iterdir():
-                with contextlib.suppress(OSError):
-                    used.add(str(link.readlink()).removeprefix("/dev/shm/").encode())
-    return there - {name.decode() for name in used}
+    return there - segments_in_use()
 
 
 def processes_of(scratch: Path) -> list[int]:

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from process_table import segments_in_use
+
 ROOT = Path(__file__).resolve().parents[2]
 GRADE = Path(sys.executable).with_name("grade")
 #: The user that stands for an ordinary one where the attacks are tried by root.
@@ -189,7 +191,9 @@ class Arena:
             digits = "".join(filter(str.isdigit, name))
             yield Finding(f"{name} was written outside", int(digits) if digits else None)
         left = sorted(
-            name for name in _names("/dev/shm") - self._shm if name.startswith((self.mark, "fastrtps_port7411"))
+            name
+            for name in _names("/dev/shm") - self._shm - segments_in_use()
+            if name.startswith((self.mark, "fastrtps_port7411"))
         )
         if left:
             yield Finding(f"shared memory was left: {', '.join(left)}", 41)
