@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import gc
 import json
 import os
 import secrets
@@ -220,8 +221,12 @@ class Arena:
         return []
 
     def _orphans(self) -> dict[int, str]:
-        """Return what descends from the runs: it has become a child of this process, or carries the mark."""
+        """Return what descends from the runs: it has become a child of this process, or carries the mark.
+
+        What this process has started itself is none: other tests have workers, which are replaced at any moment.
+        """
         found = {}
+        started = {each.pid for each in gc.get_objects() if isinstance(each, subprocess.Popen)}
         for path in Path("/proc").glob("[0-9]*"):
             try:
                 line = (path / "cmdline").read_bytes()
@@ -230,10 +235,10 @@ class Arena:
             except OSError:
                 continue
             pid = int(path.name)
-            if state == "Z" and parent == os.getpid() and pid not in self._mine:
+            if state == "Z" and parent == os.getpid() and pid not in self._mine | started:
                 with contextlib.suppress(ChildProcessError):
                     os.waitpid(pid, os.WNOHANG)
-            elif (parent == os.getpid() and pid not in self._mine) or self.mark.encode() in line:
+            elif (parent == os.getpid() and pid not in self._mine | started) or self.mark.encode() in line:
                 found[pid] = line.replace(b"\0", b" ").decode("utf-8", "replace")[:80]
         return found
 

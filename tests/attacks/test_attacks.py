@@ -150,6 +150,15 @@ def test_a_process_whose_parent_is_gone_is_noticed_and_ended(arena: Arena) -> No
     assert texts(arena) == []
 
 
+def test_a_process_that_another_test_has_started_is_no_leftover(arena: Arena) -> None:
+    """Such as a worker that takes the place of another one meanwhile."""
+    arena.patience_s = 0.0
+    with subprocess.Popen([sys.executable, "-I", "-S", "-c", "import time; time.sleep(99)"]) as started:
+        assert texts(arena) == []
+        assert started.poll() is None
+        started.kill()
+
+
 def report(**outcomes: str) -> dict[str, Any]:
     log = {"id": "a01__log", "outcome": "met", "reason": "", "evidence": {"first": outcomes.pop("said")}}
     criteria = [{"id": f"a01__{what}", "outcome": outcome, "reason": ""} for what, outcome in outcomes.items()]
