@@ -7,8 +7,9 @@ import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar, overload
+from typing import Any, ParamSpec, TypeVar, overload
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError
@@ -52,6 +53,7 @@ from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, Ste
 from grader.world.programs import Found, Program, Runnable, find_launch_file, find_program, parameter_values
 
 Value = TypeVar("Value")
+Given = ParamSpec("Given")
 
 #: How much the programs of a test may use, and how much of it is kept: they are trusted, so these are only to end what
 #: runs away. Images of some megabytes have to fit.
@@ -72,6 +74,22 @@ OWN_LIMITS = Limits(
 )
 #: What fails a test. A program that ends by itself does not: the test can look at its exit code.
 FAILING = (FaultKind.SYNTAX_ERROR, FaultKind.EXCEPTION, FaultKind.HUNG, FaultKind.KILLED)
+
+
+def _with_hint(method: Callable[Given, Value]) -> Callable[Given, Value]:
+    """Let the errors of a method show their hint, and the line of the test in place of those of the grader."""
+
+    @wraps(method)
+    def called(*args: Given.args, **kwargs: Given.kwargs) -> Value:
+        __tracebackhide__ = True
+        try:
+            return method(*args, **kwargs)
+        except GraderError as error:
+            if error.hint:
+                error.add_note(f"hint: {error.hint}")
+            raise error.with_traceback(None) from None
+
+    return called
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,6 +223,7 @@ class World:
 
     # ------------------------------------------------------------- programs
 
+    @_with_hint
     def run(  # noqa: PLR0913 - what a launch file may say of a node
         self,
         program: Runnable,
@@ -250,6 +269,7 @@ class World:
         self._perform(Start(self._plan_of(found, start, env or {}), settle=not self._plan.drawn_order))
         return started
 
+    @_with_hint
     def launch(self, file: str | Path, *, arguments: Mapping[str, Any] | None = None) -> Launched:
         """Start the nodes that a launch file describes.
 
@@ -527,6 +547,7 @@ class World:
         if not result.successful:
             raise ParameterRejected(f"{_absolute(node)}: {name} = {value!r} was not accepted: {result.reason}")
 
+    @_with_hint
     def simulate(self, simulation: Simulation | str, **parameters: Any) -> Simulation:
         """Let a simulation take part from now on; its methods run in the test's process, while time stands still.
 

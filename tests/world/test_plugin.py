@@ -69,6 +69,21 @@ def test_a_failure_leaves_its_recording_and_a_page(suite: pytest.Pytester) -> No
     assert not [*(suite.path / "kept").glob("test_a_right_answer*/*")]
 
 
+MISSING = """
+def test_it(ros):
+    ros.run("ehco.py")
+"""
+
+
+def test_a_mistake_in_a_test_is_shown_at_its_line_with_a_hint(suite: pytest.Pytester) -> None:
+    """A file that is not there; nothing of the grader's own code is shown."""
+    text = run(suite, MISSING).stdout.str()
+    assert '>       ros.run("ehco.py")' in text
+    assert "SubmissionError: ehco.py: expected a file, found none" in text
+    assert "hint: did you mean echo.py?" in text
+    assert "grader/world" not in text
+
+
 RACE = """
 import pytest
 from std_msgs.msg import String
