@@ -34,12 +34,11 @@ sys.path[:0] = [str(ROOT / "tests" / folder) for folder in ("random_programs", "
 
 from hostile import staging
 from hypothesis import HealthCheck, Phase, given, seed, settings
-from program_comparison import compared, differences_of, on_the_wall_clock, plan_of
+from program_comparison import compared, differences_of_each, on_the_wall_clock
 from program_description import Program
 from program_strategy import drawn, programs
 
 from grader.execution.recording_session import RecordingSession, open_session
-from grader.execution.supervisor import Job
 from grader.files import write_whole
 
 #: How many programs are drawn and recorded together.
@@ -118,9 +117,8 @@ def run_part(session: RecordingSession, part_seed: int, count: int, wall: int) -
     with tempfile.TemporaryDirectory(dir=session.folder) as name:
         folder = Path(name)
         folder.chmod(0o755)
-        jobs = [Job("random", plan_of(program, folder / str(n))) for n, program in enumerate(chosen)]
-        for program, trace in zip(chosen, session.recorder.each(jobs, lambda _: None), strict=True):
-            if differing := differences_of(program, trace):
+        for program, differing in differences_of_each(session, chosen, folder):
+            if differing:
                 found.append("\n".join([repr(program), *differing]))
         alone = [program for program in chosen if len(program.processes) == 1][:wall]
         on_wall = [told for program in alone if (told := once_right(session, program, folder))]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
@@ -56,6 +56,15 @@ def plan_of(program: Program, folder: Path, clock: str = "virtual") -> Plan:
 def recorded(session: RecordingSession, program: Program, folder: Path, clock: str = "virtual") -> Trace:
     """Record a program."""
     return session.recorder.record([Job("random", plan_of(program, folder, clock))], lambda _: None)[0]
+
+
+def differences_of_each(
+    session: RecordingSession, programs: Sequence[Program], folder: Path
+) -> Iterator[tuple[Program, list[str]]]:
+    """Record programs at the same time, and yield each with how it differs from its model."""
+    jobs = [Job("random", plan_of(program, folder / str(number))) for number, program in enumerate(programs)]
+    for program, trace in zip(programs, session.recorder.each(jobs, lambda _: None), strict=True):
+        yield program, differences_of(program, trace)
 
 
 def told_by_model(expected: Expected) -> dict[str, list[tuple[int, str]]]:

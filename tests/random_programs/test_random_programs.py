@@ -12,12 +12,11 @@ pytest.importorskip("rclpy")
 
 from counter_examples import COUNTER_EXAMPLES
 from hostile import staging
-from program_comparison import compared, differences_of, plan_of
+from program_comparison import compared, differences_of_each
 from program_description import Program
 from program_strategy import drawn
 
 from grader.execution.recording_session import RecordingSession, open_session
-from grader.execution.supervisor import Job
 
 pytestmark = pytest.mark.ros
 
@@ -41,9 +40,7 @@ def test_random_programs_do_what_the_model_says(session: RecordingSession, part:
     with tempfile.TemporaryDirectory(dir=session.folder) as name:
         folder = Path(name)
         folder.chmod(0o755)
-        jobs = [Job("random", plan_of(program, folder / str(number))) for number, program in enumerate(chosen)]
-        traces = session.recorder.each(jobs, lambda _: None)
-        found = [(program, differences_of(program, trace)) for program, trace in zip(chosen, traces, strict=True)]
+        found = [*differences_of_each(session, chosen, folder)]
     wrong = ["\n".join([repr(program), *differences]) for program, differences in found if differences]
     assert not wrong, "\n\n".join([*wrong, f"python benchmarks/programs.py {EACH} --seed {part} makes them smaller"])
 

@@ -21,9 +21,18 @@ pytestmark = pytest.mark.ros
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
-def test_a_goal_has_feedback_and_a_result(ros: World) -> None:
+@pytest.fixture
+def fibonacci_server(tmp_path: Path) -> Path:
+    """The server of the example, with an action that the test's process has as well."""
+    text = (REPOSITORY / "examples/fibonacci/reference/fibonacci_server.py").read_text(encoding="utf-8")
+    file = tmp_path / "fibonacci_server.py"
+    file.write_text(text.replace("example_interfaces.action", "test_msgs.action"), encoding="utf-8")
+    return file
+
+
+def test_a_goal_has_feedback_and_a_result(ros: World, fibonacci_server: Path) -> None:
     """A number every half second; the feedback of one goal is not that of another."""
-    ros.run("nodes/fibonacci_server.py")
+    ros.run(fibonacci_server)
     for order, numbers in ((4, [0, 1, 1, 2, 3]), (3, [0, 1, 1, 2])):
         began = ros.now
         outcome = ros.send_goal("/fibonacci", Fibonacci.Goal(order=order))
@@ -32,20 +41,20 @@ def test_a_goal_has_feedback_and_a_result(ros: World) -> None:
         assert ros.now - began == pytest.approx(0.5 * (order - 1), abs=1e-4)
 
 
-def test_a_goal_may_be_cancelled_or_refused(ros: World) -> None:
+def test_a_goal_may_be_cancelled_or_refused(ros: World, fibonacci_server: Path) -> None:
     """Both are outcomes, not errors."""
-    ros.run("nodes/fibonacci_server.py")
+    ros.run(fibonacci_server)
     cancelled = ros.send_goal("fibonacci", Fibonacci.Goal(order=100), cancel_after=2.2)
     assert (cancelled.status, 2.2 <= ros.now < 3.0) == (5, True)
     refused = ros.send_goal("/fibonacci", Fibonacci.Goal(order=-1))
     assert (refused.accepted, refused.result) == (False, None)
 
 
-def test_a_goal_without_a_result_says_why(ros: World) -> None:
+def test_a_goal_without_a_result_says_why(ros: World, fibonacci_server: Path) -> None:
     """Nobody offers the action, or it takes longer."""
     with pytest.raises(StepTimeout, match="nobody offers the action /fibonacci"):
         ros.send_goal("/fibonacci", Fibonacci.Goal(order=4), timeout=1.0)
-    ros.run("nodes/fibonacci_server.py")
+    ros.run(fibonacci_server)
     with pytest.raises(StepTimeout, match="it has accepted the goal"):
         ros.send_goal("/fibonacci", Fibonacci.Goal(order=50), timeout=1.0)
 
