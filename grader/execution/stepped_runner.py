@@ -6,11 +6,8 @@ middle of a command, and time stands still until it is answered.
 
 from __future__ import annotations
 
-import os
 import random
-import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
 from typing import Any
 
 from grader.core.dataclass import dataclass
@@ -245,8 +242,7 @@ class SteppedRunner(VirtualRunner):
     def _kill(self, student: NodeProcess) -> None:
         if student.ended:
             return
-        with suppress(OSError):
-            os.killpg(student.process.pid, signal.SIGKILL)
+        student.end_now()
         student.death(self._now_ns)
         student.drain()
         self._write_output(student, final=True)

@@ -423,7 +423,7 @@ class NodeProcess:
     def death(self, t_ns: int) -> Fault:
         """End a process that died or stopped reporting, and return its fault."""
         ended = self._ends(CLOSED_S if self._closed else GRACE_S)
-        self._end_now()
+        self.end_now()
         code = self.process.wait()
         self.exit_code = code if code >= 0 else 128 - code
         if self.stopped:
@@ -460,9 +460,10 @@ class NodeProcess:
     def kill(self) -> None:
         """Kill the process, if it is still running, and its process group."""
         self._ends()
-        self._end_now()
+        self.end_now()
 
-    def _end_now(self) -> None:
+    def end_now(self) -> None:
+        """Kill the process and its process group at once."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()

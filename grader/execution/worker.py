@@ -11,7 +11,6 @@ import os
 import re
 import resource
 import secrets
-import signal
 import socket
 import sys
 import time
@@ -174,12 +173,12 @@ class Worker:
                     answer = {"problem": error.message}
                 news = [_compact(o) for o in runner.news()]
                 common = {"now_ns": runner.now_ns, "ended": runner.programs(), "full": runner.full(), "news": news}
-                if isinstance(command, Finish):
+                is_last = isinstance(command, Finish)
+                last = {"notes": runner.notes(), "unsuitable": runner.unsuitable()} if is_last else {}
+                tell({**answer, **common, **last})
+                if is_last:
                     failed = bool(runner.full())
-                    last = {"notes": runner.notes(), "unsuitable": runner.unsuitable()}
-                    tell({**answer, **common, **last})
                     break
-                tell({**answer, **common})
         return failed or usage([os.getpid()]).memory_bytes > WORN_BYTES
 
     def _with_launched(self, plan: Plan, domain: int, used: Collection[str], left_out: list[str]) -> Plan:
@@ -516,9 +515,7 @@ def end_in_order(students: list[NodeProcess]) -> None:
 
 def stop_now(student: NodeProcess) -> None:
     """Kill a process that nobody will ask anything any more."""
-    with suppress(OSError):
-        os.killpg(student.process.pid, signal.SIGKILL)
-    student.process.wait()
+    student.end_now()
     student.close()
 
 
