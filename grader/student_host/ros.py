@@ -371,6 +371,8 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
             self._included = ledger.included
             #: Servers and clients of actions, with what their `is_ready` returned after the last poll.
             self._actions: dict[Any, Any] = {}
+            #: The subscriptions that had messages taken ahead of time at the last poll.
+            self._kept: list[int] = []
 
         def clear_entities(self) -> None:
             super().clear_entities()
@@ -425,6 +427,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
         def _poll(self) -> None:
             """Look, without waiting, what is ready; all else is removed."""
             super().wait(0)
+            self._kept = self._find_kept()
             for handle in self._actions:
                 self._actions[handle] = ACTION_READY[type(handle)](handle, self)
 
@@ -446,9 +449,9 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
 
         def get_ready_entities(self, kind: str) -> Any:
             ready = super().get_ready_entities(kind)
-            return [*ready, *(p for p in self._kept() if p not in ready)] if kind == "subscription" else ready
+            return [*ready, *(p for p in self._kept if p not in ready)] if kind == "subscription" else ready
 
-        def _kept(self) -> list[int]:
+        def _find_kept(self) -> list[int]:
             """Return the subscriptions in this set that have messages taken ahead of time."""
             if not ledger.keeps_anything():
                 return []
@@ -461,7 +464,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
             return (
                 bool(guards)
                 or any(ready(self, kind) for kind in self._kinds)
-                or bool(self._kept())
+                or bool(self._kept)
                 or any(self.is_ready("event", number) for number in range(self._events))
             )
 

@@ -237,4 +237,22 @@ COUNTER_EXAMPLES: dict[str, Program] = {
         ),
         2500,
     ),
+    # A message that was taken ahead of time was ready at a poll that had taken place before it arrived.
+    "two_subscriptions_in_a_busy_loop": Program(
+        (
+            Process((Node("n0", 1, (Timer("t00", 50, (Publish("a", Fixed(1)),)),), ()),), Spinning.SPIN),
+            Process(
+                (
+                    Node(
+                        "n1",
+                        1,
+                        (),
+                        (Subscription("s10", "a", 2, SAYS), Subscription("s11", "a", 1, (Say(Runs()), Nap(20)))),
+                    ),
+                ),
+                Spinning.ONCE,
+            ),
+        ),
+        1000,
+    ),
 }
