@@ -9,7 +9,6 @@ from contextlib import nullcontext
 from typing import Any
 
 from grader.core.trace import GraphSnapshot, keeps_within
-from grader.execution.exchanges import PlannedCalls, PlannedMessages
 from grader.execution.machine import Patience
 from grader.execution.observer import Observer
 from grader.execution.ros_names import is_name, is_node_name
@@ -17,6 +16,8 @@ from grader.execution.service_ends import BACKGROUND_TYPES
 from grader.execution.service_peers import ServicePeers
 from grader.execution.student_process import NodeProcess
 from grader.execution.trace_recorder import NAME_CHARACTERS, TraceRecorder
+from grader.stimuli.calls import PlannedCalls
+from grader.stimuli.messages import PlannedMessages
 
 #: The most messages that are believed to be sent between two reports.
 COUNT = 1_000_000

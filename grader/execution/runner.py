@@ -8,29 +8,21 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
+from grader.core.scenario import Event
 from grader.core.trace import ClockKind, Mark, Observation, Trace
 from grader.execution.ending import never_stopped, reported_fault
-from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer, Taken
 from grader.execution.plan import Plan
 from grader.execution.service_peers import ServicePeers
 from grader.execution.simulations import Simulations
-from grader.execution.stimuli import (
-    AddClients,
-    AddServer,
-    Ask,
-    Event,
-    RemoveServer,
-    Respond,
-    Step,
-    TopicEvent,
-    in_order,
-    schedule,
-)
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import TopicPeers
 from grader.execution.trace_recorder import TraceRecorder
 from grader.simulation.participant import Moment
+from grader.stimuli.calls import AddClients, Ask, PlannedCalls
+from grader.stimuli.events import TopicEvent, in_order
+from grader.stimuli.server import AddServer, RemoveServer, Respond
+from grader.stimuli.simulation import Step
 
 
 class Runner(ABC):
@@ -55,7 +47,7 @@ class Runner(ABC):
         self._stop_ns = 0
         self._starts_ns = dict(plan.starts_ns)
         self._simulations = Simulations(plan)
-        self._due = in_order([*schedule(plan), *self._simulations.events()])
+        self._due = in_order([*plan.events(), *self._simulations.events()])
         participants = max(plan.limits.participants, len(plan.processes))  # each process needs one
         self._recorder = TraceRecorder(replace(plan.limits, participants=participants))
         self._services = ServicePeers(

@@ -8,14 +8,15 @@ from dataclasses import field
 from typing import Any
 
 from grader.core.dataclass import dataclass
+from grader.core.scenario import Event
 from grader.core.trace import Mark, Request, Response
-from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedGoal, PlannedServer
 from grader.execution.interfaces import built, plain_fields, wanted_class
 from grader.execution.observer import size_of
 from grader.execution.plan import Plan
 from grader.execution.service_ends import Arrived, ServiceEnds
-from grader.execution.stimuli import Ask, Event, Respond
 from grader.execution.trace_recorder import TraceRecorder
+from grader.stimuli.calls import Ask, PlannedCall, PlannedCalls
+from grader.stimuli.server import PlannedServer, Respond
 
 #: The most requests and responses that are held before they are recorded.
 UNREAD = 50_000
@@ -251,27 +252,15 @@ class ServicePeers:
 
 def check_types(plan: Plan) -> None:
     """Check that this machine has every type and field that a plan names; raises HarnessError otherwise."""
-    for stream in plan.messages:
-        where = f"scenario {plan.scenario}, messages on {stream.topic}"
-        message = wanted_class(stream.type, "msg", where)
-        for value in stream.values:
-            built(message, value, where)
-    for server in plan.servers:
-        where = f"scenario {plan.scenario}, server of {server.service}"
-        for value in ({}, *server.responses):
-            built(wanted_class(server.type, "srv", where).Response, value, where)
-    for calls in plan.calls:
-        check_calls(calls, f"scenario {plan.scenario}, calls of {calls.service}")
-    for goal in plan.goals:
-        check_goal(goal, f"scenario {plan.scenario}, goal of {goal.action}")
+    for planned in plan.stimuli:
+        check_fields(planned, f"scenario {plan.scenario}, {planned.place}")
 
 
-def check_calls(calls: PlannedCalls, where: str) -> None:
-    """Check that this machine has the type and the fields of some calls; raises HarnessError otherwise."""
-    for value in calls.requests:
-        built(wanted_class(calls.type, "srv", where).Request, value, where)
-
-
-def check_goal(goal: PlannedGoal, where: str) -> None:
-    """Check that this machine has the type and the fields of a goal; raises HarnessError otherwise."""
-    built(wanted_class(goal.type, "action", where).Goal, goal.goal, where)
+def check_fields(planned: Any, where: str) -> None:
+    """Check that this machine has the type and the fields of a stimulus; raises HarnessError otherwise."""
+    if planned.holds is None:
+        return
+    name, kind, part = planned.holds
+    message, fields = wanted_class(planned.type, kind, where), getattr(planned, name)
+    for value in ({}, *((fields,) if isinstance(fields, Mapping) else fields)):
+        built(getattr(message, part) if part else message, value, where)

@@ -14,13 +14,15 @@ from typing import Any, TypeVar
 from grader.core.author_files import AuthorMistake
 from grader.core.errors import HarnessError
 from grader.core.quantities import NS_PER_MS
-from grader.execution.exchanges import PlannedMessages, PlannedServer, PlannedSimulation
+from grader.core.scenario import Event
 from grader.execution.interfaces import built, wanted_class
 from grader.execution.observer import Taken
 from grader.execution.plan import Plan
-from grader.execution.stimuli import AddServer, Advertise, Event, PublishFields, Step
 from grader.simulation.loading import SimulationError, begin_of, guarded, made
 from grader.simulation.participant import Moment, Output, Simulation
+from grader.stimuli.messages import Advertise, PlannedMessages, PublishFields
+from grader.stimuli.server import AddServer, PlannedServer
+from grader.stimuli.simulation import PlannedSimulation, Step
 
 Result = TypeVar("Result")
 
@@ -42,7 +44,7 @@ class Simulations:
     """
 
     def __init__(self, plan: Plan) -> None:
-        self._all = [_Running(planned, BEYOND * plan.limits.messages) for planned in plan.simulations]
+        self._all = [_Running(planned, BEYOND * plan.limits.messages) for planned in plan.of(PlannedSimulation)]
         self._last_ns = 0
 
     @property

@@ -7,22 +7,14 @@ from typing import Any
 
 from grader.core.trace import Delivery, Mark
 from grader.execution.discovery import Discovery, announce, readers_of
-from grader.execution.exchanges import PlannedMessages
-from grader.execution.interfaces import built, message_class, plain_fields
+from grader.execution.interfaces import built, message_class, number_message, numeric_field, plain_fields
 from grader.execution.observer import Observer
-from grader.execution.stimuli import (
-    Advertise,
-    Appear,
-    Disappear,
-    PublishFields,
-    PublishNumber,
-    PublishRecorded,
-    TopicEvent,
-    number_message,
-    numeric_field,
-)
 from grader.execution.student_process import NodeProcess
 from grader.execution.trace_recorder import TraceRecorder
+from grader.stimuli.events import Appear, Disappear, TopicEvent
+from grader.stimuli.messages import Advertise, PlannedMessages, PublishFields
+from grader.stimuli.numbers import PublishNumber
+from grader.stimuli.recorded import PublishRecorded
 
 #: How long, on the wall clock, a publisher stays after its last message, which would be lost otherwise.
 LINGER_NS = 400_000_000

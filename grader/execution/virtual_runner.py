@@ -12,18 +12,19 @@ from dataclasses import replace
 from typing import Any
 
 from grader.core.quantities import NS_PER_S
+from grader.core.scenario import Event
 from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Observation, Offer
 from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, passes, readers_of
 from grader.execution.ending import ending
-from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer, Taken, in_order
 from grader.execution.plan import Plan
 from grader.execution.runner import Runner
-from grader.execution.stimuli import APPEARANCES, AddServer, Ask, Event, RemoveServer
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import VirtualTopicPeers
 from grader.execution.trace_recorder import NAME_CHARACTERS, OFFERS
 from grader.execution.workload import Workload
+from grader.stimuli.calls import Ask, PlannedCalls
+from grader.stimuli.server import AddServer, RemoveServer
 
 #: The most steps at once, and how many more may come with each second of virtual time; more end the scenario. Nodes
 #: that rest need far fewer: ten with timers of 100 Hz that hear each other take some thousand a second.
@@ -388,7 +389,7 @@ class VirtualRunner(Runner):
     def _play(self, *, phase: str = "") -> None:
         """Execute the stimuli that are due; return after each call. In phase `before`, stop at the first message."""
         while self._due and self._due[0].t_ns <= self._now_ns:
-            if phase and not isinstance(self._due[0], APPEARANCES):
+            if phase and not self._due[0].creates:
                 return
             due = self._due.pop(0)
             self._do(due, self._now_ns)

@@ -15,13 +15,14 @@ from typing import Any, ClassVar
 from grader.core.quantities import NS_PER_MS
 from grader.core.trace import ClockKind, Mark, Message, Observation
 from grader.execution.ending import ending
-from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer
 from grader.execution.plan import Plan
 from grader.execution.runner import Runner
-from grader.execution.stimuli import Advertise, RemoveServer
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import LINGER_NS, WallTopicPeers
+from grader.stimuli.calls import PlannedCalls
+from grader.stimuli.messages import Advertise
+from grader.stimuli.server import RemoveServer
 
 #: The most messages of a topic, and reads of a stream, in one iteration, so that a flood does not delay the loop.
 MESSAGES_A_LOOK, READS_A_LOOK = 100, 2

@@ -20,8 +20,6 @@ from grader.core.scenario import (
     InOrder,
     JustAbove,
     JustBelow,
-    RecordedStream,
-    ServiceCalls,
     SomeOf,
     TimeBetween,
     Written,
@@ -42,6 +40,8 @@ from grader.rubrics.types import (
     must,
     wrong,
 )
+from grader.stimuli.calls import ServiceCalls
+from grader.stimuli.recorded import RecordedStream
 
 #: Maximum number of decimals with which a text shows a drawn number.
 DECIMALS = 9

@@ -15,8 +15,10 @@ from stand_in_checks import CHECKS, Everything, FieldValues, Point, Publishes, T
 
 from grader.core.errors import RubricError
 from grader.core.exercise import Criterion, Exercise
-from grader.core.scenario import ODOMETRY, Between, JustAbove, JustBelow, NumberStream, RecordedStream, Scenario, Span
+from grader.core.scenario import ODOMETRY, Between, JustAbove, JustBelow, Scenario, Span
 from grader.rubrics.loader import MAX_BYTES, MAX_MISTAKES, RubricMistakes, read_rubric
+from grader.stimuli.numbers import NumberStream
+from grader.stimuli.recorded import RecordedStream
 
 GOOD = """\
 schema: grader/rubric/v1

@@ -20,9 +20,10 @@ import msgspec
 
 from grader.core.errors import EvidenceError
 from grader.core.report import BroughtPackage, Environment
-from grader.core.scenario import ODOMETRY, RecordedStream, Scenario
+from grader.core.scenario import ODOMETRY, Scenario
 from grader.core.submission import Definition, StudentFile
 from grader.files import replace_file
+from grader.stimuli.recorded import RecordedStream
 
 #: Describes the run and lists its recordings; written last.
 MANIFEST = "evidence.json"

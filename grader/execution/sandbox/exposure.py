@@ -174,7 +174,8 @@ def worker_view(runtime: PythonRuntime, folder: Path) -> WorkerView:
     package = Path(grader.__file__).resolve().parent
     read = (*runtime.read_paths, runtime.executable, *runtime.library_paths, *runtime.python_paths)
     hidden = tuple(secrets_within(view_of(read).bound, runtime.python_paths))
-    own = tuple(package / name for name in ("__init__.py", "api.py", "core", "simulation", "student_host", "execution"))
+    parts = ("__init__.py", "api.py", "core", "simulation", "stimuli", "student_host", "execution")
+    own = tuple(package / name for name in parts)
     return WorkerView(read, hidden, own, (folder,))
 
 
