@@ -13,11 +13,13 @@ from grader.core.trace import Fault, FaultKind, Mark
 from grader.execution.notes import Places
 from grader.execution.plan import Plan
 from grader.execution.sandbox.start import OUTGROWN
-from grader.student_host.faults import GRADERS
+from grader.student_host.faults import GRADERS, TEXT_CHARACTERS
 
-TEXT_CHARACTERS, FRAMES = 500, 20
+#: The most frames of an exception that are read from the report of a process.
+FRAMES = 20
 #: Processor seconds that a node may use until it first blocks, including its imports, and later between two blocks.
 START_CPU_S = 10.0
+#: Later there are no imports; a callback that takes longer hangs for everybody who waits for the node.
 WAKE_UP_CPU_S = 5.0
 #: Real seconds that a node may wait for something that is neither ROS nor time, such as a keyboard.
 BLOCKED_S = 5.0

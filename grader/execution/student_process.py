@@ -21,6 +21,7 @@ from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.quantities import size
 from grader.core.trace import Fault, FaultKind, LogRecord, OutputLine, Start, WrittenFile
+from grader.execution.console import TEXT_CHARACTERS
 from grader.execution.ending import ended_by, exited, graders_fault, limit_behind
 from grader.execution.notes import Places, hidden_notes, note_of, start_of
 from grader.execution.sandbox.protocol import Command
@@ -55,8 +56,6 @@ READ_BYTES, LOOK_MS = 1 << 16, 1000
 WRITTEN_NAME_CHARACTERS = 200
 #: How much of the end of standard error is kept to find out why a process ended.
 LAST_BYTES = 16_000
-#: Longer lines and log messages are cut.
-TEXT_CHARACTERS = 4000
 #: Real seconds that a process has to end by itself after the stop signal.
 GRACE_S = 0.2
 #: Real seconds to wait for the exit code of a process that has closed its connection, as it does when it ends: a busy

@@ -67,6 +67,8 @@ SPARE_CPU_S = 3
 LOOK_S = 0.05
 #: The largest valid answer: this size, or this multiple of the size of the messages that may be in it.
 ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
+#: A worker that fails for a reason of the machine succeeds at the second time; one that fails twice in the same way is
+#: due to the submission, or to a fault of the grader.
 TRIES = 2
 MODULE = b"grader.execution.worker_main"
 #: pid, user and group of the sender of a message (`struct ucred`, unix(7)).

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Check, Criterion, Exercise, Variant
-from grader.core.limits import Limits
+from grader.core.limits import MAX_RUBRIC_BYTES, Limits
 from grader.core.quantities import duration
 from grader.core.rubric_files import rubric_file
 from grader.core.scenario import (
@@ -203,8 +203,6 @@ def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: Yam
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
-#: Largest rubric file, in bytes.
-MAX_BYTES = 256 * 1024
 
 #: The key of a ROS parameter file that holds the parameters of a node.
 PARAMETERS_KEY = "ros__parameters"
@@ -418,15 +416,15 @@ def _content(path: Path) -> bytes:
         if not stat.S_ISREG(mode):
             raise RubricError(f"{where}: expected a rubric file, found something that is not a regular file")
         with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+            content = file.read(MAX_RUBRIC_BYTES + 1)
     except (FileNotFoundError, NotADirectoryError):
         raise RubricError(f"{where}: expected a rubric file, found nothing there", "check the path") from None
     except OSError as error:
         raise RubricError(f"{where}: cannot be read: {error.strerror}") from None
     except ValueError:
         raise RubricError(f"{where}: expected a path, found one with a null character") from None
-    if len(content) > MAX_BYTES:
-        raise RubricError(f"{where}: expected at most {MAX_BYTES // 1024} KiB, found more")
+    if len(content) > MAX_RUBRIC_BYTES:
+        raise RubricError(f"{where}: expected at most {MAX_RUBRIC_BYTES // 1024} KiB, found more")
     return content
 
 

@@ -95,6 +95,8 @@ def _follow(path: Path) -> tuple[Path | None, dict[Path, str]]:
 # not map others.
 STUDENT_GROUP = 61234
 STUDENT_USERS = range(61234, 65234)
+#: Drawing again finds a free user among 4,000 as long as a few are free. After that one is shared, and the limit of its
+#: processes with it.
 TRIES = 1000
 
 

@@ -29,7 +29,7 @@ from grader.judging.findings import (
 )
 from grader.judging.logs.outputs import Output, is_no_node, numbers_in, printed_lines, shape_of, student_records
 from grader.judging.plots import Drawing, Plot
-from grader.judging.values import JITTER_NS, number_at, published
+from grader.judging.values import JITTER_NS, LONGEST_MATCHED, number_at, published
 from grader.judging.wording import listed, moment, number, quote, span
 
 
@@ -93,7 +93,6 @@ class UsesLogger:
 
 
 _LEVELS = ("DEBUG", "INFO", "WARN", "ERROR", "FATAL")
-_LONGEST = 2_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +184,7 @@ class LogsMatching:
         return rank == 0 if self.exactly else rank >= 0
 
     def _matches(self, output: Output) -> bool:
-        return self.pattern is None or re.search(self.pattern, output.text[:_LONGEST]) is not None
+        return self.pattern is None or re.search(self.pattern, output.text[:LONGEST_MATCHED]) is not None
 
     def _flaw(self, found: Sequence[Output]) -> str:
         if len(found) < self.at_least or (self.at_most is not None and len(found) > self.at_most):
