@@ -86,9 +86,11 @@ class ActionResult:
             return ("accepted, expected that it is rejected", "") if accepted else ("", "")
         if not accepted:
             return f"rejected, expected that it {_ends(self.status)}", "accept the goal: GoalResponse.ACCEPT"
+        # By the id: results come in the order in which goals end, not in which they were sent.
         mine = next((r for r in results if _goal_id(r.request.value) == _goal_id(goal.request.value)), None)
         if mine is None or mine.response is None:
             running = self.within is not None and goal.request.t_ns + self.within >= trace.stop_ns
+            # The request for the result was sent, so the server had accepted; it may still be at work.
             if mine is not None and running:
                 raise HarnessError(f"{self.action}: the recording ends before the result is due")
             return f"no result in {span(trace.stop_ns - goal.request.t_ns)}", ""
@@ -98,6 +100,7 @@ class ActionResult:
         assert mine.response is not None
         took = mine.response.t_ns - goal.request.t_ns
         ended = status_of(mine.response)
+        # The status before the content: a goal that was canceled has another result by right.
         if ended != self.status:
             return f"{ended}, expected that it {_ends(self.status)}", _FINISH_HINTS.get(self.status, "")
         result = mine.response.value.get("result")
@@ -154,6 +157,7 @@ class ActionFeedback:
         for place, goal in enumerate(accepted, 1):
             mine = [m for m in messages if _goal_id(m.value) == _goal_id(goal.request.value)]
             counts.append(len(mine))
+            # In this order: without messages there is no content, and with wrong content the pace does not matter.
             flaw = self._count_flaw(mine) or self._content_flaw(mine) or self._pace_flaw(mine)
             if flaw:
                 evidence = {"goals": len(accepted), "feedback": counts}
@@ -198,6 +202,7 @@ class ActionFeedback:
         if self.period is None or len(mine) < 2:
             return ""
         average = (mine[-1].t_ns - mine[0].t_ns) / (len(mine) - 1)
+        # The slack keeps the edge inside, which floating point would put outside now and then.
         if abs(average - self.period) <= self.tolerance * self.period * (1 + 1e-9):
             return ""
         wanted = f"{number(seconds(self.period))} s ± {number(100 * self.tolerance)} %"
@@ -232,6 +237,7 @@ def _size(message: Message, path: str | None) -> float | None:
 def _unless_crashed(trace: Trace, finding: Finding, goal: Call) -> Finding:
     """Return the finding, or the fault after the goal was sent that explains it."""
     fault = first_fault(trace)
+    # A fault before the goal did not keep the server from answering it, or there would be no such goal.
     if fault is None or fault.t_ns < goal.request.t_ns:
         return finding
     return faulted(fault, finding.reason, finding.evidence)
