@@ -104,6 +104,7 @@ class ServicePeers:
     def remove_server(self, now_ns: int, server: PlannedServer) -> None:
         """Destroy a server, if it still exists; its open requests stay unanswered."""
         served = self._servers.get(server.service)
+        # The plan may have put another server in its place since.
         if served is not None and served.plan is server:
             del self._servers[server.service]
             self._ends.remove_server(server.service)
@@ -173,6 +174,7 @@ class ServicePeers:
     def take(self) -> Counter[str]:
         """Take the requests and responses that have arrived, and return their number by channel."""
         came: Counter[str] = Counter()
+        # Taken from the middleware and not yet recorded: without a bound, a flood would fill the worker.
         if len(self._arrived) > UNREAD:
             return came  # a flood: what has arrived is enough to end the recording
         for service in list(self._servers):
@@ -187,6 +189,7 @@ class ServicePeers:
 
     def record(self, now_ns: int) -> None:
         """Record everything that was taken, in the order in which it was sent, and schedule the responses."""
+        # By the time of sending: the middleware hands over the requests of two clients in any order.
         arrived, self._arrived = sorted(self._arrived, key=lambda a: (a.sent_ns, a.service)), []
         for one in arrived:
             if one.header is None:
@@ -199,14 +202,17 @@ class ServicePeers:
         if served is None or 0 < served.plan.answers < served.taken:
             return  # the request before this one ended the server
         plan, number = served.plan, self._numbered(request.service, STUDENT)
+        # Numbered before it is known whether its content is kept: a request that is too large counts.
         value, size = self._content(request.message)
         self._recorder.exchange(Request(now_ns, plan.service, plan.type, number, STUDENT, 0, value), size)
         known = size <= self._message_bytes
+        # A simulation decides first; a plan has responses only for servers of its own.
         response = self._simulated(now_ns, request.service, value) if known else None
         response = plan.response(served.taken) if response is None else response
         if response is not None:
             served.unanswered[number] = (request.header, response)
             self._later(Respond(now_ns + plan.delay_ns, plan, number))
+        # Counted last: the index of the response is the number of requests before this one.
         served.taken += 1
 
     def answer(self, now_ns: int, server: PlannedServer, number: int) -> bool:
@@ -231,6 +237,7 @@ class ServicePeers:
         interface = self.calls()[response.service]
         answer = Response(now_ns, response.service, interface, number, STUDENT, response.client, value)
         self._recorder.exchange(answer, size)
+        # A goal that was refused has no result, and nothing that could be canceled.
         for delay_ns, following in call.then if value.get("accepted") else ():
             self._later(Ask(now_ns + delay_ns, following))
 
