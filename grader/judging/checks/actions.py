@@ -358,6 +358,7 @@ class LifecycleStates:
     def _state_flaw(self, trace: Trace, asked: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         if not self.states:
             return None
+        # Fewer requests than states: the recording ended early, or the rubric asks too rarely.
         if len(asked) < len(self.states):
             asked_said = f"the state was requested {len(asked)} times, expected {len(self.states)}"
             if crashed := explain_fault(trace, asked_said, evidence, last=True):
@@ -375,6 +376,7 @@ class LifecycleStates:
         jitter = JITTER_NS[trace.clock]
         spans = _active(changes, trace.stop_ns)
         times = [m.t_ns for m in published(trace, topic)]
+        # On the wall clock, the response to a transition and a message may be recorded in the wrong order.
         stray = next((t for t in times if not any(a - jitter <= t <= b + jitter for a, b in spans)), None)
         if stray is not None:
             reason = f"{moment(stray)}, {topic}: a message while the node is not active"
@@ -382,6 +384,7 @@ class LifecycleStates:
             return not_met(
                 reason, evidence | {"first_stray_s": seconds(stray)}, hint=hint, problem=ProblemKind.TOO_MANY
             )
+        # In every interval: a node that publishes after its first activation only has lost its timer or publisher.
         mute = next(((a, b) for a, b in spans if not any(a <= t <= b for t in times)), None)
         if mute is None:
             return None
@@ -397,6 +400,7 @@ class LifecycleStates:
         if self.node is not None and self.node not in nodes:
             reason, problem = f"{self.node}: not in the ROS graph", ProblemKind.OTHER_NAME
             return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=problem)
+        # A lifecycle node was there, so that the scenario lacks its stimuli.
         if any(e.service.endswith("/change_state") for e in trace.service_ends("service")):
             raise HarnessError("the recording requests neither a transition nor a state")
         reason = "the program has no lifecycle node, so no transition can be requested"
@@ -408,6 +412,7 @@ def _label(call: Call) -> str:
     if not isinstance(transition, Mapping):
         return "?"
     label, number = transition.get("label"), transition.get("id")
+    # The label decides, as in the request itself: shutdown has three numbers.
     if isinstance(label, str) and label:
         return quote(label, 30)
     return _TRANSITIONS.get(number, "?") if isinstance(number, int) else "?"

@@ -74,6 +74,7 @@ class UsesLogger:
         records = student_records(trace, self.process)
         lines = printed_lines(trace, self.process)
         evidence = {"process": self.process, "records": len(records), "printed_lines": len(lines)}
+        # Without any output, the missing log is the first thing to say; the missing node has criteria of its own.
         if (records or lines) and is_no_node(trace, self.process):
             return no_node(trace, self.process, evidence)
         if records:

@@ -51,6 +51,7 @@ class ServiceAvailable:
     def judge(self, trace: Trace) -> Finding:
         answers = [r for r in trace.responses(self.service, "student") if r.type == self.type]
         ends = [e for e in trace.service_ends("service", self.service) if e.type == self.type]
+        # A response proves the server even if the graph was never looked at while it was there.
         if not answers and all(end.unusual for end in ends):
             return explain_no_server(trace, self.service, self.type)
         node = quote(ends[0].node) if ends else "a node"

@@ -311,6 +311,7 @@ def _ms(duration_ns: int) -> str:
 def _no_input(trace: Trace, topic: str) -> Finding:
     if crashed := explain_fault(trace, f"nothing had been published on {topic} by then"):
         return crashed
+    # There was input, and none of it could be judged: the recording is too short.
     if trace.deliveries(topic) or published(trace, topic):
         raise HarnessError(f"{topic}: no input was published early enough in {span(trace.stop_ns)}")
     return waiting_for("publishes", explain_no_message(trace, topic))
