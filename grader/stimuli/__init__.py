@@ -14,7 +14,7 @@ from grader.stimuli.server import ServiceServer
 from grader.stimuli.simulation import Simulated
 
 #: Every kind. Values are drawn in this order, and of two events at one instant, that of the kind listed first comes
-#: first: an evidence of earlier versions has the same values and the same order.
+#: first: in another order, a seed that somebody noted would give other values.
 KINDS: tuple[type[Stimulus], ...] = (
     NumberStream,
     RecordedStream,
