@@ -9,6 +9,7 @@ repository, reports and charts, is made when the site is built: `<!-- site: TEXT
 
 from __future__ import annotations
 
+import ast
 import inspect
 import io
 import re
@@ -28,6 +29,7 @@ from ruamel.yaml import YAML
 from grader import api
 from grader.app.explain import explain_checks, explain_rubrics
 from grader.cli.main import app
+from grader.core import quantities
 from grader.core.chart import Chart, Panel
 from grader.core.exercise import Criterion, Exercise
 from grader.core.report import CheckExplanation, CriterionExplanation, Parameter, Report
@@ -362,6 +364,78 @@ def _as_markdown(doc: str) -> str:
     return "\n".join(lines)
 
 
+# --- limits -----------------------------------------------------------------------------------------------------------
+
+#: Names of constants that bound something.
+_BOUND = re.compile(
+    r"_?(MOST|MAX|LONGEST|LARGEST|DEEPEST)(_|$)|.*(?<!NS_PER)_(BYTES|CHARACTERS|S|NS|MS|LIMIT|TRIES)$|_?(TRIES|DEPTH)$"
+)
+#: Packages whose bounds only shorten what is shown.
+_SHOWN = ("grader/reporting/", "grader/mutation/", "grader/ros_packages/")
+_UNITS = {name: value for name, value in vars(quantities).items() if isinstance(value, int)}
+
+
+def limits() -> str:
+    """Return a table of the constants that bound time, memory, sizes and counts, with their reasons, by module."""
+    made = []
+    for path in sorted((ROOT / "grader").rglob("*.py")):
+        place = path.relative_to(ROOT).as_posix()
+        rows = [] if place.startswith(_SHOWN) else list(bounds(path.read_text(encoding="utf-8")))
+        if rows:
+            table = "\n".join(f"| `{names}` | {value} | {_cell(why)} |" for names, value, why in rows)
+            made.append(f"\n### `{place}`\n\n| limit | value | why |\n|---|---|---|\n{table}\n")
+    return "".join(made)
+
+
+def bounds(source: str) -> Iterator[tuple[str, str, str]]:
+    """Yield the bounds in the text of a module: their names, their values in words, and the comment above each."""
+    lines = source.split("\n")
+    for node in ast.parse(source).body:
+        if not isinstance(node, (ast.Assign, ast.AnnAssign)) or node.value is None:
+            continue
+        target = node.targets[0] if isinstance(node, ast.Assign) else node.target
+        names = [
+            one.id for one in (target.elts if isinstance(target, ast.Tuple) else [target]) if isinstance(one, ast.Name)
+        ]
+        values = _numbers(node.value)
+        if len(values) == len(names) and any(map(_BOUND.fullmatch, names)):
+            said = ", ".join(_amount(name, value) for name, value in zip(names, values, strict=True))
+            yield ", ".join(names), said, _comment_above(lines, node.lineno - 1)
+
+
+def _comment_above(lines: list[str], index: int) -> str:
+    found: list[str] = []
+    while lines[index - 1 - len(found)].startswith("#"):
+        found.insert(0, lines[index - 1 - len(found)].lstrip("#: "))
+    return " ".join(found) or lines[index].partition("  # ")[2]
+
+
+def _numbers(node: ast.expr) -> list[float]:
+    """Return the numbers of an expression; none if it has another value."""
+    parts = node.elts if isinstance(node, ast.Tuple) else [node]
+    found = []
+    for part in parts:
+        named = {one.id for one in ast.walk(part) if isinstance(one, ast.Name)}
+        if not named <= _UNITS.keys() or not all(isinstance(one, _ARITHMETIC) for one in ast.walk(part)):
+            return []
+        value = eval(compile(ast.Expression(part), "limits", "eval"), {}, _UNITS)  # noqa: S307 - numbers and operators
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return []
+        found.append(value)
+    return found
+
+
+_ARITHMETIC = (ast.Constant, ast.Name, ast.Load, ast.BinOp, ast.UnaryOp, ast.operator, ast.unaryop)
+
+
+def _amount(name: str, value: float) -> str:
+    if name.endswith("BYTES"):
+        return quantities.size(int(value))
+    if name.endswith("_NS"):
+        return quantities.duration(int(value))
+    return f"{value:,} s" if name.endswith("_S") else f"{value:,}"
+
+
 # --- exercises --------------------------------------------------------------------------------------------------------
 
 
@@ -462,6 +536,7 @@ NAMES: Mapping[str, Callable[[], str]] = {
     "gallery": gallery,
     "examples": examples,
     "interface": interface,
+    "limits": limits,
 }
 
 _PART = re.compile(r"(<!-- generated: (\w+) -->)\n.*?(<!-- end of generated: \2 -->)", re.DOTALL)

@@ -176,6 +176,13 @@ def test_a_message_that_nothing_says_is_found() -> None:
     assert len(_messages()) > 30
 
 
+def test_every_limit_has_its_reason() -> None:
+    """In a comment above it, which the page about limits shows."""
+    rows = [line for line in generated.limits().splitlines() if line.startswith("| `")]
+    assert len(rows) > 200
+    assert [row for row in rows if row.endswith("|  |")] == []
+
+
 @pytest.mark.parametrize("document", [d for d in DOCUMENTS if "<!-- generated: " in (ROOT / d).read_text("utf-8")])
 def test_what_is_generated_is_current(document: str) -> None:
     """`python docs/generated.py` renews it."""
@@ -194,7 +201,7 @@ def test_an_old_part_is_noticed() -> None:
 
 def test_the_site_names_every_command_option_check_and_key() -> None:
     """The pages are made from the code; nothing of it is left out."""
-    commands, checks, grammar, gallery, examples, interface = (make() for make in generated.NAMES.values())
+    commands, checks, grammar, gallery, examples, interface, _ = (make() for make in generated.NAMES.values())
     for name, command in app.commands.items():
         described = [parameter for parameter in command.params if not getattr(parameter, "hidden", False)]
         options = [option for parameter in described for option in parameter.opts if option.startswith("--")]

@@ -12,8 +12,8 @@ from grader.app.bags import recording_digest
 from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest, command_words, reproduction
 from grader.cli import main
-from grader.core.scenario import ODOMETRY, TimedMessage
-from grader.execution.bag import Recording
+from grader.core.scenario import ODOMETRY
+from grader.stimuli.recorded import Recording, TimedMessage
 
 
 def test_the_seed_is_named_even_if_nobody_asked_for_one() -> None:

@@ -37,9 +37,7 @@ S = 1_000_000_000
 
 
 def job(scenario: str = "alone", **fields: Any) -> Job:
-    return Job(
-        scenario, Plan(scenario, (("a.py", "a.py"),), "/", "00", 10 * S, "/x", 60 * S, (), (), "virtual", **fields)
-    )
+    return Job(scenario, Plan(scenario, (("a.py", "a.py"),), "/", "00", 10 * S, "/x", 60 * S, "virtual", **fields))
 
 
 def trace(clock: ClockKind = ClockKind.VIRTUAL, *, rate_hz: float = 20.0, value: float = 1.0, **fields: Any) -> Trace:

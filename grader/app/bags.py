@@ -12,10 +12,11 @@ from grader.compiled import compiled, state_of
 from grader.core.errors import RecordingError
 from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S
-from grader.core.scenario import ODOMETRY, RecordedStream
+from grader.core.scenario import ODOMETRY
 from grader.core.shipped import PACKAGE, shipped
-from grader.execution.bag import Define, Least, Recording, read_bag, topics_in
+from grader.execution.bag import Define, Least, read_bag, topics_in
 from grader.rubrics.builtin import builtin_recording
+from grader.stimuli.recorded import RecordedStream, Recording, recordings_in
 from grader.submissions.collected import listed, shown
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ ENOUGH = Least(messages=20, span_ns=5 * NS_PER_S)
 def read_recordings(request: GradeRequest, exercises: Iterable[Exercise]) -> Recordings:
     """Read what the scenarios of some exercises play; raises RecordingError."""
     folders = dict.fromkeys(Path(one) for exercise in exercises for one in exercise.interfaces)
-    streams = [stream for exercise in exercises for stream in exercise.recorded]
+    streams = [stream for exercise in exercises for stream in recordings_in(exercise)]
     return recordings_of(streams, (*folders, *request.interfaces), request.bags)
 
 
@@ -86,7 +87,7 @@ def replacement(stream: RecordedStream, given: Iterable[tuple[str, Path]]) -> Pa
 
 def refuse_unplayed(given: Iterable[tuple[str, Path]], exercises: Sequence[Exercise]) -> None:
     """Raise RecordingError for a recording on a topic on which no exercise of the rubrics plays one."""
-    played = {stream.topic for exercise in exercises for stream in exercise.recorded}
+    played = {stream.topic for exercise in exercises for stream in recordings_in(exercise)}
     for topic, path in given:
         if topic.startswith("/") and topic not in played:
             where = f"--recording {shown(topic)}={shown(str(path), 500)}"
@@ -112,7 +113,7 @@ def _own(stream: RecordedStream, define: Define) -> Recording:
 
 @cache
 def _shipped(path: Path, topic: str, type_: str) -> Recording:
-    code = (PACKAGE / name for name in ("execution/bag.py", "core/scenario.py"))
+    code = (PACKAGE / name for name in ("execution/bag.py", "stimuli/recorded.py"))
     name = hashlib.sha256(f"{path.name} {topic} {type_}".encode()).hexdigest()[:8]
     files = path.iterdir() if path.is_dir() else [path]
     return compiled(f"recording-{name}", state_of([*files, *code]), lambda: read_bag(path, topic, type_))

@@ -27,6 +27,7 @@ from grader.submissions.foreign_archives import install_command, is_installed
 
 #: Messages that the trial node sends, one every 0.1 s starting at 0.1 s, and how long it is observed.
 TRIAL_MESSAGES = 10
+#: Half a period more than the last message: the trial ends between two of them.
 TRIAL_NS = NS_PER_S + NS_PER_S // 20
 TRIAL_TOPIC = "/trial"
 TRIAL_NODE = f"""\

@@ -14,29 +14,14 @@ from grader.core.errors import GraderError
 from grader.core.exercise import Criterion, Exercise
 from grader.core.quantities import Unit, duration
 from grader.core.report import CheckExplanation, CriterionExplanation, Parameter
-from grader.core.scenario import (
-    ActionGoal,
-    AnyOrder,
-    Count,
-    CountBetween,
-    MessageStream,
-    NumberStream,
-    Scenario,
-    ServiceCalls,
-    ServiceServer,
-    Simulated,
-    SomeOf,
-    Stimulus,
-    Time,
-    TimeBetween,
-    cases,
-)
+from grader.core.scenario import Scenario
 from grader.judging.run_check import check_name
 from grader.rubrics.check_parameters import Manual, manual_of
 from grader.rubrics.draws import First
 from grader.rubrics.exercise_checks import known_checks
 from grader.rubrics.loader import own_checks
 from grader.rubrics.units import format_quantity
+from grader.stimuli.phrases import time_phrase
 
 #: Most names suggested for an unknown one.
 OFFERED = 3
@@ -163,58 +148,11 @@ def _unit(annotation: object) -> Unit | None:
 def _situation(scenario: Scenario) -> str:
     """Describe in one sentence what runs, for how long, and what the grader publishes meanwhile."""
     span = scenario.span
-    text = f"{' and '.join(scenario.processes)} observed for {_time(span.duration_ns)}"
+    text = f"{' and '.join(scenario.processes)} observed for {time_phrase(span.duration_ns)}"
     if span.after_first_message_on:
         text += f" from the first message on {span.after_first_message_on} on"
         text += f", which is waited for at most {duration(span.wait_at_most_ns)}"
-    return "; ".join([text, *map(_stimulus, scenario.stimuli)])
-
-
-def _stimulus(stimulus: Stimulus) -> str:  # noqa: PLR0911  one for each kind
-    if isinstance(stimulus, NumberStream):
-        pace = f"one every {duration(stimulus.period_ns)}, each value for {_time(stimulus.hold_ns)}"
-        return f"the grader publishes {_cases(stimulus.values, 'values')} on {stimulus.topic}, {pace}"
-    if isinstance(stimulus, MessageStream):
-        pace = f"one every {duration(stimulus.period_ns)} from {_time(stimulus.start_ns)} on"
-        times = "" if stimulus.repeats == 1 else f", each {_count(stimulus.repeats)} times"
-        return f"the grader publishes {_cases(stimulus.values, 'messages')}{times} on {stimulus.topic}, {pace}"
-    if isinstance(stimulus, ServiceServer):
-        answers = f" with {_cases(stimulus.responses, 'responses')}" if _is_open(stimulus.responses) else ""
-        return f"the grader offers the service {stimulus.service}{answers} from {_time(stimulus.start_ns)} on"
-    if isinstance(stimulus, ServiceCalls):
-        who = "a client" if stimulus.clients == 1 else f"{stimulus.clients} clients"
-        times = "once" if stimulus.calls == 1 else f"{_count(stimulus.calls)} times"
-        pace = f"{times} from {_time(stimulus.start_ns)} on, every {duration(stimulus.period_ns)}"
-        return f"{who} of the grader's calling {stimulus.service} {pace}"
-    if isinstance(stimulus, ActionGoal):
-        then = f", and cancels it {duration(stimulus.cancel_after_ns)} later" if stimulus.cancel_after_ns else ""
-        return f"a client of the grader's sends {stimulus.action} a goal at {_time(stimulus.start_ns)}{then}"
-    if isinstance(stimulus, Simulated):
-        return f"the simulation {stimulus.name} reacts to what is published"
-    played = f"from {_time(stimulus.start_ns)} on for {_time(stimulus.duration_ns)}"
-    return f"the grader plays recorded {stimulus.type} on {stimulus.topic}, {played}"
-
-
-def _time(time: Time) -> str:
-    """Return a time in words; of a drawn one, both ends."""
-    if not isinstance(time, TimeBetween):
-        return duration(time)
-    return f"{duration(time.low_ns)} to {duration(time.high_ns)} (drawn)"
-
-
-def _count(count: Count) -> str:
-    return f"{count.low} to {count.high} (drawn)" if isinstance(count, CountBetween) else str(count)
-
-
-def _cases(items: tuple[object, ...], what: str) -> str:
-    """Describe how many cases there are, and whether their order is drawn."""
-    low, high = cases(items)
-    order = " in a drawn order" if _is_open(items) else ""
-    return f"{low if low == high else f'{low} to {high}'} {what}{order}"
-
-
-def _is_open(items: tuple[object, ...]) -> bool:
-    return any(isinstance(item, (AnyOrder, SomeOf)) for item in items)
+    return "; ".join([text, *(stimulus.phrase() for stimulus in scenario.stimuli)])
 
 
 def unknown(

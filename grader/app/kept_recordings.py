@@ -9,6 +9,7 @@ from grader.core.exercise import Exercise
 from grader.core.trace import Trace
 from grader.execution.evidence.manifest import scenario_digest
 from grader.execution.evidence.store import Evidence, run_of
+from grader.stimuli.recorded import recordings_in
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,7 @@ def recorded_alike(evidence: Evidence, exercises: Sequence[Exercise], planned: P
         if exercise.id in asked
         and found.issuperset(exercise.files)
         and all(asked[exercise.id].get(s.id) == scenario_digest(s) for s in exercise.scenarios)
-        and (manifest.run.recording == planned.recording or not exercise.recorded)
+        and (manifest.run.recording == planned.recording or not recordings_in(exercise))
     )
 
 

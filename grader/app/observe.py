@@ -17,7 +17,7 @@ from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S
 from grader.core.report import Summary
-from grader.core.scenario import RecordedStream, Scenario, Span, is_launch_file
+from grader.core.scenario import Scenario, Span, is_launch_file
 from grader.core.submission import Submission
 from grader.core.trace import Trace
 from grader.execution.launching import NODES
@@ -27,6 +27,7 @@ from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
 from grader.judging.summary import summarise
 from grader.judging.values import student_endpoints
+from grader.stimuli.recorded import RecordedStream
 from grader.submissions.sources import source_text
 
 #: When a given recording starts playing; before that the nodes receive nothing of it.

@@ -37,6 +37,7 @@ from grader.reporting.formats import known
 from grader.reporting.json_report import ReportData, dumps, report_to_json
 from grader.reporting.rejudged import RejudgedResult, ReportChange, change
 from grader.rubrics.draws import First
+from grader.stimuli.recorded import recordings_in
 
 #: With fewer submissions than this for each process, another process does not pay off.
 WORTH_A_POOL = 16
@@ -102,7 +103,7 @@ def judged_again(evidence: Evidence, exercises: Sequence[Exercise], request: Gra
     given = Reproduction(
         command=command_words(request, run.seed),
         rubrics=run.reproduce.rubrics,
-        recording=played if any(exercise.recorded for exercise in exercises) else "",
+        recording=played if any(recordings_in(exercise) for exercise in exercises) else "",
     )
     submission = replace(run.submission, path=request.submission)
     return judge_run(exercises, replace(run, submission=submission, reproduce=given), pictures=True)

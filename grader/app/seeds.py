@@ -33,7 +33,9 @@ _SEED_SCHEME = b"grader/seed/v1\n"
 _VARIANT_SCHEME = "grader/variant/v1"
 #: 48 bits: exact in every JSON reader, short enough to type, and too many to try in a student's process.
 _HEX_DIGITS = 12
+#: How many random bytes a new key is made from: 256 bits, as many as the hash has that it goes into.
 _KEY_BYTES = 32
+#: So many bytes of a hash choose a value of a variant: a remainder of 128 bits favours none of them noticeably.
 _VARIANT_BYTES = 16
 
 

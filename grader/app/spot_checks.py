@@ -15,7 +15,6 @@ from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind, Trace
 from grader.execution.plan import Plan, derive
 from grader.execution.recording_session import WALL
-from grader.execution.stimuli import schedule
 from grader.execution.supervisor import Job
 from grader.judging.agreement import Difference, differences, sentence, start_of
 
@@ -49,7 +48,7 @@ def shortened(plan: Plan, virtual: Trace, judge: BeginningJudge) -> Plan:
         first_ns = messages[0].t_ns if messages else watched_ns
         watched_ns, waited_ns = min(plan.duration_ns, watched_ns), min(plan.wait_at_most_ns, first_ns + PATIENCE_NS)
         return replace(bare, duration_ns=watched_ns, wait_at_most_ns=waited_ns, shutdown_ns=0)
-    begins_ns = min((due.t_ns for due in schedule(plan) if due.t_ns > 0), default=0)
+    begins_ns = min((due.t_ns for due in plan.events() if due.t_ns > 0), default=0)
     watched_ns = begins_ns + judge.length_ns(virtual, begins_ns)
     return replace(bare, duration_ns=min(plan.duration_ns, watched_ns), shutdown_ns=0)
 

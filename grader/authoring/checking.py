@@ -16,13 +16,15 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError, RecordingError, RubricError
 from grader.core.exercise import Criterion, Exercise, named, roles_of
 from grader.core.quantities import duration
-from grader.core.scenario import RecordedStream, Scenario, Simulated, is_launch_file, shortest
+from grader.core.scenario import Scenario, is_launch_file, shortest
 from grader.judging.checks import CHECKS
 from grader.rubrics.check_parameters import manual_of
 from grader.rubrics.draws import First
 from grader.rubrics.loader import RubricMistakes, read_rubric
 from grader.rubrics.simulations import Offered, offered
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlTree, read_yaml
+from grader.stimuli.recorded import RecordedStream
+from grader.stimuli.simulation import Simulated
 from grader.submissions.collected import shown
 
 #: The points of a rubric should add up to a multiple of this, for easy arithmetic.

@@ -27,7 +27,7 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError, RubricError, SubmissionError
 from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S, seconds
-from grader.core.scenario import ODOMETRY, Scenario, Simulated
+from grader.core.scenario import ODOMETRY, Scenario
 from grader.core.trace import FaultKind, Trace
 from grader.judging.findings import fault_sentence
 from grader.judging.values import carries_number, student_endpoints
@@ -35,6 +35,7 @@ from grader.judging.wording import quote
 from grader.rubrics.exercise_checks import known_checks
 from grader.rubrics.loader import RubricMistakes, read_rubric
 from grader.rubrics.simulations import offered
+from grader.stimuli.simulation import Simulated
 
 _VALUES = (1, 2, 3, 4)
 _CALLS = 3

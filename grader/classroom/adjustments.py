@@ -17,6 +17,7 @@ from grader.rubrics.mistakes import mistakes_of, nearest
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
 from grader.submissions.collected import listed, shown
 
+#: A file of some thousand students with reasons has less.
 MAX_BYTES = 1 << 20
 _AMOUNT = re.compile(r"(\d{1,6}(?:\.\d{1,6})?)\s*(%|points?)")
 #: A number as people write it in this file: other forms that YAML reads as numbers are too easily misread.

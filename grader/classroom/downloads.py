@@ -15,11 +15,11 @@ from pathlib import Path
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import ClassError, HarnessError
+from grader.core.limits import MAX_ARCHIVE_BYTES
 from grader.files import write_whole
 from grader.submissions.archives import (
     ARCHIVE_SUFFIXES,
     HEAD_BYTES,
-    MAX_ARCHIVE_BYTES,
     archive_kind,
     is_tar,
     tar_members,
@@ -133,7 +133,9 @@ def _common(labels: Sequence[str]) -> str:
 
 #: Largest download, its largest unpacked size (on disk; in memory for a compressed tar), and most entries.
 MAX_DOWNLOAD_BYTES = 1 << 30
+#: A zip archive is unpacked to the disk, member by member.
 MAX_UNPACKED_BYTES = 4 << 30
+#: A compressed tar archive is unpacked in memory.
 MAX_TAR_BYTES = 2 << 30
 MAX_ENTRIES = 300_000
 #: Largest unpacked size of one student's part; grading checks its own limits later.

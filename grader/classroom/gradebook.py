@@ -316,6 +316,7 @@ COLUMNS = (
     "bonus",
     "decisions",
 )
+#: Spreadsheets hold 32,767 characters in a cell; nobody reads more than this.
 _TEXT_LIMIT = 2_000
 
 

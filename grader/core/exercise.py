@@ -12,7 +12,7 @@ from numbers import Rational, Real
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, TypeGuard
 
 from grader.core.dataclass import dataclass
-from grader.core.scenario import RecordedStream, Scenario
+from grader.core.scenario import Scenario
 from grader.core.trace import Trace
 
 
@@ -403,8 +403,3 @@ class Exercise:
     interfaces: tuple[str, ...] = ()  # paths of the folders with interface packages that the rubric brings
     bonus: Fraction = Fraction(0)  # points above the maximum that an instructor may give
     hints: Iterable[HintRule] = ()  # the rubric's own hint rules, in the order of its files
-
-    @property
-    def recorded(self) -> tuple[RecordedStream, ...]:
-        """The recordings that its scenarios play."""
-        return tuple(stimulus for s in self.scenarios for stimulus in s.stimuli if isinstance(stimulus, RecordedStream))

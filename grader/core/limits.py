@@ -1,4 +1,7 @@
-"""Limits of the students' processes in one scenario, and their descriptions for messages."""
+"""Limits of what others hand in, and of the students' processes in one scenario, with their words for messages.
+
+A limit of a single module is beside what it bounds; `docs/reference/limits.md` lists all of them.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,69 @@ from grader.core.quantities import GIB, KIB, MIB, NS_PER_S, Bytes, DurationNs, L
 #: Default limit, in seconds of real time, for all recordings of one submission together; an ordinary submission takes
 #: 3 to 10 s.
 TIME_BUDGET_S = 300.0
+
+# What others hand in. The grader reads it in processes of its own, so these bound what a single submission, rubric or
+# evidence can cost. The largest of the test submissions has 6 files and 22 KiB, the largest rubric 11 KiB.
+
+#: The most files of a submission. Each is copied and hashed, and is there for every process of the student's.
+MAX_FILES = 2_000
+#: The most bytes of all its files together. Staged copies lie in memory where the temporary folder does.
+MAX_TOTAL_BYTES = 50 << 20
+#: The most bytes of one of them.
+MAX_FILE_BYTES = 8 << 20
+#: The most folders in each other.
+MAX_DEPTH = 20
+#: Entries of any kind that are examined before a folder or an archive is rejected as not being a submission. They are
+#: more than the files, because folders, hidden files and what a build leaves behind count too.
+MAX_ENTRIES = 20_000
+#: The longest path inside a submission: with the staging folder in front, the system rejects longer ones than 4,096.
+MAX_PATH_BYTES = 2_000
+#: The longest name of one file or folder on Linux (NAME_MAX).
+MAX_NAME_BYTES = 255
+
+#: The most bytes of an archive, which is read into memory.
+MAX_ARCHIVE_BYTES = 64 << 20
+#: The most bytes of an unpacked tar archive, with headers and skipped files: a little more than `MAX_TOTAL_BYTES`.
+MAX_UNPACKED_BYTES = 64 << 20
+#: The most bytes of content per byte of archive, once the content exceeds `RATIO_FREE_BYTES`. Deflate packs programs to
+#: a quarter, and a bomb to a thousandth, which is as much as it can.
+MAX_RATIO = 200
+#: So much may come of an archive of any size: an empty map or log of an honest student shrinks like a bomb.
+RATIO_FREE_BYTES = 4 << 20
+#: The largest header that only describes the next member of a tar archive.
+MAX_EXTENDED_BYTES = 64 << 10
+#: The most compressed streams behind each other; parallel compressors write several.
+MAX_STREAMS = 100
+#: The memory of the xz decompressor; `xz -9` needs 65 MiB.
+MAX_XZ_BYTES = 128 << 20
+
+#: Longer program files are not read: for checks and hints they do not exist, and they count as files that look into
+#: their own process.
+MAX_SOURCE_BYTES = 1 << 20
+#: The most bytes of all files that are searched for names by which a program looks into its own process; one with more
+#: counts as such.
+MAX_PROGRAM_BYTES = 4 << 20
+#: Longer programs are not parsed before they run, because nobody writes one by hand. Parsing takes up to 500 bytes of
+#: memory for each byte, in a process that is trusted.
+MAX_PARSED_BYTES = 256 << 10
+
+#: The largest rubric file.
+MAX_RUBRIC_BYTES = 256 << 10
+#: The most cases in a list of a stimulus, and repetitions of one case. A plan holds every one of them.
+MAX_CASES = 1_000
+#: The most clients of the grader that call at the same instant; each is an endpoint of its node.
+MAX_CLIENTS = 20
+#: The most calls of each.
+MAX_CALLS = 1_000
+
+#: The grader never writes a longer manifest of evidence, a longer recording, or a longer trace in one.
+MAX_MANIFEST_BYTES = 64 << 20
+#: The same of a recording.
+MAX_RECORDING_BYTES = 512 << 20
+#: The same of the trace in a recording, unpacked: as much as the largest answer of a worker.
+MAX_TRACE_BYTES = 256 << 20
+
+# What a student's process may use.
 
 #: Address space beyond the memory limit: libraries, and thread stacks and memory pools that stay empty.
 ADDRESS_SPACE_BEYOND = 3 * GIB // 2

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import field
-from typing import Annotated, Any
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
-from grader.core.quantities import NS_PER_S, ActionType, Kind, MessageType, ServiceType, Topic
+from grader.core.quantities import NS_PER_S, Kind, Topic
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,49 +124,9 @@ class JustBelow:
     limit: float
 
 
-NumberSpec = float | Between | JustAbove | JustBelow
-#: A number, or several numbers with an order.
-NumberItem = NumberSpec | AnyOrder | InOrder | SomeOf
-
-
-@dataclass(frozen=True, slots=True)
-class NumberStream:
-    """A stimulus: numbers published on a topic, each held for a while.
-
-    They are published with the message type that the student's node subscribes to.
-    """
-
-    topic: Topic  # topic name, absolute
-    type: MessageType  # message type if no subscription has another one, e.g. `std_msgs/msg/Float32`
-    values: Annotated[tuple[NumberItem, ...], Kind("numbers")]  # numbers in order
-    period_ns: FixedTime  # time between two messages
-    # How long each number is repeated. If this is drawn, each number gets its own time, and the last one is repeated
-    # until the end of an observation that starts with the scenario.
-    hold_ns: LongTime
-    start_ns: Time  # time of the first message since scenario start
-    # Name of the field that holds the number; by default `data`, or else the only number of a message
-    field: Annotated[str, Kind("field name")] = ""
-
-
 #: The type of messages that the stimulus `odometry` plays and `--odom-bag` replaces. Both are older than `recorded` and
 #: `--recording TYPE=BAG`, and aliases of them.
 ODOMETRY = "nav_msgs/msg/Odometry"
-
-
-@dataclass(frozen=True, slots=True)
-class RecordedStream:
-    """A stimulus: the recorded messages of a topic.
-
-    They are played with their original timing by a publisher that disappears afterwards.
-    """
-
-    topic: Topic  # topic name, absolute
-    type: MessageType  # type of the messages, e.g. `sensor_msgs/msg/LaserScan`
-    # The rosbag2 recording beside the rubric: a folder, or a .mcap or .db3 file. If it has no messages of this type on
-    # the topic, the topic with most of them is played.
-    bag: Annotated[str, Kind("recording")]
-    start_ns: Time  # when the publisher appears and the first message is sent
-    duration_ns: LongTime  # how much of the recording is played; which part is drawn from the seed
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,101 +154,83 @@ FieldsItem = Mapping[str, FieldSpec] | AnyOrder | InOrder | SomeOf
 
 
 @dataclass(frozen=True, slots=True)
-class MessageStream:
-    """A stimulus: messages of one type, one per period; omitted fields keep their defaults."""
+class Event:
+    """One action of a stimulus."""
 
-    topic: Topic  # topic name, absolute
-    # e.g. `std_msgs/msg/String`; unlike that of a number stream, it does not depend on the student's node
-    type: MessageType
-    values: Annotated[tuple[FieldsItem, ...], Kind("messages")] = field(hash=False)  # fields of each message
-    period_ns: FixedTime  # time between two messages
-    start_ns: Time = 0  # time of the first message
-    repeats: Count = 1  # how often each message is sent, once per period; drawn separately for each message
-    stop_ns: TimeOrNever = 0  # when the publisher disappears; 0 for never
-    best_effort: bool = False  # whether it offers only best-effort reliability
-    latched: bool = False  # whether it offers transient-local durability
+    #: Whether it creates a publisher, server or client; at time 0 these come before everything else.
+    creates: ClassVar[bool] = False
+
+    t_ns: int  # time since the scenario's start
 
 
-@dataclass(frozen=True, slots=True)
-class ServiceServer:
-    """A stimulus: a server that answers the student's client; without responses it never answers."""
+class Content(NamedTuple):
+    """Where a planned stimulus holds the fields of messages: one mapping, or a tuple of them."""
 
-    service: Topic  # absolute name
-    type: ServiceType  # e.g. `std_srvs/srv/Trigger`
-    # Fields of each response in order
-    responses: Annotated[tuple[FieldsItem, ...], Kind("messages, or none")] = field(hash=False)
-    start_ns: Time = 0  # when it appears
-    stop_ns: TimeOrNever = 0  # when it disappears; 0 for never
-    delay_ns: Time = 0  # time from a request to its response
-    cycle: bool = False  # whether the responses begin again after the last one; otherwise the last one is repeated
-    # After this many responses it accepts one more request and disappears without answering; 0 for never
-    answers: CountOrNever = 0
+    field: str  # its field that holds them
+    kind: str  # what its type is: `msg`, `srv` or `action`
+    part: str = ""  # the part of that type that has the fields: `Request`, `Response` or `Goal`
 
 
-@dataclass(frozen=True, slots=True)
-class ServiceCalls:
-    """A stimulus: clients that call the student's server; a call waits until the server exists."""
+class Planned:
+    """A stimulus with every value drawn, as plain JSON values; times since the scenario's start."""
 
-    # Absolute name; `~/NAME` is a service of the student's only node. Parameters and lifecycle transitions are calls of
-    # the services behind them.
-    service: Topic
-    type: ServiceType  # e.g. `std_srvs/srv/Trigger`
-    # Fields of each request in order; with fewer requests than calls, they repeat from the first one
-    requests: Annotated[tuple[FieldsItem, ...], Kind("messages")] = field(hash=False)
-    calls: Count = 1  # number of requests of each client
-    # Number of clients; all of them send their k-th call at the same instant
-    clients: Annotated[int, Kind("clients")] = 1
-    period_ns: FixedTime = NS_PER_S  # time between two calls of a client, which does not wait for responses
-    start_ns: Time = 0  # when the clients appear and send their first call
+    __slots__ = ()
+    holds: ClassVar[Content | None] = None
+
+    @property
+    def place(self) -> str:
+        """What it is in a message about a mistake in the fields that it holds, such as `messages on /scan`."""
+        return ""
+
+    def events(self) -> Iterator[Event]:
+        """Yield what happens, in any order; nothing if a program decides in the run what does."""
+        yield from ()
 
 
-@dataclass(frozen=True, slots=True)
-class ActionGoal:
-    """A stimulus: a goal for the student's action server, which may be cancelled later.
+class Stimulus:
+    """Something that the grader does to the student's nodes; each kind is a module of `grader/stimuli/`.
 
-    In the trace it appears as calls of the action's services, `/NAME/_action/send_goal`, `get_result` and
-    `cancel_goal`; feedback and status are messages on `/NAME/_action/feedback` and `/NAME/_action/status`.
+    The fields of a kind are the parameters in rubrics, and its docstring is their manual.
     """
 
-    action: Topic  # absolute name
-    type: ActionType  # e.g. `test_msgs/action/Fibonacci`
-    goal: Fields = field(hash=False)  # fields of the goal
-    start_ns: Time = 0  # when the client appears and sends the goal; it waits for the server, as a real client does
-    cancel_after_ns: TimeOrNever = 0  # time from the acceptance of the goal to the request to cancel it; 0 for never
+    __slots__ = ()
+    #: Its key in rubrics.
+    key: ClassVar[str]
+    #: What the seed makes of it.
+    becomes: ClassVar[type[Planned]]
+    #: Defaults of parameters that the JSON Schema of rubrics shows, where they differ from those of the fields.
+    shown: ClassVar[Mapping[str, Any]] = {}
+    #: Whether it is published in the type that the student's node subscribes with, and its own type is a default.
+    follows_type: ClassVar[bool] = False
 
+    start_ns: Time
 
-@dataclass(frozen=True, slots=True)
-class Simulated:
-    """A stimulus: a participant that reacts to what the student's nodes publish, such as a simulated robot.
+    def planned(self, draws: Any) -> Planned:
+        """Draw every value from the `Draws` of `grader/stimuli/drawing.py`."""
+        raise NotImplementedError
 
-    It exists from the beginning to the end of the observation.
-    """
+    def phrase(self) -> str:
+        """Return what the grader does, as a part of a sentence."""
+        raise NotImplementedError
 
-    name: str  # one of the built-in simulations, or one in the table of the file
-    parameters: Fields = field(hash=False)  # its parameters; those left out keep their defaults
-    path: str = ""  # the author's file with its class, for messages; empty for a built-in one
-    content: bytes = b""  # the text of that file
-    start_ns: int = 0
+    def course_ns(self) -> int:
+        """Return the latest time at which all its cases have been presented; for a server, when it appears."""
+        return longest(self.start_ns)
 
+    def mistakes(self) -> Iterator[tuple[str, str]]:
+        """Yield parameters that do not fit each other: the name of one in rubrics, and what was expected."""
+        if 0 < getattr(self, "stop_ns", 0) <= longest(self.start_ns):
+            yield "stop", "expected a stop after the start"
 
-Stimulus = NumberStream | RecordedStream | MessageStream | ServiceServer | ServiceCalls | ActionGoal | Simulated
-
-
-def longest_course_ns(stimulus: Stimulus) -> int:
-    """Return the latest time at which a stimulus has presented all its cases; for a server, when it appears."""
-    start_ns = longest(stimulus.start_ns)
-    if isinstance(stimulus, NumberStream):
-        return start_ns + cases(stimulus.values)[1] * longest(stimulus.hold_ns)
-    if isinstance(stimulus, MessageStream):
-        return start_ns + cases(stimulus.values)[1] * most(stimulus.repeats) * stimulus.period_ns
-    if isinstance(stimulus, ServiceCalls):
-        return start_ns + most(stimulus.calls) * stimulus.period_ns
-    return start_ns + longest(stimulus.duration_ns) if isinstance(stimulus, RecordedStream) else start_ns
+    def beside(self, folder: str) -> Self:
+        """Return it with the paths of files, which a rubric names relative to its folder."""
+        del folder
+        return self
 
 
 def is_open(stimulus: Stimulus) -> bool:
     """Return whether the seed decides anything besides values: times, counts or orders."""
-    parts = [getattr(stimulus, name) for name in stimulus.__slots__]
+    parts = [getattr(stimulus, one.name) for one in fields(stimulus)]  # type: ignore[arg-type]  # each kind is one
     inside = [item for part in parts if isinstance(part, tuple) for item in part]
     return any(isinstance(part, (TimeBetween, CountBetween, AnyOrder, SomeOf)) for part in (*parts, *inside))
 
@@ -334,12 +276,3 @@ class Scenario:
 def is_launch_file(name: str) -> bool:
     """Return whether a file is a launch file, by its name: `ros2 launch` takes all that end in `launch.py`."""
     return name.endswith("launch.py")
-
-
-@dataclass(frozen=True, slots=True)
-class TimedMessage:
-    """A recorded message to be played."""
-
-    t_ns: int  # time since the start of the stream
-    cdr: bytes  # the message as it goes over the wire (CDR with its 4-byte header)
-    value: Mapping[str, Any]  # the decoded fields, for judging

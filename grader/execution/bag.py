@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 import stat
@@ -16,7 +15,7 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import RecordingError
 from grader.core.quantities import seconds
 from grader.core.releases import DEFAULT
-from grader.core.scenario import TimedMessage
+from grader.stimuli.recorded import Recording, TimedMessage
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -43,26 +42,6 @@ _Raw = tuple[int, bytes]
 _T = TypeVar("_T")
 #: Returns the definition of a message type as in .msg files, those of nested types included; None if unknown.
 Define = Callable[[str], "str | None"]
-
-
-@dataclass(frozen=True, slots=True)
-class Recording:
-    """The recorded messages of one topic.
-
-    Attributes:
-        topic: Absolute name of the recorded topic.
-        type: Type of its messages.
-        messages: In order of receive time, which starts at 0 and strictly increases; at least one.
-    """
-
-    topic: str
-    type: str
-    messages: tuple[TimedMessage, ...]
-
-    @property
-    def span_ns(self) -> int:
-        """Time from the first to the last message."""
-        return self.messages[-1].t_ns
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,25 +85,6 @@ def topics_in(path: Path) -> Mapping[str, str]:
     source = _source(path)
     with _plainly_named(source) as plain:
         return {topic: type_ for topic, type_, _ in _opened(path, plain, _topics)}
-
-
-def window(recording: Recording, *, duration_ns: int, seed: int) -> tuple[TimedMessage, ...]:
-    """Cut a window out of a recording, with times counted from its first message.
-
-    Args:
-        recording: The recording.
-        duration_ns: Minimum time from first to last message of the window; a shorter recording is returned whole.
-        seed: Determines where the window starts.
-    """
-    messages = recording.messages
-    latest_ns = messages[-1].t_ns - duration_ns
-    starts = max(1, sum(m.t_ns <= latest_ns for m in messages))
-    # The word stays the one that was hashed when only odometry was played: the same seed plays the same part.
-    drawn = hashlib.sha256(f"odometry window {seed}".encode()).digest()
-    first = int.from_bytes(drawn[:8], "big") % starts
-    start_ns = messages[first].t_ns
-    stop = next((i for i, m in enumerate(messages) if m.t_ns >= start_ns + duration_ns), len(messages) - 1)
-    return tuple(TimedMessage(m.t_ns - start_ns, m.cdr, m.value) for m in messages[first : stop + 1])
 
 
 def _source(path: Path) -> Path:

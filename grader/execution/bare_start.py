@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from grader.core.limits import Limits
+from grader.core.limits import MAX_PARSED_BYTES, Limits
 from grader.core.trace import LogRecord, OutputLine
 from grader.execution.console import last_traceback
 from grader.execution.plan import PlannedStart
@@ -19,9 +19,6 @@ from grader.execution.sandbox.protocol import Command
 from grader.execution.student_process import NodeProcess
 from grader.student_host.packages import ENTRY_POINT, layout_of, never_true, package_folders, start_of
 
-#: A larger file is not parsed but run as a script: nobody writes one by hand. Parsing takes up to 500 bytes of memory
-#: for each byte, in a process that is trusted.
-MOST_BYTES = 256 << 10
 #: Modules whose functions only prepare the program when a file calls them at the top level.
 _SETTING_UP = frozenset({"sys", "os", "warnings", "random", "logging", "np", "numpy", "signal", "math"})
 _NODES = frozenset({"Node", "LifecycleNode"})
@@ -119,7 +116,7 @@ def _by_import(
 def _parsed(path: Path) -> ast.Module | None:
     try:
         content = path.read_bytes()
-        return ast.parse(content) if len(content) <= MOST_BYTES else None
+        return ast.parse(content) if len(content) <= MAX_PARSED_BYTES else None
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
         return None
 

@@ -27,10 +27,11 @@ from grader.execution.sandbox.environment import PACKAGE, worker_environment
 #: The modules that a node and the host import directly; their own imports are found through sys.modules.
 LOADED = ("rclpy", "rclpy.action", "rclpy.executors", "time_machine", *(f"{name}.msg" for name in MESSAGE_PACKAGES))
 #: Folders of this package that workers and student processes load modules from.
-OWN = tuple(PACKAGE / name for name in ("student_host", "core", "execution", "execution/sandbox"))
+OWN = tuple(PACKAGE / name for name in ("student_host", "core", "stimuli", "execution", "execution/sandbox"))
 #: Layout of a .pyc: magic number, flags, then a hash of the source or its time and size; PEP 552.
 HEADER_BYTES, FLAGS_AT, FIRST_AT, SECOND_AT = 16, 4, 8, 12
 BY_HASH, CHECK_SOURCE = 0b01, 0b10
+#: Importing ROS once takes a second or two; a machine that is busy may take a minute.
 TIMEOUT_S = 120.0
 
 

@@ -15,6 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
+from grader.core.scenario import Planned
 from grader.core.trace import (
     Delivery,
     Fault,
@@ -30,6 +31,7 @@ from grader.core.trace import (
     Start,
     Trace,
 )
+from grader.stimuli import PLANNED
 
 FORMAT = "grader/trace/v1"
 #: The tag of each kind of observation.
@@ -45,6 +47,8 @@ TAGS: Mapping[type, str] = {
     Offer: "offer",
     Mark: "mark",
 }
+#: The key that says of which kind a planned stimulus is.
+_KIND = "is"
 _SCALARS = frozenset({str, int, bool, type(None)})
 #: The number of trailing fields of a fault that are written as one list.
 _DETAILS = 3
@@ -133,7 +137,8 @@ def to_json(value: Any) -> Any:
     """Convert a dataclass to plain JSON values by field name; `from_json` reads them back."""
     kind: Any = type(value)
     if (names := _field_names(kind)) is not None:
-        return {name: to_json(getattr(value, name)) for name in names}
+        tag = {_KIND: kind.__name__} if isinstance(value, Planned) else {}
+        return tag | {name: to_json(getattr(value, name)) for name in names}
     if isinstance(value, tuple):
         return [to_json(item) for item in value]
     if isinstance(value, bytes):
@@ -143,6 +148,8 @@ def to_json(value: Any) -> Any:
 
 def from_json(kind: Any, data: Any) -> Any:
     """Rebuild a value of a type from the output of `to_json`; the sender must be trusted."""
+    if isinstance(kind, type) and issubclass(kind, Planned):
+        kind, data = PLANNED[data[_KIND]], {name: value for name, value in data.items() if name != _KIND}
     if hasattr(kind, "__dataclass_fields__"):
         return kind(**{name: from_json(_hints(kind)[name], value) for name, value in data.items()})
     if get_origin(kind) is tuple:

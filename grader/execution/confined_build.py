@@ -26,6 +26,7 @@ from grader.interfaces.definitions import InterfacePackage
 MODULE = "grader.interfaces.program"
 #: Limits of the process: processor time, real time, memory, the size of a file, and the files and bytes it may write.
 PROCESSOR_S, REAL_S, MEMORY_BYTES, FILE_BYTES = 30, 120.0, GIB, 8 * MIB
+#: What may be there when it has ended: far more than the definitions of a package make.
 MOST_FILES, MOST_BYTES = 4_000, 64 * MIB
 #: The most sentences about definitions, and characters of one.
 MOST_PROBLEMS, PROBLEM_CHARACTERS = 20, 500

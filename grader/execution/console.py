@@ -15,7 +15,7 @@ from grader.core.trace import LogRecord, OutputLine
 
 #: `[INFO] [1767225600.000000000] [node]: text`, the default of RCUTILS_CONSOLE_OUTPUT_FORMAT.
 HEADER = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[(\d{1,12})\.(\d{9})\] \[([^\]]*)\]: (.*)", re.DOTALL)
-#: A longer text is cut.
+#: A longer line, or text of a log record, is cut: up to 50,000 of them are kept.
 TEXT_CHARACTERS = 4000
 TRACEBACK, IN_THREAD = "Traceback (most recent call last):", "Exception in thread "
 #: An exception has no more lines of text than this after its first one.

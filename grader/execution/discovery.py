@@ -9,7 +9,6 @@ from contextlib import nullcontext
 from typing import Any
 
 from grader.core.trace import GraphSnapshot, keeps_within
-from grader.execution.exchanges import PlannedCalls, PlannedMessages
 from grader.execution.machine import Patience
 from grader.execution.observer import Observer
 from grader.execution.ros_names import is_name, is_node_name
@@ -17,6 +16,8 @@ from grader.execution.service_ends import BACKGROUND_TYPES
 from grader.execution.service_peers import ServicePeers
 from grader.execution.student_process import NodeProcess
 from grader.execution.trace_recorder import NAME_CHARACTERS, TraceRecorder
+from grader.stimuli.calls import PlannedCalls
+from grader.stimuli.messages import PlannedMessages
 
 #: The most messages that are believed to be sent between two reports.
 COUNT = 1_000_000
@@ -174,6 +175,8 @@ class Discovery:
         if not self.patience.wait(lambda: self._holds(now_ns, staying), pause_s=GRAPH_PAUSE_S):
             self._recorder.note("an endpoint that a node created was not seen in the graph")
         if not self._departures.wait(lambda: not self._surplus(now_ns, claims), pause_s=GRAPH_PAUSE_S):
+            # What stays in the graph without anybody's claim is left by a process that died, and counts as known from
+            # now on.
             self._strangers = self._strangers + self._surplus(now_ns, claims)
         self.look(now_ns)
         unknown = self._observer.watch(self._recorder.graph.endpoints)
@@ -203,6 +206,7 @@ class Discovery:
         for (reader, topic, sender), count in served.items():
             if count and (reader, topic, sender) not in self._served:
                 announce(students[reader], f"topic {topic}", count)
+        # Forgotten with the subscription: a new one on the same topic gets the kept messages again.
         self._served = set(served)
 
     def offered(self, topic: str) -> dict[str, Any]:
@@ -225,6 +229,7 @@ class Discovery:
     def is_heard(self, topic: str) -> bool:
         """Return whether the publisher of a stimulus is matched with every compatible subscription."""
         writer = self.offered(topic)
+        # The grader watches its own stimuli where a student publishes on the same topic.
         own = sum(writer["reliable"] or not reliable for reliable in self._observer.watching(topic, writer["type"]))
         readers = sum(compatible(writer, c) for s in self._students if not s.ended for c in readers_of(s, topic))
         return self._observer.subscribers_matched(topic) >= int(readers + own)

@@ -13,11 +13,13 @@ from grader.core.trace import Fault, FaultKind, Mark
 from grader.execution.notes import Places
 from grader.execution.plan import Plan
 from grader.execution.sandbox.start import OUTGROWN
-from grader.student_host.faults import GRADERS
+from grader.student_host.faults import GRADERS, TEXT_CHARACTERS
 
-TEXT_CHARACTERS, FRAMES = 500, 20
+#: The most frames of an exception that are read from the report of a process.
+FRAMES = 20
 #: Processor seconds that a node may use until it first blocks, including its imports, and later between two blocks.
 START_CPU_S = 10.0
+#: Later there are no imports; a callback that takes longer hangs for everybody who waits for the node.
 WAKE_UP_CPU_S = 5.0
 #: Real seconds that a node may wait for something that is neither ROS nor time, such as a keyboard.
 BLOCKED_S = 5.0
@@ -64,6 +66,7 @@ def reported_fault(process: str, t_ns: int, data: Any, limits: Limits, places: P
     code = data.get("code")
     hung = _HUNG.get(code) if isinstance(code, str) else None
     kind = FaultKind.SYNTAX_ERROR if code == "syntax_error" else FaultKind.HUNG if hung else FaultKind.EXCEPTION
+    # Codes before words: what an exception says is up to the program.
     text = hung or graders_fault(process, data) or _own_words(data)
     python = sys.version_info[:2] if kind is FaultKind.SYNTAX_ERROR else None
     if python is not None:
@@ -87,6 +90,7 @@ def graders_fault(process: str, data: Any) -> str:
     if not isinstance(data, dict) or data.get("code") != GRADERS:
         return ""
     module, line, kind = data.get("module"), data.get("at"), data.get("type")
+    # From the student's process: only what looks like a module and a line is shown.
     known = isinstance(module, str) and _MODULE.fullmatch(module) and type(line) is int and 0 < line < 10_000
     where = f", {module} line {line}" if known else ""
     what = kind if isinstance(kind, str) and _TYPE.fullmatch(kind) else "Exception"
@@ -152,6 +156,7 @@ def ending(  # noqa: PLR0913 - each comes from another place
         places: The files of the submission.
         stopped: Whether the process had received the stop signal.
     """
+    # Before `may_exit`: after Ctrl-C, other endings are normal than before.
     if stopped and is_normal_stop(report):
         return Mark(t_ns, "stopped", process)
     if process in plan.may_exit and is_free_exit(report):
@@ -194,6 +199,7 @@ def limit_behind(signal: str, last_words: bytes, most_threads: int, used_ns: int
         used_ns: Its processor time when the resource monitor last looked.
         limits: Limits of the process.
     """
+    # By the signal and what was measured; the last words of a program only choose the sentence.
     if signal == "SIGXCPU" and used_ns > HARDLY_ANY * limits.processor_ns:
         return f"stopped at {limits.processor_words()}"
     if signal == "SIGXFSZ":

@@ -8,10 +8,8 @@ import stat
 import warnings
 from pathlib import Path
 
+from grader.core.limits import MAX_PARSED_BYTES
 from grader.student_host.packages import parsed
-
-#: A larger file is left to the student's process and its limits: parsing takes up to 500 bytes of memory for each byte.
-MOST_BYTES = 256 << 10
 
 
 def is_runnable(path: Path) -> bool:
@@ -39,7 +37,8 @@ def text_of(path: Path) -> bytes | None:
         return None
     with open(path, "rb", opener=_without_waiting) as file:
         found = os.fstat(file.fileno())  # it may have been replaced
-        return file.read(MOST_BYTES) if stat.S_ISREG(found.st_mode) and found.st_size <= MOST_BYTES else None
+        is_usual = stat.S_ISREG(found.st_mode) and found.st_size <= MAX_PARSED_BYTES
+        return file.read(MAX_PARSED_BYTES) if is_usual else None
 
 
 def _without_waiting(path: str, flags: int) -> int:

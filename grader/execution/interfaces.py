@@ -141,3 +141,48 @@ def _value(kind: Any, value: Any, part: Any, where: str) -> Any:
 
 def _name(message: Any) -> str:
     return f"{message.__module__.split('.')[0]}/{message.__name__}"
+
+
+#: The numeric types of fields, as the classes of messages name them.
+_NUMBER = re.compile(r"float|double|u?int(8|16|32|64)")
+#: The distance of "just above" from a limit for floating-point types; integers differ by 1. In
+#: single precision, a limit of up to 32,767 and a number that is just above it are still different.
+FRACTION_STEP = 0.001
+
+
+def numeric_field(interface: str, field: str = "") -> tuple[str, bool] | None:
+    """Return the numeric field of a message type, and whether it is an integer; None if there is none.
+
+    Without a field, that is `data`, or else the only number apart from a variance, as in sensor_msgs/msg/FluidPressure.
+    """
+    message = message_class(interface)
+    if message is None:
+        return None
+    kinds: Mapping[str, str] = message.get_fields_and_field_types()
+    if field or "data" in kinds:
+        known = [(field or "data", kinds.get(field or "data", ""))]
+    else:
+        known = [(name, kind) for name, kind in kinds.items() if name != "variance" and _NUMBER.fullmatch(kind)]
+    if len(known) != 1 or not _NUMBER.fullmatch(known[0][1]):
+        return None
+    name, kind = known[0]
+    return name, kind not in ("float", "double")
+
+
+def number_message(interface: str, number: tuple[float, int], field: str = "") -> tuple[Any, Mapping[str, Any]]:
+    """Build a message of a type from a planned number, and return it with its fields; integer types round.
+
+    Raises:
+        ValueError: The type has no numeric field.
+    """
+    found = numeric_field(interface, field)
+    if found is None:
+        raise ValueError(interface)
+    name, whole = found
+    value, side = number
+    message = message_class(interface)()
+    if whole:
+        setattr(message, name, round(value) + side)
+    else:
+        setattr(message, name, float(value) + side * FRACTION_STEP)
+    return message, {name: plain_fields(getattr(message, name))}

@@ -109,6 +109,7 @@ def evaluated(student: NodeProcess, plan: Plan) -> Launched:
         return Launched(fault=Fault(0, student.name, kind, why or _ENDED))
     if graders := graders_fault(student.name, report.get("fault")):
         return Launched(harness_problem=graders)
+    # The grader's own fault was looked for first: it is not the launch file's.
     if "fault" in report:
         return Launched(fault=reported_fault(student.name, 0, report["fault"], plan.limits, student.places))
     return _launched(student.name, report, plan, student.places)
@@ -127,8 +128,10 @@ def _description(student: NodeProcess) -> tuple[dict[str, Any] | None, str]:
                 return None, student.stopped
             if report.get("kind") == "launched":
                 return report, ""
+        # What it writes is read and dropped, because a full pipe would block it.
         student.drain()
         found = families(list(student.roots))
+        # With its children: a launch file may start a program to find something out.
         used = usage(set().union(*found.values()))
         if used.processor_ns > START_CPU_S * NS_PER_S:
             return None, f"did not return within {START_CPU_S:g} s of processor time"
@@ -153,15 +156,18 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
     made = Launched()
     for node in _dicts(report.get("nodes"), NODES):
         package, wanted = _text(node.get("package")), _text(node.get("executable"))
+        # Reported by a process that the student's code shares: only a package that is there is named.
         near = _text(node.get("near")) if has_package(plan.projects, _text(node.get("near"))) else ""
         known_package = has_package(plan.projects, package)
         look = find_executable(root, plan.projects, package, wanted) if known_package else find_loose(root, wanted)
+        # A package that is misspelt is not there, even if a file of the same name lies elsewhere.
         found = None if near else look
         where = _place(name, node, places)
         if found is None or found.file is None:
             if found is None and (why := why_unknown(root, plan.projects, package, wanted)):
                 unstarted.append((f"{where}: {_program(package, wanted)} was not started: {why}", ""))
                 continue
+            # As in ROS, where a launch file that names a program its package lacks starts nothing at all.
             if known_package or near:
                 text = _not_found(package, wanted, found, executables(root, plan.projects), near)
                 file, _, line = where.rpartition(":")
@@ -193,6 +199,7 @@ def _added(  # noqa: PLR0913  what one node consists of
 ) -> Launched:
     """Return the processes with one more."""
     assert found.file is not None
+    # Criteria know processes by the files that the rubric asks for; two of the same get numbers.
     label = known.get(f"{found.file} {found.name}") or known.get(found.file) or launch
     number = sum(1 for _, other in made.labels if other == label)
     process = f"{label} ({number + 1})" if number or label == launch else label
@@ -206,6 +213,7 @@ def _added(  # noqa: PLR0913  what one node consists of
         launched_by=where,
     )
     delay = node.get("delay_s")
+    # Longer than any scenario is never; also NaN fails both comparisons.
     late = isinstance(delay, (int, float)) and 0 < delay < 1e6
     delay_ns = round(delay * NS_PER_S) if isinstance(delay, (int, float)) and late else 0
     return replace(
@@ -241,6 +249,7 @@ def _not_found(package: str, wanted: str, found: Executable | None, known: Seque
 def _command(one: Mapping[str, Any]) -> list[str]:
     """Return the words of a command that was left out; none for anything else, and where a shell may run more."""
     text = _text(one.get("text")) if one.get("code") == "command" else ""
+    # A shell may run anything behind these characters, so that such a command counts as unknown.
     return [] if re.search(r"[;&|`$<>\n]", text) else text.split()
 
 
@@ -299,6 +308,7 @@ def expanded(plan: Plan, launched: Mapping[str, Launched]) -> Plan:
             continue
         processes += made.processes
         starts += made.starts
+        # The delays in a launch file count from its own start.
         begins = late.pop(name, 0)
         late |= {process: begins + delay for process, delay in made.starts_ns if begins + delay}
         may_exit += [process for process, _ in made.processes if name in plan.may_exit]

@@ -9,14 +9,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from grader.core.limits import MAX_FILE_BYTES
 from grader.core.trace import Start, StartWay, main_not_called
 
 #: The full name of a node.
 _NODE = re.compile(r"(?:/[A-Za-z_][A-Za-z0-9_]{0,99}){1,20}")
 #: The highest ROS domain that has ports for its participants.
 MOST_DOMAIN = 232
-#: The size limit of a file in a submission.
-MOST_BYTES = 8 << 20
+#: A longer path in a report is not looked for: the process is not trusted.
 NAME_CHARACTERS = 300
 
 
@@ -55,7 +55,7 @@ class Places:
             with open(path, "rb", opener=_without_waiting) as source:
                 if not stat.S_ISREG(os.fstat(source.fileno()).st_mode):
                     return 0
-                return max(1, len(source.read(MOST_BYTES).splitlines()))
+                return max(1, len(source.read(MAX_FILE_BYTES).splitlines()))
         except (OSError, ValueError):
             return 0
 
@@ -87,6 +87,7 @@ _WHY = {
     "package": "the submission has no such package",
     "parameter_file": "it is not there",
 }
+#: As much of a student's text as fits into a line of a note.
 _QUOTED_CHARACTERS = 80
 
 
@@ -118,6 +119,7 @@ def left_out_sentence(data: Mapping[str, Any]) -> str:
 
 
 _WAYS = {way.value: way for way in StartWay}
+#: The longest name of a function in a note, and the most files that hide modules in one report.
 _NAME_CHARACTERS, _HIDDEN = 100, 20
 #: The dotted name of a module. Folder names may contain spaces, parentheses and hyphens.
 _TARGET = re.compile(r"[\w.() -]{1,300}")

@@ -148,6 +148,7 @@ class Observer:
             for kind, look in looks.items()
             for info in asked(look, topic, nothing=nobody)
         ]
+        # An endpoint without the name of its node is in the next snapshot with it, and would count as two here.
         students = [e for e in ends if e.participant >= 0 and UNKNOWN_NODE not in e.node]
         return GraphSnapshot(t_ns, tuple(nodes), tuple(sorted(students, key=_endpoint_order)), offered)
 
@@ -161,6 +162,8 @@ class Observer:
 
     def _endpoint(self, kind: str, topic: str, info: Any) -> Endpoint:
         own = info.node_name in self._names
+        # The first twelve bytes of an endpoint's GUID are those of its participant, and a process has one for each ROS
+        # context.
         prefix = bytes(info.endpoint_gid[:12])
         number = -1 if own else self._participants.setdefault(prefix, len(self._participants))
         manual = info.qos_profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC
@@ -208,6 +211,7 @@ class Observer:
                 self.crowded = f"more than {PARTICIPANTS} types of messages on {topic[:NAME_CHARACTERS]}"
                 continue
             if known is not None:
+                # What has arrived at the old subscription is taken before it goes.
                 self._left += self._taken(topic, interface, known, DEPTH, AT_ONCE_BYTES)[0]
                 next(node for node in self._nodes if known in node.subscriptions).destroy_subscription(known)
         return unknown
@@ -302,6 +306,7 @@ class Observer:
         """
         taken, self._left = self._left, []
         left_bytes = AT_ONCE_BYTES
+        # Sorted, because subscriptions are made in the order in which discovery happens to tell of publishers.
         for (topic, interface), reader in sorted(self._readers.items()):
             found, left_bytes = self._taken(topic, interface, reader, at_once, left_bytes)
             taken += found
@@ -315,6 +320,7 @@ class Observer:
                 found = reader.handle.take_message(reader.msg_type, True)  # noqa: FBT003
                 if found is None:
                     break
+                # The message that goes beyond is still taken: a single one may be larger than all that is allowed.
                 left_bytes -= len(found[0])
                 sent_ns = int(found[1].get("source_timestamp", 0))
                 taken.append(replace(self._decoded(topic, interface, reader.msg_type, found[0]), sent_ns=sent_ns))

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from rosidl_parser.definition import AbstractSequence, AbstractString, AbstractWString, Array, BasicType
 
+#: Sizes of the header of CDR and of the length before a sequence or text.
 HEADER_BYTES, LENGTH_BYTES = 4, 4
 #: Byte order by the second byte of the header.
 _ORDERS: dict[int, Literal["big", "little"]] = {0: "big", 1: "little"}

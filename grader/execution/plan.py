@@ -8,46 +8,18 @@ import posixpath
 import random
 from collections.abc import Iterable, Iterator, Mapping
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.projects import Project
 from grader.core.quantities import NS_PER_S
-from grader.core.scenario import (
-    ActionGoal,
-    Between,
-    JustAbove,
-    JustBelow,
-    MessageStream,
-    NumberSpec,
-    NumberStream,
-    RecordedStream,
-    RunOptions,
-    Scenario,
-    ServiceCalls,
-    ServiceServer,
-    Simulated,
-    TimeBetween,
-    is_launch_file,
-    shortest,
-)
+from grader.core.scenario import Event, Planned, RunOptions, Scenario, is_launch_file
 from grader.core.trace import Endpoint
-from grader.execution.bag import Recording, window
-from grader.execution.exchanges import (
-    PlannedCalls,
-    PlannedGoal,
-    PlannedMessages,
-    PlannedServer,
-    PlannedSimulation,
-    drawn_time,
-    in_drawn_order,
-    plan_calls,
-    plan_goal,
-    plan_messages,
-    plan_server,
-    plan_simulation,
-)
+from grader.stimuli import KINDS
+from grader.stimuli.drawing import Draws, drawn_time
+from grader.stimuli.events import in_order
+from grader.stimuli.recorded import RecordedStream, Recording
 from grader.student_host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 from grader.student_host.packages import layout_of
 
@@ -57,32 +29,7 @@ if TYPE_CHECKING:
 #: The most characters of what a process is started with, as JSON. It is handed over as one argument of a program, for
 #: which Linux allows 128 KiB (MAX_ARG_STRLEN, execve(2)); a large parameter file of a course has 10.
 MOST_START_CHARACTERS = 64 << 10
-#: A number to publish, or the limit it lies just above (1) or just below (-1) in the student's own type.
-PlannedNumber = tuple[float, int]
-
-
-@dataclass(frozen=True, slots=True)
-class PlannedNumbers:
-    """Numbers to publish in the type that the student's node subscribes with; times since the scenario's start."""
-
-    topic: str
-    type: str
-    start_ns: int
-    period_ns: int
-    repeats: int
-    numbers: tuple[PlannedNumber, ...]
-    field: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class PlannedRecording:
-    """Recorded messages to publish unchanged: `(t_ns, cdr, value)`, with times since the scenario's start."""
-
-    topic: str
-    type: str
-    start_ns: int
-    stop_ns: int
-    messages: tuple[tuple[int, bytes, Mapping[str, Any]], ...]
+Kind = TypeVar("Kind", bound=Planned)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,17 +86,11 @@ class Plan:
         duration_ns: How long to observe.
         first_message_on: Topic whose first message starts the observation, or empty.
         wait_at_most_ns: How long to wait for that message.
-        numbers: Number streams.
-        recordings: Recordings to play.
         clock: `virtual` or `wall`.
+        stimuli: What the grader does, in the order of `KINDS`.
         limits: How much the processes may use, and how much is recorded.
         charged: The share of a program's work for which time passes on the virtual clock; otherwise it stands still.
         stop_when_unfit: Whether a run on the virtual clock may end as soon as virtual time is known to be unsuitable.
-        messages: Message streams.
-        servers: Service servers.
-        calls: Service calls.
-        goals: Action goals.
-        simulations: Participants that react.
         starts_ns: Name and start time of the processes that start late.
         may_exit: Names of the processes that may exit.
         shutdown_ns: How long processes may take to end after the stop signal; 0 to send none.
@@ -180,16 +121,10 @@ class Plan:
     duration_ns: int
     first_message_on: str
     wait_at_most_ns: int
-    numbers: tuple[PlannedNumbers, ...]
-    recordings: tuple[PlannedRecording, ...]
     clock: str
+    stimuli: tuple[Planned, ...] = ()
     limits: Limits = Limits()
     stop_when_unfit: bool = False
-    messages: tuple[PlannedMessages, ...] = ()
-    servers: tuple[PlannedServer, ...] = ()
-    calls: tuple[PlannedCalls, ...] = ()
-    goals: tuple[PlannedGoal, ...] = ()
-    simulations: tuple[PlannedSimulation, ...] = ()
     starts_ns: tuple[tuple[str, int], ...] = ()
     may_exit: tuple[str, ...] = ()
     shutdown_ns: int = 0
@@ -207,6 +142,14 @@ class Plan:
     drawn_order: bool = False
     working: str = ""
     environment: tuple[tuple[str, str], ...] = ()
+
+    def of(self, kind: type[Kind]) -> tuple[Kind, ...]:
+        """Return the stimuli of a kind."""
+        return tuple(one for one in self.stimuli if isinstance(one, kind))
+
+    def events(self) -> list[Event]:
+        """Return what happens, sorted by time, apart from what simulations do."""
+        return in_order(event for stimulus in self.stimuli for event in stimulus.events())
 
     def start_of(self, process: str) -> PlannedStart:
         """Return what a process is started with."""
@@ -269,10 +212,12 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
     course = random.Random(derive(seed, "course", exercise, scenario.id))  # noqa: S311 - it has to repeat
     duration_ns = drawn_time(scenario.span.duration_ns, course)
     until_ns = 0 if scenario.span.after_first_message_on else duration_ns
-    draw = random.Random(derive(seed, *purposes))  # noqa: S311 - as above
-    numbers = tuple(_numbers(s, draw, own, until_ns) for s, own in drawn if isinstance(s, NumberStream))
-    played = tuple(
-        _recording(s, recordings[s], draw.getrandbits(32), own) for s, own in drawn if isinstance(s, RecordedStream)
+    shared = random.Random(derive(seed, *purposes))  # noqa: S311 - as above
+    stimuli = tuple(
+        stimulus.planned(Draws(own, shared, until_ns, recordings))
+        for kind in KINDS
+        for stimulus, own in drawn
+        if isinstance(stimulus, kind)
     )
     return Plan(
         scenario=scenario.id,
@@ -282,18 +227,12 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         duration_ns=duration_ns,
         first_message_on=scenario.span.after_first_message_on or "",
         wait_at_most_ns=scenario.span.wait_at_most_ns,
-        numbers=numbers,
-        recordings=played,
         clock=clock,
+        stimuli=stimuli,
         epoch_ns=EPOCH_NS + _drawn(EPOCH_SPAN_S, seed, "epoch") * NS_PER_S,
         uptime_ns=UPTIME_NS + _drawn(UPTIME_SPAN_S, seed, "uptime") * NS_PER_S,
         hash_seed=1 + _drawn(_HASH_SEEDS, seed, "hashes", exercise, scenario.id) if own_hashes else 0,
         limits=scenario.limits,
-        messages=tuple(plan_messages(s, source) for s, source in drawn if isinstance(s, MessageStream)),
-        servers=tuple(plan_server(s, source) for s, source in drawn if isinstance(s, ServiceServer)),
-        calls=tuple(plan_calls(s, source) for s, source in drawn if isinstance(s, ServiceCalls)),
-        goals=tuple(plan_goal(s, source) for s, source in drawn if isinstance(s, ActionGoal)),
-        simulations=tuple(plan_simulation(s, source) for s, source in drawn if isinstance(s, Simulated)),
         starts_ns=tuple((name, drawn_time(t_ns, course)) for name, t_ns in scenario.starts_ns),
         may_exit=scenario.may_exit,
         shutdown_ns=scenario.shutdown_ns,
@@ -367,49 +306,3 @@ _HASH_SEEDS = 2**32 - 1
 
 def _drawn(below: int, seed: int, *purpose: str) -> int:
     return int(derive(seed, *purpose)[:16], 16) % below
-
-
-def _numbers(stream: NumberStream, draw: random.Random, own: random.Random, until_ns: int) -> PlannedNumbers:
-    """Draw the numbers of a stream.
-
-    Args:
-        stream: The stream to plan.
-        draw: Draws the numbers of all streams of the scenario.
-        own: Draws all other random values of this stream.
-        until_ns: When the observation ends; 0 if that is not known.
-    """
-    start_ns = drawn_time(stream.start_ns, own)
-    numbers = tuple(_number(spec, draw) for spec in in_drawn_order(stream.values, own))
-    repeats = max(1, shortest(stream.hold_ns) // stream.period_ns)
-    if isinstance(stream.hold_ns, TimeBetween) and numbers:
-        each = [max(1, drawn_time(stream.hold_ns, own) // stream.period_ns) for _ in numbers]
-        # a node may switch off when messages stop, so the last number is repeated until the observation ends
-        each[-1] = max(each[-1], -(-(until_ns - start_ns) // stream.period_ns) - sum(each[:-1]))
-        numbers, repeats = tuple(n for n, times in zip(numbers, each, strict=True) for _ in range(times)), 1
-    return PlannedNumbers(stream.topic, stream.type, start_ns, stream.period_ns, repeats, numbers, stream.field)
-
-
-def _number(spec: NumberSpec, draw: random.Random) -> PlannedNumber:
-    if isinstance(spec, Between):
-        if float(spec.low).is_integer() and float(spec.high).is_integer():
-            return float(draw.randint(int(spec.low), int(spec.high))), 0
-        # Two decimals: exactly what a student's "%.2f" shows.
-        return round(draw.uniform(spec.low, spec.high), 2), 0
-    if isinstance(spec, JustAbove):
-        return spec.limit, 1
-    if isinstance(spec, JustBelow):
-        return spec.limit, -1
-    return spec, 0
-
-
-def _recording(stream: RecordedStream, recording: Recording, seed: int, own: random.Random) -> PlannedRecording:
-    start_ns, duration_ns = drawn_time(stream.start_ns, own), drawn_time(stream.duration_ns, own)
-    messages = window(recording, duration_ns=duration_ns, seed=seed)
-    kept = tuple((start_ns + m.t_ns, m.cdr, m.value) for m in messages if m.t_ns <= duration_ns)
-    return PlannedRecording(
-        topic=stream.topic,
-        type=stream.type,
-        start_ns=start_ns,
-        stop_ns=kept[-1][0] + 1 if kept else start_ns,
-        messages=kept,
-    )

@@ -101,6 +101,7 @@ class RecordingSession:
         from grader.execution.unrunnable import trace_without_run  # noqa: PLC0415 - after a worker has been started
 
         budget = budget or RealTimeBudget()
+        # What no interpreter can run needs no worker.
         known = {key: trace for key, job in jobs.items() if (trace := trace_without_run(job.plan)) is not None}
         to_run = {key: job for key, job in jobs.items() if key not in known}
         first = [Job(job.title, replace(job.plan, stop_when_unfit=clock == AUTO), budget) for job in to_run.values()]
@@ -116,9 +117,11 @@ class RecordingSession:
             traces[key] = trace
             if not (_unfit(trace, clock) or _doubtful(trace, clock)):
                 tell(key, trace)
+        # After all others, so that these recordings do not take processors from first ones.
         doubtful = {key: jobs[key] for key, trace in traces.items() if _doubtful(trace, clock)}
         charged = self._charged(doubtful, budget, progress)
         for key, trace in charged.items():
+            # The first recording stays, because its times are those of a machine that is fast enough.
             if keeps_pace(traces[key], trace):
                 tell(key, traces[key])
             else:
@@ -128,7 +131,9 @@ class RecordingSession:
                 tell(key, traces[key])
                 continue
             again = Job(f"{jobs[key].title}, on the wall clock", replace(jobs[key].plan, clock=WALL), budget)
+            # One at a time: nodes on the wall clock that run beside each other delay each other.
             repeated = replace(self.recorder.record([again], progress)[0], clock_reason=traces[key].clock_reason)
+            # Only where work was the reason: a program that waits for something outside needs the wall clock.
             if traces[key].may_drift and _was_held_up(repeated):
                 repeated = self._counted(jobs[key], traces[key], repeated, charged.get(key), budget, progress)
             tell(key, repeated)
@@ -180,6 +185,7 @@ class RecordingSession:
 
 def workers_for(processors: int, more: int = MORE_ALONE) -> int:
     """Return how many scenarios of one submission to record in parallel on so many processors."""
+    # More than processors, because a recording also waits for discovery, which takes no processor time.
     return min(max(1, processors) + more, MOST_WORKERS)
 
 

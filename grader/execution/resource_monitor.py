@@ -104,6 +104,7 @@ class ResourceMonitor:
         self._held: dict[int, Held] = {}
         self._last_pid = ""
         self._started_ns = time.monotonic_ns()
+        # What this process has filled and used before is not due to these nodes.
         self._own_bytes = usage([os.getpid()]).memory_bytes
         self._own_ns = time.process_time_ns()
         self._over = threading.Event()
@@ -142,6 +143,7 @@ class ResourceMonitor:
     def starved_ns(self) -> int:
         """Real time that the nodes have lost to other programs on this machine, in nanoseconds."""
         processors = len(os.sched_getaffinity(0))
+        # Nodes that use so much of the machine wait for each other, which is their own fault.
         their_own = self._used_ns > OWN_SHARE * processors * self.real_ns
         return 0 if their_own else min(self._waited_ns, self.real_ns)
 
@@ -157,6 +159,7 @@ class ResourceMonitor:
                 self._look_for_waiting()
             much = self._look_at_sockets(looks, search=search)
             before, used_bytes = used_bytes, self._look()
+            # Rarely while nothing grows, so that the looks cost nodes no time; at once again when something does.
             intervals = 1 if much or used_bytes > before + GROWTH_BYTES else min(2 * intervals, LONGEST)
 
     def _look_at_sockets(self, looks: int, *, search: bool) -> bool:
@@ -187,9 +190,12 @@ class ResourceMonitor:
             held = self._held.get(student.process.pid, Held())
             used = usage(self._families.get(student.process.pid, ()))
             used = replace(used, memory_bytes=used.memory_bytes + held.memory_bytes)
+            # Sockets before memory, in which they are counted too: the limit that is named is the one to do something
+            # about.
             self._hold(student, _held_too_much(held))
             student.most_threads = max(student.most_threads, used.threads)
             student.most_bytes = max(student.most_bytes, used.memory_bytes)
+            # The largest of all looks: what a child has used leaves the sum when it ends and nobody waits for it.
             student.used_ns = max(student.used_ns, used.processor_ns)
             self._hold(student, self._reached(used))
             used_bytes += used.memory_bytes
@@ -212,6 +218,7 @@ class ResourceMonitor:
         if self._ending:
             return
         real_ns = self.real_ns
+        # The budget of the submission first: the limit of a scenario says nothing when hardly any of it was left.
         if self._budget is not None and real_ns > self._budget.left_ns:
             self._end_time(self._budget.words)
         elif real_ns > self._limits.wall_ns:

@@ -8,29 +8,21 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
+from grader.core.scenario import Event
 from grader.core.trace import ClockKind, Mark, Observation, Trace
 from grader.execution.ending import never_stopped, reported_fault
-from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer, Taken
 from grader.execution.plan import Plan
 from grader.execution.service_peers import ServicePeers
 from grader.execution.simulations import Simulations
-from grader.execution.stimuli import (
-    AddClients,
-    AddServer,
-    Ask,
-    Event,
-    RemoveServer,
-    Respond,
-    Step,
-    TopicEvent,
-    in_order,
-    schedule,
-)
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import TopicPeers
 from grader.execution.trace_recorder import TraceRecorder
 from grader.simulation.participant import Moment
+from grader.stimuli.calls import AddClients, Ask, PlannedCalls
+from grader.stimuli.events import TopicEvent, in_order
+from grader.stimuli.server import AddServer, RemoveServer, Respond
+from grader.stimuli.simulation import Step
 
 
 class Runner(ABC):
@@ -55,7 +47,8 @@ class Runner(ABC):
         self._stop_ns = 0
         self._starts_ns = dict(plan.starts_ns)
         self._simulations = Simulations(plan)
-        self._due = in_order([*schedule(plan), *self._simulations.events()])
+        # Simulations last: of two events at one instant, that of the plan comes first.
+        self._due = in_order([*plan.events(), *self._simulations.events()])
         participants = max(plan.limits.participants, len(plan.processes))  # each process needs one
         self._recorder = TraceRecorder(replace(plan.limits, participants=participants))
         self._services = ServicePeers(
@@ -71,9 +64,11 @@ class Runner(ABC):
         """Run the plan to its end and return the trace."""
         self._begin()
         self._run_on()
+        # The graph before the stop signal, which takes nodes out of it.
         self._recorder.look_back(self._last_look())
         self._stop_ns = self._end_ns
         unfit = self._unfit()
+        # A recording that is not judged, or has ended early, shows nothing about the end of its programs.
         if self._plan.shutdown_ns and not (unfit or self._recorder.full):
             self._shut_down()
         return Trace(
@@ -84,6 +79,7 @@ class Runner(ABC):
             observations=self._observations(),
             notes=self._recorder.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
             starts=tuple(s.start_told for s in self._students if s.start_told is not None),
+            # The grader's own fault first: it says more than that the machine was busy.
             harness_problem=self._graders_fault() or self._harness_problem(),
             incomplete=self._is_incomplete(),
             may_drift=self._may_drift(),
@@ -147,6 +143,7 @@ class Runner(ABC):
 
     def _shut_down(self) -> None:
         """Send the stop signal to every process, and continue until all have ended."""
+        # No stimuli after the stop signal: they would wake nodes that are about to end.
         self._due, self._end_ns = [], self._time_ns() + self._plan.shutdown_ns
         for student in self._students:
             if not student.ended:
@@ -162,10 +159,12 @@ class Runner(ABC):
         return all(s.ended for s in self._students) and not any(isinstance(d, (TopicEvent, Step)) for d in self._due)
 
     def _record(self, now_ns: int, taken: Taken, *, early: bool = False) -> None:
+        # Before the message is recorded, after which its topic has been seen.
         first = taken.topic == self._plan.first_message_on and not self._recorder.seen(taken.topic)
         if first and not self._stop_ns:
             self._end_ns = now_ns + self._plan.duration_ns
         self._recorder.message(now_ns, taken, early=early)
+        # Not after the end: a simulation would go on reacting to nodes that are about to leave.
         if self._simulations.exist and not (self._recorder.full or self._stop_ns):
             for event in self._simulations.hear(taken, self._moment(now_ns)):
                 self._later(event)
@@ -188,6 +187,7 @@ class Runner(ABC):
 
     def _later(self, event: Event) -> None:
         """Schedule an event, after all others that are due at the same time."""
+        # To the right of what is due at the same time: causes before effects.
         bisect.insort(self._due, event, key=lambda e: e.t_ns)
 
     def _do(self, event: Event, now_ns: int) -> None:

@@ -8,14 +8,15 @@ from dataclasses import field
 from typing import Any
 
 from grader.core.dataclass import dataclass
+from grader.core.scenario import Event
 from grader.core.trace import Mark, Request, Response
-from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedGoal, PlannedServer
 from grader.execution.interfaces import built, plain_fields, wanted_class
 from grader.execution.observer import size_of
 from grader.execution.plan import Plan
 from grader.execution.service_ends import Arrived, ServiceEnds
-from grader.execution.stimuli import Ask, Event, Respond
 from grader.execution.trace_recorder import TraceRecorder
+from grader.stimuli.calls import Ask, PlannedCall, PlannedCalls
+from grader.stimuli.server import PlannedServer, Respond
 
 #: The most requests and responses that are held before they are recorded.
 UNREAD = 50_000
@@ -103,6 +104,7 @@ class ServicePeers:
     def remove_server(self, now_ns: int, server: PlannedServer) -> None:
         """Destroy a server, if it still exists; its open requests stay unanswered."""
         served = self._servers.get(server.service)
+        # The plan may have put another server in its place since.
         if served is not None and served.plan is server:
             del self._servers[server.service]
             self._ends.remove_server(server.service)
@@ -172,6 +174,7 @@ class ServicePeers:
     def take(self) -> Counter[str]:
         """Take the requests and responses that have arrived, and return their number by channel."""
         came: Counter[str] = Counter()
+        # Taken from the middleware and not yet recorded: without a bound, a flood would fill the worker.
         if len(self._arrived) > UNREAD:
             return came  # a flood: what has arrived is enough to end the recording
         for service in list(self._servers):
@@ -186,6 +189,7 @@ class ServicePeers:
 
     def record(self, now_ns: int) -> None:
         """Record everything that was taken, in the order in which it was sent, and schedule the responses."""
+        # By the time of sending: the middleware hands over the requests of two clients in any order.
         arrived, self._arrived = sorted(self._arrived, key=lambda a: (a.sent_ns, a.service)), []
         for one in arrived:
             if one.header is None:
@@ -198,14 +202,17 @@ class ServicePeers:
         if served is None or 0 < served.plan.answers < served.taken:
             return  # the request before this one ended the server
         plan, number = served.plan, self._numbered(request.service, STUDENT)
+        # Numbered before it is known whether its content is kept: a request that is too large counts.
         value, size = self._content(request.message)
         self._recorder.exchange(Request(now_ns, plan.service, plan.type, number, STUDENT, 0, value), size)
         known = size <= self._message_bytes
+        # A simulation decides first; a plan has responses only for servers of its own.
         response = self._simulated(now_ns, request.service, value) if known else None
         response = plan.response(served.taken) if response is None else response
         if response is not None:
             served.unanswered[number] = (request.header, response)
             self._later(Respond(now_ns + plan.delay_ns, plan, number))
+        # Counted last: the index of the response is the number of requests before this one.
         served.taken += 1
 
     def answer(self, now_ns: int, server: PlannedServer, number: int) -> bool:
@@ -230,6 +237,7 @@ class ServicePeers:
         interface = self.calls()[response.service]
         answer = Response(now_ns, response.service, interface, number, STUDENT, response.client, value)
         self._recorder.exchange(answer, size)
+        # A goal that was refused has no result, and nothing that could be canceled.
         for delay_ns, following in call.then if value.get("accepted") else ():
             self._later(Ask(now_ns + delay_ns, following))
 
@@ -251,27 +259,15 @@ class ServicePeers:
 
 def check_types(plan: Plan) -> None:
     """Check that this machine has every type and field that a plan names; raises HarnessError otherwise."""
-    for stream in plan.messages:
-        where = f"scenario {plan.scenario}, messages on {stream.topic}"
-        message = wanted_class(stream.type, "msg", where)
-        for value in stream.values:
-            built(message, value, where)
-    for server in plan.servers:
-        where = f"scenario {plan.scenario}, server of {server.service}"
-        for value in ({}, *server.responses):
-            built(wanted_class(server.type, "srv", where).Response, value, where)
-    for calls in plan.calls:
-        check_calls(calls, f"scenario {plan.scenario}, calls of {calls.service}")
-    for goal in plan.goals:
-        check_goal(goal, f"scenario {plan.scenario}, goal of {goal.action}")
+    for planned in plan.stimuli:
+        check_fields(planned, f"scenario {plan.scenario}, {planned.place}")
 
 
-def check_calls(calls: PlannedCalls, where: str) -> None:
-    """Check that this machine has the type and the fields of some calls; raises HarnessError otherwise."""
-    for value in calls.requests:
-        built(wanted_class(calls.type, "srv", where).Request, value, where)
-
-
-def check_goal(goal: PlannedGoal, where: str) -> None:
-    """Check that this machine has the type and the fields of a goal; raises HarnessError otherwise."""
-    built(wanted_class(goal.type, "action", where).Goal, goal.goal, where)
+def check_fields(planned: Any, where: str) -> None:
+    """Check that this machine has the type and the fields of a stimulus; raises HarnessError otherwise."""
+    if planned.holds is None:
+        return
+    name, kind, part = planned.holds
+    message, fields = wanted_class(planned.type, kind, where), getattr(planned, name)
+    for value in ({}, *((fields,) if isinstance(fields, Mapping) else fields)):
+        built(getattr(message, part) if part else message, value, where)

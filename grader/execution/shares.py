@@ -8,14 +8,13 @@ import shutil
 from collections.abc import Container, Iterator, Sequence
 from pathlib import Path
 
+from grader.core.limits import MAX_FILES, MAX_TOTAL_BYTES
 from grader.core.projects import Project
-from grader.core.quantities import MIB, size
+from grader.core.quantities import size
 from grader.execution.ros_installation import RosInstallation
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 _INDEX = Path("share", "ament_index", "resource_index", "packages")
-#: The most files and bytes that are installed: those of a whole submission, once. setup.py may install a file twice.
-MOST_FILES, MOST_BYTES = 2_000, 50 * MIB
 
 
 def install_shares(
@@ -76,7 +75,8 @@ class _Copies:
             if self._prefix not in place.parents or not source.is_file() or place.is_file():
                 return True
             self._files, self._bytes = self._files + 1, self._bytes + source.stat().st_size
-            if self._files > MOST_FILES or self._bytes > MOST_BYTES:
+            # As much as a whole submission: setup.py may install one file any number of times
+            if self._files > MAX_FILES or self._bytes > MAX_TOTAL_BYTES:
                 self._full = True
                 return False
             place.parent.mkdir(parents=True, exist_ok=True)
@@ -88,7 +88,7 @@ class _Copies:
     def notes(self) -> Iterator[str]:
         """Yield what could not be installed, as sentences."""
         if self._full:
-            yield f"data_files of setup.py: only {MOST_FILES:,} files and {size(MOST_BYTES)} of them are installed"
+            yield f"data_files of setup.py: only {MAX_FILES:,} files and {size(MAX_TOTAL_BYTES)} of them are installed"
         if self._failed:
             files = "1 file" if len(self._failed) == 1 else f"{len(self._failed):,} files"
             yield f"data_files of setup.py: {files} cannot be installed where it says, as something else is there"

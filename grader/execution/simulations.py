@@ -13,19 +13,20 @@ from typing import Any, TypeVar
 
 from grader.core.author_files import AuthorMistake
 from grader.core.errors import HarnessError
-from grader.core.quantities import NS_PER_MS
-from grader.execution.exchanges import PlannedMessages, PlannedServer, PlannedSimulation
+from grader.core.scenario import Event
 from grader.execution.interfaces import built, wanted_class
 from grader.execution.observer import Taken
 from grader.execution.plan import Plan
-from grader.execution.stimuli import AddServer, Advertise, Event, PublishFields, Step
 from grader.simulation.loading import SimulationError, begin_of, guarded, made
-from grader.simulation.participant import Moment, Output, Simulation
+from grader.simulation.participant import SHORTEST_PERIOD_NS, Moment, Output, Simulation
+from grader.stimuli.messages import Advertise, PlannedMessages, PublishFields
+from grader.stimuli.server import AddServer, PlannedServer
+from grader.stimuli.simulation import PlannedSimulation, Step
 
 Result = TypeVar("Result")
 
-#: The most messages that a simulation may publish in one call, and its shortest period.
-OUTPUTS, SHORTEST_NS = 100, NS_PER_MS
+#: The most messages that a simulation may publish in one call: an author's loop without an end stops here.
+OUTPUTS = 100
 #: How many times as many messages as a student's node a simulation may publish: it may react to several topics.
 BEYOND = 5
 
@@ -42,7 +43,7 @@ class Simulations:
     """
 
     def __init__(self, plan: Plan) -> None:
-        self._all = [_Running(planned, BEYOND * plan.limits.messages) for planned in plan.simulations]
+        self._all = [_Running(planned, BEYOND * plan.limits.messages) for planned in plan.of(PlannedSimulation)]
         self._last_ns = 0
 
     @property
@@ -97,7 +98,7 @@ class _Running:
         self._planned = planned
         self._left = most
         self.simulation = begun or made(planned.name, planned.path, planned.content, planned.parameters)
-        self.period_ns = max(SHORTEST_NS, self.simulation.period)
+        self.period_ns = max(SHORTEST_PERIOD_NS, self.simulation.period)
         self.hears = self._call(lambda: dict(self.simulation.hears()), "hears")
         self.serves = self._call(lambda: dict(self.simulation.serves()), "serves")
         self._streams = {

@@ -12,11 +12,11 @@ from typing import Any
 
 from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_S
+from grader.core.scenario import Event
 from grader.core.trace import Fault, Mark, Observation
-from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedMessages, PlannedServer, goal_call
 from grader.execution.observer import Observer
 from grader.execution.plan import Plan, derive
-from grader.execution.service_peers import check_calls, check_goal
+from grader.execution.service_peers import check_fields
 from grader.execution.steps import (
     Advance,
     Call,
@@ -29,19 +29,15 @@ from grader.execution.steps import (
     Simulate,
     Start,
 )
-from grader.execution.stimuli import (
-    AddClients,
-    AddServer,
-    Advertise,
-    Ask,
-    Disappear,
-    Event,
-    PublishRecorded,
-    TopicEvent,
-)
 from grader.execution.student_process import NodeProcess
 from grader.execution.virtual_runner import VirtualRunner, unfit
 from grader.simulation.participant import Moment, Output, Simulation
+from grader.stimuli.calls import AddClients, Ask, PlannedCall, PlannedCalls
+from grader.stimuli.events import Disappear, TopicEvent
+from grader.stimuli.goals import goal_call
+from grader.stimuli.messages import Advertise, PlannedMessages
+from grader.stimuli.recorded import PublishRecorded
+from grader.stimuli.server import AddServer, PlannedServer
 
 #: Starts the processes of a plan; returns each with the time to wait before it runs, in nanoseconds. What a launch file
 #: asks for and nobody starts is added to the list, as sentences.
@@ -306,13 +302,13 @@ class SteppedRunner(VirtualRunner):
 
     def _call(self, command: Call) -> dict[str, Any]:
         calls = PlannedCalls(command.service, command.type, self._now_ns, NS_PER_S, 1, (command.request,))
-        check_calls(calls, command.service)
+        check_fields(calls, command.service)
         self._do(AddClients(self._now_ns, calls), self._now_ns)
         self._later(Ask(self._now_ns, PlannedCall(calls, 0)))
         return {"client": self._services.clients_of(command.service)}
 
     def _send_goal(self, command: SendGoal) -> dict[str, Any]:
-        check_goal(command.goal, command.goal.action)
+        check_fields(command.goal, command.goal.action)
         call = goal_call(command.goal)
         clients = []
         for part in (call, *(following for _, following in call.then)):

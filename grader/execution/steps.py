@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from grader.core.dataclass import dataclass
-from grader.execution.exchanges import PlannedGoal
 from grader.execution.plan import Plan
+from grader.stimuli.goals import PlannedGoal
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.quantities import size
 from grader.core.trace import Fault, FaultKind, LogRecord, OutputLine, Start, WrittenFile
+from grader.execution.console import TEXT_CHARACTERS
 from grader.execution.ending import ended_by, exited, graders_fault, limit_behind
 from grader.execution.notes import Places, hidden_notes, note_of, start_of
 from grader.execution.sandbox.protocol import Command
@@ -55,8 +56,6 @@ READ_BYTES, LOOK_MS = 1 << 16, 1000
 WRITTEN_NAME_CHARACTERS = 200
 #: How much of the end of standard error is kept to find out why a process ended.
 LAST_BYTES = 16_000
-#: Longer lines and log messages are cut.
-TEXT_CHARACTERS = 4000
 #: Real seconds that a process has to end by itself after the stop signal.
 GRACE_S = 0.2
 #: Real seconds to wait for the exit code of a process that has closed its connection, as it does when it ends: a busy
@@ -172,6 +171,7 @@ class NodeProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
+                # A session of its own: signals to its group, and Ctrl-C at the terminal, reach nobody else.
                 start_new_session=True,
             )
         finally:
@@ -194,6 +194,7 @@ class NodeProcess:
         student._register(line.fileno(), "")
         for stream, source in (("stdout", process.stdout), ("stderr", process.stderr)):
             if source is not None:
+                # A program may write without end, or stop in the middle of a line; neither holds up the worker.
                 os.set_blocking(source.fileno(), False)
                 student._register(source.fileno(), stream)
         return student
@@ -217,6 +218,7 @@ class NodeProcess:
         """Wait for the first report, sent before any of the student's code runs; return whether it is valid."""
         report = self.report() or {}
         token = str(report.get("log_token"))
+        # Checked, although the host sends it: nothing that comes on this socket is believed unchecked.
         self.log_token = token if _TOKEN.fullmatch(token) else ""
         return report.get("kind") == "ready"
 
@@ -228,11 +230,13 @@ class NodeProcess:
 
     def claims_of(self, kind: str, name: str) -> list[dict[str, Any]]:
         """Return the endpoints of a kind and name that the process reports; every node has some services."""
+        # The services of parameters and of types come with a node, and hosts do not report them one by one.
         node = name.rpartition("/")[0] if kind == "service" else ""
         return [c for c in self.claims if (c["kind"], c["name"]) in ((kind, name), ("node", node))]
 
     def note(self, report: Mapping[str, Any]) -> None:
         """Record a note: how the file is started, which comes first, or something that readers must know."""
+        # The first counts: a program that writes to this socket itself could only add another one.
         if report.get("code") == "started":
             if self.start_told is None and (start := start_of(self.name, self.file, report, self.places)):
                 self.start_told = replace(start, arguments=self.arguments, launched_by=self.launched_by)
@@ -252,6 +256,7 @@ class NodeProcess:
         if report.get("kind") == "reached" and len(self.reached) < REACHED:
             self.reached.append(str(report.get("what"))[:NAME_CHARACTERS])
             return True
+        # Once, at its end; more of them come from the program.
         if report.get("kind") == "written" and not self.written:
             self.written = written_files(self.name, report.get("files"))
             return True

@@ -67,6 +67,8 @@ SPARE_CPU_S = 3
 LOOK_S = 0.05
 #: The largest valid answer: this size, or this multiple of the size of the messages that may be in it.
 ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
+#: A worker that fails for a reason of the machine succeeds at the second time; one that fails twice in the same way is
+#: due to the submission, or to a fault of the grader.
 TRIES = 2
 MODULE = b"grader.execution.worker_main"
 #: pid, user and group of the sender of a message (`struct ucred`, unix(7)).
@@ -145,6 +147,7 @@ class Worker(ABC):
         self._interfaces = plan.interfaces
         own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
         request = json.dumps({"plan": to_json(plan), **own}) + "\n"
+        # Of the worker itself: a plan that takes longer gives it more to receive.
         own_s = worker_processor_s(plan.limits, plan.duration_ns + plan.wait_at_most_ns)
         expected = f"worker: expected a trace of {plan.scenario}, found none"
         if self._group is not None:
@@ -170,6 +173,7 @@ class Worker(ABC):
             raise WorkerLostError(f"{expected} (it had used {what})", limit=what) from error
         except EOFError as error:
             end = self._end()
+            # Limits that the kernel or the worker's own monitor enforces end it in these ways.
             limits = {"SIGXCPU": processor_words(own_s), f"code {FULL_CODE}": f"{size(FULL_BYTES)} of memory"}
             limit = limits.get(end, "")
             raise WorkerLostError(f"{expected} (ended by {end})", limit=limit) from error
@@ -185,6 +189,7 @@ class Worker(ABC):
             raise WorkerFailedError(what, has_started=isinstance(answer, dict) and answer.get("has_started") is True)
         self.worn = answer.get("worn") is True
         real_ns, starved_ns = (answer.get(name) for name in ("real_ns", "starved_ns"))
+        # From the worker, which parses what students send: nothing of its answer is believed unchecked.
         if isinstance(real_ns, int) and isinstance(starved_ns, int):
             budget.charge(real_ns, starved_ns)
         return trace_from_json(answer["trace"])
@@ -255,6 +260,7 @@ class Worker(ABC):
             if not found:
                 raise EOFError
             received += found
+            # A worker that was taken over could otherwise fill the supervisor's memory.
             if len(received) > most:
                 raise OSError("its answer did not end")
         return bytes(received)
@@ -563,6 +569,7 @@ class Recorder:
 
     def _recorded_surely(self, job: Job) -> Trace:
         trace = self._recorded(job)
+        # A signal that no limit explains may come from the machine, such as one that is out of memory.
         doubtful = trace.incomplete or any(f.signal for f in trace.faults())
         return self._recorded(job) if doubtful and job.budget.left_ns else trace
 

@@ -7,22 +7,14 @@ from typing import Any
 
 from grader.core.trace import Delivery, Mark
 from grader.execution.discovery import Discovery, announce, readers_of
-from grader.execution.exchanges import PlannedMessages
-from grader.execution.interfaces import built, message_class, plain_fields
+from grader.execution.interfaces import built, message_class, number_message, numeric_field, plain_fields
 from grader.execution.observer import Observer
-from grader.execution.stimuli import (
-    Advertise,
-    Appear,
-    Disappear,
-    PublishFields,
-    PublishNumber,
-    PublishRecorded,
-    TopicEvent,
-    number_message,
-    numeric_field,
-)
 from grader.execution.student_process import NodeProcess
 from grader.execution.trace_recorder import TraceRecorder
+from grader.stimuli.events import Appear, Disappear, TopicEvent
+from grader.stimuli.messages import Advertise, PlannedMessages, PublishFields
+from grader.stimuli.numbers import PublishNumber
+from grader.stimuli.recorded import PublishRecorded
 
 #: How long, on the wall clock, a publisher stays after its last message, which would be lost otherwise.
 LINGER_NS = 400_000_000
@@ -73,7 +65,9 @@ class TopicPeers(ABC):
 
     def follow_type(self, topic: str) -> None:
         """Replace a publisher if the subscriptions of students' nodes ask for another type."""
+        # Looked up each time: subscriptions come and go while a stimulus runs.
         current, asked = self._streams[topic], [interface for interface, _ in self._asked(topic)]
+        # A subscription of the present type suffices: changing to another one's would lose its messages.
         if topic in self._fixed or not asked or current in asked:
             return
         if any(self._carries(interface, topic) for interface in asked):
@@ -87,7 +81,9 @@ class TopicPeers(ABC):
         """Create a publisher as the students' subscriptions ask for it, with type and durability; return if latched."""
         asked = self._asked(topic)
         usable = [interface for interface, _ in asked if interface == default or self._carries(interface, topic)]
+        # The first subscription decides, as it would for a publisher that is written to fit it.
         interface = usable[0] if usable and topic not in self._fixed else default
+        # A subscription that asks for transient local hears no volatile publisher, and a volatile one hears both.
         latched = any(late for found, late in asked if found == interface)
         self._observer.advertise(topic, interface, latched=latched)
         self._streams[topic] = interface
@@ -98,6 +94,7 @@ class TopicPeers(ABC):
         return numeric_field(interface, self._fields.get(topic, "")) is not None
 
     def _publish(self, delivery: Delivery, message: Any) -> None:
+        # Recorded before it is sent, so that no answer to it can be recorded first.
         self._recorder.add(delivery)
         self._observer.publish(delivery.topic, message)
 
@@ -151,6 +148,7 @@ class VirtualTopicPeers(TopicPeers):
         topic = delivery.topic
         self._discovery.published[topic] += 1
         for student in self._students:
+            # Only to those that receive it: a process waits in real time for what is announced.
             if any(self._discovery.takes(reader, topic) for reader in readers_of(student, topic)):
                 announce(student, f"topic {topic}", 1)
 

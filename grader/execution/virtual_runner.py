@@ -12,18 +12,19 @@ from dataclasses import replace
 from typing import Any
 
 from grader.core.quantities import NS_PER_S
+from grader.core.scenario import Event
 from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Observation, Offer
 from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, passes, readers_of
 from grader.execution.ending import ending
-from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer, Taken, in_order
 from grader.execution.plan import Plan
 from grader.execution.runner import Runner
-from grader.execution.stimuli import APPEARANCES, AddServer, Ask, Event, RemoveServer
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import VirtualTopicPeers
 from grader.execution.trace_recorder import NAME_CHARACTERS, OFFERS
 from grader.execution.workload import Workload
+from grader.stimuli.calls import Ask, PlannedCalls
+from grader.stimuli.server import AddServer, RemoveServer
 
 #: The most steps at once, and how many more may come with each second of virtual time; more end the scenario. Nodes
 #: that rest need far fewer: ten with timers of 100 Hz that hear each other take some thousand a second.
@@ -78,6 +79,7 @@ class VirtualRunner(Runner):
                 self._step(student)
 
     def _last_look(self) -> int:
+        # Otherwise two recordings of one program would differ in their last snapshot.
         if not any(s.ended for s in self._students):
             self._discovery.look(self._now_ns)  # the endpoints of an ended process disappear at a random time
         return self._now_ns
@@ -202,12 +204,14 @@ class VirtualRunner(Runner):
         for _ in range(MOST_REPORTS):
             report = student.report()
             kind = None if report is None else report.get("kind")
+            # What the host never sends comes from the program, which then speaks for it.
             if report is None or kind not in ("arrived", "note", "fault", "idle", "exited"):
                 self._mark_dead(student)
                 return
             if kind == "arrived":
                 workload.arrived()
                 continue
+            # Before anything is recorded: the process may have let time pass on its own.
             self._catch_up(report)
             if kind == "note":
                 student.note(report)
@@ -216,6 +220,7 @@ class VirtualRunner(Runner):
             if kind == "fault":
                 self._report_fault(student, report, self._now_ns)
                 continue
+            # Before the messages are collected: waiting for them is the grader's time, not the program's.
             workload.end(report, self._now_ns - began_ns)
             student.leaving = report.get("leaving") is True
             self._account(student, report)
@@ -243,6 +248,8 @@ class VirtualRunner(Runner):
             self._has_lost = True
         if sent := counts(report.get("sent")):
             early = _of_topics(counts(report.get("early")))
+            # In this order: recorded, then announced. A process that answers an announcement must not be recorded
+            # before what it answers.
             self._collect(_of_topics(sent), {t: n for t, n in early.items() if self._is_new(student, t)})
             self._collect_exchanges(student, sent)
             self._forward(student, sent)
@@ -250,6 +257,7 @@ class VirtualRunner(Runner):
         if isinstance(endpoints, list) and report["kind"] == "idle":
             if len(endpoints) > CLAIMS:
                 self._recorder.stop(self._now_ns, f"more than {CLAIMS:,} endpoints and parameters of {student.name}")
+            # Replaced as a whole: the host reports all of its endpoints each time.
             student.claims, student.renewed = [c for c in endpoints[:CLAIMS] if is_claim(c)], True
             student.sees_graph = report.get("sees_graph") is True
             for claim in student.claims:
@@ -257,6 +265,7 @@ class VirtualRunner(Runner):
                     self._appeared_ns.setdefault((student.name, claim.get("number", 0)), self._now_ns)
             self._note_offers(student)
             self._discovery.match(self._now_ns)
+            # A new endpoint may be the server that a call has waited for.
             for due in self._services.ready(self._is_served):
                 self._later(replace(due, t_ns=self._now_ns))
 
@@ -291,11 +300,13 @@ class VirtualRunner(Runner):
             taken = self._observer.take()
             arrived.extend(taken)
             expected.subtract(message.topic for message in taken)
+            # A flood is recorded as it comes, so that the limit of the recording can end it.
             if len(arrived) > MOST_ARRIVED:
                 record_arrived()
             return bool(self._recorder.full) or all(count <= 0 for count in expected.values())
 
         def record_arrived() -> None:
+            # By topic: whose messages arrive first is up to the middleware, and differs from run to run.
             for message in in_order(arrived):
                 self._record(self._now_ns, message, early=first[message.topic] > 0)
                 first[message.topic] -= 1
@@ -388,7 +399,7 @@ class VirtualRunner(Runner):
     def _play(self, *, phase: str = "") -> None:
         """Execute the stimuli that are due; return after each call. In phase `before`, stop at the first message."""
         while self._due and self._due[0].t_ns <= self._now_ns:
-            if phase and not isinstance(self._due[0], APPEARANCES):
+            if phase and not self._due[0].creates:
                 return
             due = self._due.pop(0)
             self._do(due, self._now_ns)

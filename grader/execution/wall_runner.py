@@ -15,25 +15,28 @@ from typing import Any, ClassVar
 from grader.core.quantities import NS_PER_MS
 from grader.core.trace import ClockKind, Mark, Message, Observation
 from grader.execution.ending import ending
-from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer
 from grader.execution.plan import Plan
 from grader.execution.runner import Runner
-from grader.execution.stimuli import Advertise, RemoveServer
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import LINGER_NS, WallTopicPeers
+from grader.stimuli.calls import PlannedCalls
+from grader.stimuli.messages import Advertise
+from grader.stimuli.server import RemoveServer
 
 #: The most messages of a topic, and reads of a stream, in one iteration, so that a flood does not delay the loop.
 MESSAGES_A_LOOK, READS_A_LOOK = 100, 2
-#: The shortest pause between two iterations, and the longest, if nothing arrives; and the longest delay of the loop
-#: before the run counts as invalid.
+#: The shortest pause between two iterations: without one, the loop would take a processor from the nodes.
 PAUSE_S = 0.0002
+#: The longest pause, if nothing arrives: graph and output are only noticed by looking.
 LONGEST_PAUSE_NS = 10 * NS_PER_MS
+#: The longest delay of the loop before the run counts as invalid: the nodes may have been delayed as long.
 HELD_UP_NS = 150 * NS_PER_MS
 #: The most early messages that are distinguished.
 MOST_EARLY = 10_000
 #: How long before its first message a publisher is created, so that subscriptions can discover it.
 LEAD_NS = 300 * NS_PER_MS
+#: How often the graph is looked at: what is there for a shorter time may be missed, and each look delays discovery.
 GRAPH_EVERY_NS = 50 * NS_PER_MS
 
 

@@ -115,7 +115,9 @@ class Worker:
         self._real_ns = self._starved_ns = 0
         sys.path += [folder for folder in plan.interfaces if folder not in sys.path]  # installed packages come first
         started_ns = time.monotonic_ns()
+        # Virtual time does not depend on how busy the machine is, so that a second try would be the same.
         for _ in range(WALL_TRIES if plan.clock == "wall" else 1):
+            # Anew for each try: the limit of the kernel counts from the start of the worker.
             limit_processor_time(own_processor_s(plan))
             spent_ns = time.monotonic_ns() - started_ns
             trace = self._record(plan, domain, Budget(left_ns - spent_ns, budget_words))
@@ -256,6 +258,7 @@ class Worker:
             from grader.execution.observer import Observer  # noqa: PLC0415 - imports rclpy, which takes long
 
             if plan.clock == ClockKind.WALL.value:
+                # Now, and not in the middle of the run, where its import would hold up the loop.
                 late_numpy.load()
 
             observer = Observer(domain, plan.limits)  # while the starter is still busy with imports

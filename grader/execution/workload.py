@@ -115,6 +115,7 @@ class Delay:
             return
         if not self._starting:
             self.wake_ups += 1
+            # Lindley's recursion: what is not done by the next wake-up delays it, and waiting makes up for it.
             self._delay_ns = max(0, self._delay_ns + self._work_ns - (t_ns - self._at_ns))
             self.late += self._work_ns > SLOW_NS or self._delay_ns > LATE_NS
         else:
@@ -147,6 +148,8 @@ class Delay:
     @property
     def hides(self) -> bool:
         """Whether virtual time hides how late the process would be."""
+        # A share, because one slow callback in a thousand is what any node has; and a number, because of few wake-ups
+        # one is a large share.
         late = self.late > max(LATE_AT_LEAST, LATE_SHARE * self.wake_ups)
         return self.hopeless or late or self._outruns or self._certain.exceeds(self._at_ns - self._began_ns)
 
@@ -179,6 +182,7 @@ class Workload:
     """
 
     def __init__(self, root: int, start_ns: int) -> None:
+        # A sandbox is a chain of processes, of which the last is the program.
         self._pid = innermost(root)
         self._clock = _processor_clock(self._pid)
         self._began_ns = self._used_before_ns = self._at_ns = self._forgiven_ns = 0
@@ -198,6 +202,7 @@ class Workload:
             self._count(max(0, used_ns - self._used_before_ns - UNATTENDED_NS))
         self.delay.wake(t_ns)
         self._moved_on, self._at_ns, self._begun = t_ns > self._at_ns or not self._begun, t_ns, True
+        # Forgiven once in each step, or a program could report arrivals to make all of its work free.
         self._may_arrive, self._forgiven_ns = arrivals, 0
         self._began_ns, self._used_before_ns = time.monotonic_ns(), used_ns
 
@@ -219,6 +224,7 @@ class Workload:
         """
         taken_ns = self._taken(threads=bool(report.get("threads")))
         moved = report.get("moved")
+        # The process reports this number: it is worth no more than the time that has passed allows.
         moves = min(max(moved, 0), MOST_POLLS, passed_ns // YIELD_NS) if isinstance(moved, int) else 0
         self.delay.work(max(0, taken_ns - POLL_NS * moves))
         waited_ns = max(0, self._forgiven_ns - ARRIVAL_FREE_NS)
@@ -249,6 +255,7 @@ class Workload:
         real_ns = time.monotonic_ns() - self._began_ns
         before_ns, self._used_before_ns = self._used_before_ns, self._used()
         used_ns = max(0, self._used_before_ns - before_ns)
+        # Reading how long threads waited takes a while, and is needed only where real time and processor time differ.
         if real_ns - used_ns > unexplained_ns:
             real_ns -= min(self._starved(threads=threads), real_ns)
         taken_ns = max(used_ns, real_ns)

@@ -18,6 +18,7 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault
 from grader.interfaces.definitions import KINDS, DefinitionError, InterfacePackage, digest, read
 
+#: As many definitions as a package may have are built in seconds.
 _PROCESSOR_S = 120
 _MEMORY = 2 * 1024**3
 #: Exit codes of a process that the kernel ended at a limit, or for lack of memory.

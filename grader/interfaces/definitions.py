@@ -28,6 +28,7 @@ INTEGERS = {f"{sign}int{bits}": (bits, sign == "") for sign in ("", "u") for bit
 PRIMITIVES = ("bool", "byte", "char", "float32", "float64", *INTEGERS, "string", "wstring")
 # More than any course needs, and little enough to be built in seconds.
 MAXIMUM_DEFINITIONS = 300
+#: Of one definition.
 MAXIMUM_BYTES = 64 * 1024
 MAXIMUM_FIELDS = 500
 MAXIMUM_ELEMENTS = 1_000_000

@@ -21,6 +21,7 @@ from grader.judging.wording import number
 
 #: Variables of a formula: the number of a message from 0, and its time in seconds.
 VARIABLES = ("n", "t")
+#: A longer formula is not one that a reader of the rubric could follow.
 _MOST_CHARACTERS = 200
 _CONSTANTS = MappingProxyType({"pi": math.pi})
 _FUNCTIONS: Mapping[str, Callable[[float], float]] = MappingProxyType(
@@ -257,8 +258,7 @@ def _scaled(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Inste
 
 
 #: Step between the lags that are tried, and the longest lag.
-_STEP_NS = 100 * NS_PER_MS
-_LONGEST_NS = 8 * NS_PER_S
+_STEP_NS, _LONGEST_NS = 100 * NS_PER_MS, 8 * NS_PER_S
 #: Maximum number of inputs that an answer may lag behind.
 _FURTHEST_BEHIND = 25
 #: Minimum share of answers that must fit for a lag to be reported.

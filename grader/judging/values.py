@@ -225,8 +225,8 @@ def text_at(value: Mapping[str, object], path: str) -> str | None:
     return found if isinstance(found, str) else None
 
 
-#: Longest text that is matched against a pattern, in characters.
-_LONGEST = 2_000
+#: The longest text that is matched against a pattern, in characters: an author's pattern may need quadratic time.
+LONGEST_MATCHED = 2_000
 _YES_OR_NO = MappingProxyType({"yes": True, "no": False})
 
 
@@ -294,7 +294,9 @@ class FieldRule:
     def _of_form(self, value: object) -> bool:
         if self.pattern is None:
             return True
-        return isinstance(value, str) and len(value) <= _LONGEST and re.fullmatch(self.pattern, value) is not None
+        if not isinstance(value, str) or len(value) > LONGEST_MATCHED:
+            return False
+        return re.fullmatch(self.pattern, value) is not None
 
     @property
     def wanted(self) -> str:

@@ -16,7 +16,7 @@ from pydantic.config import JsonDict
 from grader.core.dataclass import dataclass
 from grader.core.exercise import roles_of
 from grader.core.quantities import DurationNs, FieldOf, Hertz, Kind, Least, Unit
-from grader.core.scenario import Simulated
+from grader.core.scenario import FieldSpec
 from grader.rubrics.drawing import (
     Calls,
     CallsOrNever,
@@ -60,6 +60,7 @@ from grader.rubrics.types import (
     wrong,
 )
 from grader.rubrics.units import format_quantity
+from grader.stimuli.simulation import Simulated
 
 T = TypeVar("T")
 
@@ -97,6 +98,9 @@ _BY_KIND: Mapping[str, object] = {
     "messages, or none": MessageCasesOrNone,
     "fields": Fields,
 }
+
+#: Types whose definitions name themselves: Python looks that name up in the module of the class that uses them.
+_RECURSIVE = {"FieldSpec": FieldSpec}
 
 #: A name, and its meaning on the same line and the lines below that are indented further.
 _PARAMETER = re.compile(r"^ {4}(\w+): (.*(?:\n(?: {8}.*| *$))*)", re.MULTILINE)
@@ -206,7 +210,7 @@ def part_model(cls: type, name: str, aliases: Mapping[str, str] | None = None, *
     `aliases` holds rubric names of fields, where they differ, and `usual` the defaults that the JSON Schema shows,
     where they differ from those of the dataclass; a required field gets this default.
     """
-    hints = get_type_hints(cls, include_extras=True)
+    hints = get_type_hints(cls, localns=_RECURSIVE, include_extras=True)
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(cls):
         key = (aliases or {}).get(field.name) or field.name.removesuffix("_ns").removesuffix("_bytes")

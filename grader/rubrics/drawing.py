@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeV
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag, create_model, model_validator
 from typing_extensions import TypeAliasType
 
+from grader.core.limits import MAX_CALLS, MAX_CASES, MAX_CLIENTS
 from grader.core.scenario import (
     ODOMETRY,
     AnyOrder,
@@ -20,8 +21,6 @@ from grader.core.scenario import (
     InOrder,
     JustAbove,
     JustBelow,
-    RecordedStream,
-    ServiceCalls,
     SomeOf,
     TimeBetween,
     Written,
@@ -42,6 +41,8 @@ from grader.rubrics.types import (
     must,
     wrong,
 )
+from grader.stimuli.calls import ServiceCalls
+from grader.stimuli.recorded import RecordedStream
 
 #: Maximum number of decimals with which a text shows a drawn number.
 DECIMALS = 9
@@ -113,12 +114,8 @@ else:
 Fields = dict[FieldName, FieldValue]
 
 
-#: Maximum number of cases in a list, and of repetitions of one case.
-CASES = 1_000
-
-
 _TWO = "two of them, the lower one first"
-_TWO_COUNTS = f"two whole numbers from 0 to {CASES:,}, the lower one first"
+_TWO_COUNTS = f"two whole numbers from 0 to {MAX_CASES:,}, the lower one first"
 
 
 class _Drawn(Shape):
@@ -149,7 +146,7 @@ class DrawnCountShape(_Drawn):
     """A count that is drawn from the seed."""
 
     made = CountBetween
-    between: Annotated[tuple[Whole, Whole], must(lambda pair: 0 <= pair[0] < pair[1] <= CASES, _TWO_COUNTS)]
+    between: Annotated[tuple[Whole, Whole], must(lambda pair: 0 <= pair[0] < pair[1] <= MAX_CASES, _TWO_COUNTS)]
 
 
 def drawn_or_not(value: object) -> str:
@@ -157,7 +154,7 @@ def drawn_or_not(value: object) -> str:
     return "<drawn>" if isinstance(value, Mapping) else "<fixed>"
 
 
-_Count = Annotated[Whole, must(lambda n: 0 <= n <= CASES, f"a whole number from 0 to {CASES:,}")]
+_Count = Annotated[Whole, must(lambda n: 0 <= n <= MAX_CASES, f"a whole number from 0 to {MAX_CASES:,}")]
 _Fixed = TypeVar("_Fixed")
 _Varying = TypeVar("_Varying")
 #: A fixed value, or a mapping that says how it is drawn.
@@ -242,8 +239,6 @@ def list_of(case: object) -> Any:
 
 #: Default of keys that were not chosen in a choice; not a value that a rubric can contain.
 ABSENT: Any = None
-#: Maximum number of concurrent clients, and of calls of each.
-CLIENTS, CALLS = 20, 1_000
 
 
 class DrawnShape(Choice):
@@ -269,11 +264,11 @@ def _count_to(most: int) -> AfterValidator:
 
 
 _DRAWN_CALLS = must(
-    lambda drawn: 1 <= drawn.between[0] < drawn.between[1] <= CALLS,
-    f"two whole numbers from 1 to {CALLS:,}, the lower one first",
+    lambda drawn: 1 <= drawn.between[0] < drawn.between[1] <= MAX_CALLS,
+    f"two whole numbers from 1 to {MAX_CALLS:,}, the lower one first",
 )
-Calls = Either[Annotated[Whole, _count_to(CALLS)], Annotated[DrawnCountShape, _DRAWN_CALLS]]
-Clients = Annotated[Whole, _count_to(CLIENTS)]
+Calls = Either[Annotated[Whole, _count_to(MAX_CALLS)], Annotated[DrawnCountShape, _DRAWN_CALLS]]
+Clients = Annotated[Whole, _count_to(MAX_CLIENTS)]
 _NEVER = AfterValidator(lambda value: value or 0)
 TimeOrNever = Annotated[LongDuration | None, _NEVER]
 CallsOrNever = Annotated[Calls | None, _NEVER]

@@ -16,7 +16,7 @@ import msgspec
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
 from grader.core.quantities import FieldOf
-from grader.core.scenario import ActionGoal, MessageStream, NumberStream, ServiceCalls, ServiceServer, Stimulus
+from grader.core.scenario import Stimulus
 from grader.core.submission import Definition
 from grader.judging.series import curve
 from grader.rubrics.mistakes import found, nearest
@@ -53,13 +53,6 @@ _PRIMITIVES: Mapping[int, str] = {
 }
 #: What separates the definitions of nested types from each other in the text of a message type.
 _RULE = "=" * 80
-#: The part of a service or action that a stimulus or a check holds the fields of.
-_SENT: Mapping[type[Stimulus], tuple[str, str]] = {
-    MessageStream: ("values", ""),
-    ServiceServer: ("responses", "_Response"),
-    ServiceCalls: ("requests", "_Request"),
-    ActionGoal: ("goal", "_Goal"),
-}
 _KINDS = {"msg": "message", "srv": "service", "action": "action"}
 #: Values of simulated messages whose types are known before they are published.
 _PLAIN = (bool, int, float, str, list, tuple, Mapping)
@@ -286,9 +279,9 @@ class _Checked:
             if where is None:
                 continue
             on = _end_of(stimulus)
-            if isinstance(stimulus, NumberStream):
+            if stimulus.follows_type:
                 self._free.add(on)
-            yield _Named(stimulus.type, where), on  # type: ignore[union-attr]
+            yield _Named(getattr(stimulus, "type", ""), where), on
 
         for path, offered_ in self._simulated:
             for on, type_ in {**offered_.publishes, **offered_.hears, **offered_.serves}.items():
@@ -306,8 +299,8 @@ class _Checked:
             if unknown := self._interfaces.unknown(named.type, named.where):
                 yield unknown
         for path, stimulus in self._stimuli:
-            key, part = _SENT.get(type(stimulus), ("", ""))
-            type_ = f"{getattr(stimulus, 'type', '')}{part}"
+            key, _, part = stimulus.becomes.holds or ("", "", "")
+            type_ = f"{getattr(stimulus, 'type', '')}{part and f'_{part}'}"
             if key and (*path, key) in self._tree.values and self._interfaces.fields(type_) is not None:
                 raw = self._raw((*path, key))
                 each = [((*path, key), raw)] if isinstance(raw, Mapping) else _cases(raw, (*path, key))

@@ -16,12 +16,10 @@ from pydantic import BaseModel, ValidationError
 from grader.core.dataclass import dataclass
 from grader.core.errors import RubricError
 from grader.core.exercise import Check, Criterion, Exercise, Variant
-from grader.core.limits import Limits
+from grader.core.limits import MAX_RUBRIC_BYTES, Limits
 from grader.core.quantities import duration
 from grader.core.rubric_files import rubric_file
 from grader.core.scenario import (
-    NumberStream,
-    RecordedStream,
     RunOptions,
     Scenario,
     Span,
@@ -31,7 +29,6 @@ from grader.core.scenario import (
     is_launch_file,
     is_open,
     longest,
-    longest_course_ns,
     shortest,
 )
 from grader.judging.checks import CHECKS
@@ -159,16 +156,13 @@ def _too_late(start: Time, observed: Span, path: TreePath, tree: YamlTree) -> It
 
 def _in_stimulus(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
     yield from _too_late(stimulus.start_ns, observed, (*path, "start"), tree)
-    if isinstance(stimulus, NumberStream) and shortest(stimulus.hold_ns) < stimulus.period_ns:
-        text = "expected each number to be held for at least one period, found a shorter `hold`"
-        yield tree.at((*path, "hold")).mistake(text)
-    if 0 < getattr(stimulus, "stop_ns", 0) <= longest(stimulus.start_ns):
-        yield tree.at((*path, "stop")).mistake("expected a stop after the start")
+    for key, expected in stimulus.mistakes():
+        yield tree.at((*path, key)).mistake(expected)
 
 
 def _cut_off(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
     """Yield a mistake if, for some draw, a case is lost because the observation ends before it."""
-    time, needed_ns = observed.duration_ns, longest_course_ns(stimulus)
+    time, needed_ns = observed.duration_ns, stimulus.course_ns()
     if (isinstance(time, TimeBetween) or is_open(stimulus)) and needed_ns > shortest(time):
         text = f"expected at least {duration(needed_ns)}, so that every case is played whatever is drawn, found "
         text += f"{'as little as ' if isinstance(time, TimeBetween) else ''}{duration(shortest(time))}"
@@ -209,8 +203,6 @@ def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: Yam
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
-#: Largest rubric file, in bytes.
-MAX_BYTES = 256 * 1024
 
 #: The key of a ROS parameter file that holds the parameters of a node.
 PARAMETERS_KEY = "ros__parameters"
@@ -424,15 +416,15 @@ def _content(path: Path) -> bytes:
         if not stat.S_ISREG(mode):
             raise RubricError(f"{where}: expected a rubric file, found something that is not a regular file")
         with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+            content = file.read(MAX_RUBRIC_BYTES + 1)
     except (FileNotFoundError, NotADirectoryError):
         raise RubricError(f"{where}: expected a rubric file, found nothing there", "check the path") from None
     except OSError as error:
         raise RubricError(f"{where}: cannot be read: {error.strerror}") from None
     except ValueError:
         raise RubricError(f"{where}: expected a path, found one with a null character") from None
-    if len(content) > MAX_BYTES:
-        raise RubricError(f"{where}: expected at most {MAX_BYTES // 1024} KiB, found more")
+    if len(content) > MAX_RUBRIC_BYTES:
+        raise RubricError(f"{where}: expected at most {MAX_RUBRIC_BYTES // 1024} KiB, found more")
     return content
 
 
@@ -492,7 +484,7 @@ def _scenario(path: Path, shape: ScenarioShape, limits: Limits, provided: Mappin
         id=shape.id,
         processes=shape.processes,
         span=build(shape.observe),
-        stimuli=tuple(_with_bag(path, build(stimulus)) for stimulus in shape.stimuli),
+        stimuli=tuple(build(stimulus).beside(str(path.parent)) for stimulus in shape.stimuli),
         limits=limits,
         starts_ns=tuple((name, build(shape.start[name])) for name in shape.processes if name in shape.start),
         may_exit=shape.may_exit,
@@ -500,10 +492,3 @@ def _scenario(path: Path, shape: ScenarioShape, limits: Limits, provided: Mappin
         run=run,
         provided=tuple(sorted(used.items())),
     )
-
-
-def _with_bag(path: Path, stimulus: Stimulus) -> Stimulus:
-    """Return a stimulus with the path of its recording, if it plays one, which a rubric names relative to itself."""
-    if not isinstance(stimulus, RecordedStream) or not stimulus.bag:
-        return stimulus
-    return replace(stimulus, bag=str(path.parent / stimulus.bag))

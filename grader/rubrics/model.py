@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import date
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
@@ -11,16 +11,7 @@ from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, 
 
 from grader.core.exercise import DUE_DATE, OPEN, ORDER, PUBLISHED, Feedback, Shows
 from grader.core.limits import Limits
-from grader.core.quantities import NS_PER_S
-from grader.core.scenario import (
-    ActionGoal,
-    MessageStream,
-    NumberStream,
-    RecordedStream,
-    ServiceCalls,
-    ServiceServer,
-    Span,
-)
+from grader.core.scenario import Span, Stimulus
 from grader.rubrics.check_parameters import choice_model, part_model, simulation_shape
 from grader.rubrics.drawing import OdometryShape, ParameterShape, SomeLongTime, StateShape, TransitionShape, list_of
 from grader.rubrics.mistakes import nearest
@@ -44,6 +35,10 @@ from grader.rubrics.types import (
 )
 from grader.rubrics.variants import VariantsField
 from grader.simulation.robots import SIMULATIONS
+from grader.stimuli import KINDS
+from grader.stimuli.calls import ServiceCalls
+from grader.stimuli.recorded import RecordedStream
+from grader.stimuli.simulation import Simulated
 from grader.submissions.collected import listed
 
 _EVENTS = (DUE_DATE, PUBLISHED)
@@ -56,18 +51,20 @@ _LIMITS = {
     "wall_ns": "real_time",
     "message_bytes": "message_size",
 }
-_STIMULI: Mapping[str, type[Shape]] = {
-    "numbers": part_model(NumberStream, "NumbersShape", start=0, field=None),
-    "recorded": part_model(RecordedStream, "RecordedShape", start=0),
-    "odometry": OdometryShape,
-    "messages": part_model(MessageStream, "MessagesShape", period=NS_PER_S, stop=None),
-    "server": part_model(ServiceServer, "ServerShape", stop=None, answers=None),
-    "calls": part_model(ServiceCalls, "CallsShape", requests=({},)),
-    "parameter": ParameterShape,
-    "transition": TransitionShape,
-    "state": StateShape,
-    "goal": part_model(ActionGoal, "GoalShape", goal={}, cancel_after=None),
+#: Other keys of stimuli, below the kind that each is short for.
+_SHORT_FOR: Mapping[type[Stimulus], Mapping[str, type[Shape]]] = {
+    RecordedStream: {"odometry": OdometryShape},
+    ServiceCalls: {"parameter": ParameterShape, "transition": TransitionShape, "state": StateShape},
 }
+
+
+def _stimuli() -> Iterator[tuple[str, type[Shape]]]:
+    for kind in KINDS:
+        if kind is not Simulated:  # its parameters are those of a simulation
+            yield kind.key, part_model(kind, f"{kind.key.capitalize()}Shape", **kind.shown)
+            yield from _SHORT_FOR.get(kind, {}).items()
+
+
 _SIMULATIONS = {name: simulation_shape(name, kind) for name, kind in SIMULATIONS.items()}
 
 
@@ -78,7 +75,7 @@ def _stimulus_model(simulations: Mapping[str, type[Shape]]) -> type[Choice]:
         "SimulationShape", "A stimulus: a participant that reacts, such as a simulated robot.", shapes
     )
     about = "Something that the grader does to the student's nodes."
-    return choice_model("StimulusShape", about, {**_STIMULI, "simulation": chosen})
+    return choice_model("StimulusShape", about, {**dict(_stimuli()), Simulated.key: chosen})
 
 
 if TYPE_CHECKING:  # created at run time; pydantic reads those below

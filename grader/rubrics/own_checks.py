@@ -42,6 +42,7 @@ MOST_DEFINITIONS = 400
 #: Most files in a recording, and the largest one in bytes: all travel to each machine of a cluster, and minutes of
 #: laser scans take a few megabytes.
 MOST_BAG_FILES = 20
+#: The largest file of a recording; see above.
 MOST_BAG_BYTES = 64 * 1024 * 1024
 
 

@@ -10,19 +10,17 @@ from typing import Any
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.quantities import NS_PER_MS
-from grader.core.scenario import Between, Choose, FieldSpec, Simulated, Written
+from grader.core.scenario import Between, Choose, FieldSpec, Written
 from grader.rubrics.model import RubricShape, ScenarioShape
 from grader.rubrics.types import build
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlTree
 from grader.simulation.loading import begin_of, guarded, made
-from grader.simulation.participant import Moment, Output
+from grader.simulation.participant import SHORTEST_PERIOD_NS, Moment, Output
+from grader.stimuli.simulation import Simulated
 from grader.submissions.collected import shown
 
 #: How many steps and messages of a step are tried.
 STEPS, OUTPUTS = 3, 20
-#: The shortest period, in nanoseconds.
-SHORTEST_NS = NS_PER_MS
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +37,9 @@ def simulated_in(rubric: RubricShape) -> Iterator[tuple[TreePath, Simulated]]:
     """Yield the simulations of a rubric, each with the place of its name."""
     for index, scenario in enumerate(rubric.scenarios):
         for number, shape in enumerate(scenario.stimuli):
-            if shape.chosen[0] == "simulation":
+            if shape.chosen[0] == Simulated.key:
                 chosen = shape.chosen[1]
-                yield ("scenarios", index, "stimuli", number, "simulation", chosen.chosen[0]), build(chosen)
+                yield ("scenarios", index, "stimuli", number, Simulated.key, chosen.chosen[0]), build(chosen)
 
 
 def offered(simulated: Simulated) -> Offered:
@@ -50,7 +48,7 @@ def offered(simulated: Simulated) -> Offered:
     one = made(simulated.name, simulated.path, simulated.content, parameters)
     call = partial(guarded, simulated.name, simulated.path)
     call(lambda: one.begin(random.Random(0)))  # noqa: S311  the same at each reading
-    if not (isinstance(one.period, int) and one.period >= SHORTEST_NS):
+    if not (isinstance(one.period, int) and one.period >= SHORTEST_PERIOD_NS):
         raise HarnessError(
             f"the simulation `{simulated.name}` has a period of {one.period!r} ns, expected at least 1 ms"
         )

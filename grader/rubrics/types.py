@@ -217,6 +217,7 @@ Duration = Annotated[int, Quantity(Unit("s"))]
 LongDuration = Annotated[int, Quantity(Unit("s"), above_zero=True)]
 Frequency = Annotated[float, Quantity(Unit("Hz"))]
 
+#: A longer pattern is not one that a reader of the rubric could follow.
 _LONGEST_PATTERN = 400
 
 

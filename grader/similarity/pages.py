@@ -22,6 +22,7 @@ MOST_PAGES = 200
 #: file than the second number.
 WHOLE, MOST_LINES = 400, 1_500
 _AROUND = 3
+#: A longer line is data, and is cut.
 _LINE_LIMIT = 400
 OVERVIEW = "index.html"
 COLUMNS = (

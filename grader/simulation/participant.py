@@ -7,8 +7,10 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from grader.core.dataclass import dataclass
-from grader.core.quantities import NS_PER_S, seconds
+from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
 
+#: The shortest time between two steps of a simulation: no sensor is faster, and each step takes the grader's time.
+SHORTEST_PERIOD_NS = NS_PER_MS
 #: A message to publish: its topic, and its fields as plain values, nested by name; fields left out keep their defaults.
 Output = tuple[str, Mapping[str, Any]]
 

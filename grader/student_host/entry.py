@@ -37,6 +37,7 @@ def path_of(request: Mapping[str, Any]) -> list[str]:
     """Return the first folders of sys.path: the folder of the script, or the folders that contain packages."""
     root, file = request["root"], request["file"]
     layout = _layout_of(request)
+    # As Python does: the folder of the script, or for a module of a package the folder that the package is in.
     first = layout.base if layout.module else os.path.dirname(os.path.join(root, file))
     if not layout.module and layout.package is None:
         return [first]
@@ -57,6 +58,7 @@ def command_line(request: Mapping[str, Any]) -> list[str]:
     """Return the arguments of the program; parameter files are written to the folder for temporary files."""
     given = list(request.get("ros_arguments", ()))
     for number, (_, text) in enumerate(request.get("parameter_files", ()), 1):
+        # Files, as `ros2 run` has them: rclpy reads parameters from files or from single arguments only.
         path = os.path.join(os.environ.get("HOME") or tempfile.gettempdir(), f"parameters_{os.getpid()}_{number}.yaml")
         with open(path, "w", encoding="utf-8") as file:
             file.write(text)
@@ -81,14 +83,17 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     start = start_of(root, file, layout, tree, request.get("executable", ""), request.get("scripts", ()))
     shadows = shadows_of(request)
     how = {"way": start.way, "module": start.module, "function": start.function}
+    # Before any code of the file: how it was started is needed most if it then ends at once.
     notify({"code": "started", **how, "hidden": shadows.files})
     if shadows.files:
         shadows.fall(install_ros)
+    # In front, as Python puts the folder of a script there: a file of the student's hides a module of Python.
     sys.path[:0] = [f for f in dict.fromkeys((start.base, *path_of(request))) if f]
     if layout.module:
         _find_neighbours(tree, path, notify)
     sys.argv = [path, *command_line(request)]
     sys.orig_argv = [sys.executable, *sys.argv]
+    # Only for these ways: an entry point names the function to call.
     if start.way in (SCRIPT, MODULE):
         run_what_nothing_called(_run_as_main(path, start.module, layout), tree, notify)
         return
@@ -99,6 +104,7 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     for name in start.function.split("."):
         called = getattr(called, name)
     result = called()
+    # A console script passes the result of the function to `sys.exit`.
     if start.way != MAIN:
         sys.exit(result)
 
@@ -115,6 +121,7 @@ def _run_as_main(path: str, name: str, layout: PackageLayout) -> dict[str, Any]:
     module.__file__ = path
     module.__loader__ = SourceFileLoader("__main__", path)
     module.__spec__ = None
+    # As in a script: in modules that are imported, it is the dictionary.
     module.__dict__["__builtins__"] = sys.modules["builtins"]
     module.__dict__["__cached__"] = None
     sys.modules["__main__"] = module
@@ -125,6 +132,7 @@ def _run_as_main(path: str, name: str, layout: PackageLayout) -> dict[str, Any]:
             importlib.import_module(package)
         module.__package__ = package
         module.__spec__ = ModuleSpec(name, module.__loader__, origin=path)
+    # As bytes: Python reads the declared encoding itself.
     with open(path, "rb") as source:
         code = compile(source.read(), path, "exec", dont_inherit=True)
     exec(code, module.__dict__)  # noqa: S102 - running the student's file is what the host is for
@@ -155,6 +163,7 @@ def _find_neighbours(tree: ast.Module, path: str, notify: Notify) -> None:
         beside = os.path.isfile(os.path.join(folder, f"{name}.py"))
         if beside and name not in sys.modules and PathFinder.find_spec(name) is None:
             notify({"code": "neighbour_imported", "module": name})
+    # At the end: packages that are installed come first, as they would under `ros2 run`.
     sys.path.append(folder)
 
 
@@ -167,14 +176,17 @@ def _plain_imports(tree: ast.Module) -> set[str]:
 def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, notify: Notify) -> None:
     """Start what a file defines but never starts: its `main`, or its only node class."""
     ros = sys.modules.get(f"{__package__}.ros")
+    # A file that has made a node has been started, however it did that.
     if ros is None or ros.MADE_NODES:
         return
+    # `main` before a class: it says how its author means the node to be run.
     main = namespace.get("main")
     if callable(main) and not _calls_at_top_level(tree.body, "main"):
         notify({"code": "main_not_called"})
         main()
         return
     nodes = _node_classes(namespace)
+    # With two, nobody knows which; and where there is a `main`, it was called above or by the file.
     if "main" not in namespace and len(nodes) == 1:
         notify({"code": "class_not_started", "class": nodes[0].__name__})
         if _needs_nothing(nodes[0]):
@@ -194,6 +206,7 @@ def _node_classes(namespace: dict[str, Any]) -> list[Any]:
         if isinstance(value, type)
         and node is not None
         and issubclass(value, node)
+        # Not what was imported: a base class in a helper module is there to be derived from.
         and value.__module__ == namespace["__name__"]
     ]
 

@@ -87,6 +87,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     log = Log(request["log_format"])
     ready = {"kind": "ready", "log_token": log.token}
 
+    # A fork has imported rclpy already; one whose submission hides a module of it is executed instead.
     hidden = not prepared and hides_modules(request)
 
     def install_ros() -> None:
@@ -98,9 +99,14 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     elif not hidden:  # otherwise done when the program imports rclpy
         install_ros()
         preload(os.path.join(request["root"], request["file"]))
+    # After the imports of the host: what they draw must not shift what the program draws.
     seed_randomness(request["seed"])
+    # A child of the student's would answer on the same socket. On the wall clock it may live, but says nothing; in
+    # virtual time nobody could step it.
     os.register_at_fork(after_in_child=link.cut if request["clock"] == "wall" else lambda: originals.exit_now(70))
+    # From here on the worker decides when the program runs.
     start = link.ask(ready)
+    # The token is known to the logging library and the worker alone; the program could find this value.
     ready.clear()
     if isinstance(time, VirtualTime):
         time.start(start["now_ns"], request["steady_ns"], charged=request["charged"])
@@ -114,6 +120,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
         time.give_up_outside = watchdog.give_up_outside
         if not request["in_place"]:  # nobody deceives whoever tests a program of their own
             Watch(link, request["root"]).install()
+    # Last: what is replaced after this would show names of the host in tracebacks.
     rename_functions()
     home = os.environ.get("HOME", "")
     kept = tuple(os.path.join(home, name) for name in ("log", ".cache", ".config"))
@@ -124,6 +131,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
         ending |= clean_up(request["root"], time, watchdog)
     except Exception as error:  # no code of the student runs there that could raise
         ending = {"fault": describer.exception(error), **ending, "code": 1, "left": False}
+    # Before the report: the worker reads what was written until then as the program's last words.
     flush()
     with contextlib.suppress(Exception):
         if found := written.files():
@@ -140,6 +148,7 @@ def clean_up(root: str, time: VirtualTime | WallTime, watchdog: Watchdog | None)
         time: The clock.
         watchdog: Stopped, because nothing can hang any more.
     """
+    # In the order of the interpreter: open files are flushed, then modules are freed.
     time.finish()
     with contextlib.suppress(BaseException):
         flush_open_files()
@@ -147,6 +156,7 @@ def clean_up(root: str, time: VirtualTime | WallTime, watchdog: Watchdog | None)
         forget_modules(root)
     if watchdog is not None:
         watchdog.stop()
+    # After the modules: a `__del__` may still publish, and what it sends has to arrive.
     return {"left": time.end(), **time.summary()}
 
 
@@ -174,6 +184,7 @@ def evaluate(request: dict[str, Any]) -> None:
     try:
         path = os.path.join(here, request["file"])
         sys.argv = [path]
+        # Reversed, so that of two packages with one name the outermost counts.
         packages = {name: os.path.join(root, folder).rstrip("/") for name, folder in reversed(told["packages"])}
         sys.path += [os.path.join(root, folder) for folder in request["imported"]]
         nodes, left_out = launch_files.describe((root, own), path, packages, dict(told["arguments"]))
@@ -213,14 +224,17 @@ def play(request: dict[str, Any], describer: Describer, link: Link, install_ros:
         at_depth(lambda: entry.run_file(request, lambda note: link.send({"kind": "note", **note}), install_ros))
     except SystemExit as leaving:
         ending["code"] = exit_code(leaving)
+    # Ctrl-C without a handler ends Python with 130, 128 and the number of the signal.
     except KeyboardInterrupt:
         ending["code"] = 130
     except BaseException as error:  # whatever the student's code raises becomes a fault
         ending = {"code": 1, "fault": describer.exception(error)}
+        # What the program prints about its own end is what it would print without the host.
         error.__traceback__ = of_program(error.__traceback__)
         sys.last_type, sys.last_value, sys.last_traceback = type(error), error, error.__traceback__
         sys.excepthook(type(error), error, error.__traceback__)
     with contextlib.suppress(BaseException):
+        # Threads before exit handlers, as Python waits for the first before it calls the second.
         finish_threads()
         atexit._run_exitfuncs()
     return ending
@@ -274,6 +288,7 @@ def forget_modules(root: str) -> None:
 
 def finish_threads() -> None:
     """Wait for all non-daemon threads, as the interpreter does when it exits."""
+    # In reverse order, as the interpreter calls them: pools of threads end here, and are told before they are joined.
     for call in reversed(getattr(threading, "_threading_atexits", [])):
         call()
     while threads := [t for t in threading.enumerate() if t is not threading.current_thread() and not t.daemon]:
@@ -286,6 +301,7 @@ def exit_code(leaving: SystemExit) -> int:
     if leaving.code is None:
         return 0
     if isinstance(leaving.code, int):
+        # The kernel keeps eight bits of an exit code.
         return leaving.code & 0xFF
     print(leaving.code, file=sys.stderr)  # noqa: T201 - this is what the interpreter does
     return 1
@@ -306,6 +322,7 @@ def seed_randomness(seed: str) -> None:
     def seed_from_source(self: random.Random, a: Any = None, version: int = 2) -> None:
         seed_generator(self, int.from_bytes(urandom(32), "big") if a is None else a, version)
 
+    # All of `secrets`, `uuid4` and unseeded generators draw from these.
     os.urandom, os.getrandom = urandom, getrandom
     random._urandom = urandom  # type: ignore[attr-defined]
     random.Random.seed = seed_from_source  # type: ignore[method-assign]
@@ -374,6 +391,7 @@ def warm_up() -> None:
 def keep_interfaces(request: dict[str, Any]) -> None:
     """Forget the interface packages that `preload` would not have imported: a program has to import them itself."""
     named = _named(os.path.join(request["root"], request["file"]))
+    # Not only what it names: an interface package imports those whose messages it holds.
     kept = {*named, *(other for name in named for other in INTERFACES[name])}
     forgotten = {name.partition(".")[0] for name in INTERFACES if name not in kept}
     for name in [name for name in sys.modules if name.partition(".")[0] in forgotten]:

@@ -31,6 +31,7 @@ class Timeouts:
 
     def deadline_ns(self, seconds: float | None) -> int | None:
         """Return the deadline of a timeout; None, if the timeout is None or negative, means to wait forever."""
+        # The work before it first: a time-out is counted from the moment at which the program asks for it.
         self._clock.charge()
         if seconds is None or seconds < 0:
             return None
@@ -77,6 +78,8 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
                 return self._wait_from_outside()
             self._waiters.append(green_thread)
             try:
+                # Whoever releases the lock takes this thread out of the waiters, and hands the lock over without
+                # unlocking it.
                 while green_thread in self._waiters and not timeouts.over(deadline_ns):
                     scheduler.pause(deadline_ns)
             except BaseException:
@@ -94,6 +97,7 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
             else:
                 self.release()
 
+        # A thread that a C library has started is not scheduled here, and waits in real time.
         def _wait_from_outside(self) -> bool:
             while self._locked:
                 originals.sleep(0.001)
@@ -103,6 +107,7 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
         def release(self) -> None:
             if not self._locked:
                 raise RuntimeError("release unlocked lock")
+            # Handed over, not unlocked: otherwise a thread that comes by could take it before those that wait.
             if self._waiters:
                 scheduler.wake(self._waiters.popleft())
             else:
@@ -143,11 +148,13 @@ def install_locks(scheduler: Scheduler, clock: VirtualClock) -> None:
     virtual = lock_type(scheduler, clock)
     threading.Lock = virtual  # type: ignore[assignment]
     threading._allocate_lock = virtual  # type: ignore[attr-defined]
+    # The reentrant lock and the queue in C block for real; those in Python are built on the plain lock.
     threading._CRLock = None  # type: ignore[attr-defined]
     threading.RLock = threading._PyRLock  # type: ignore[attr-defined]
     _thread.allocate_lock = virtual
     _thread.RLock = threading._PyRLock  # type: ignore[attr-defined,misc]
     queue.SimpleQueue = queue._PySimpleQueue  # type: ignore[attr-defined,misc]
+    # Made when the module was imported, before locks were virtual.
     concurrent.futures.thread._global_shutdown_lock = virtual()
 
 
@@ -160,6 +167,7 @@ def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Cal
 
     _thread.start_new_thread = start_new_thread
     _thread.start_new = start_new_thread
+    # `threading` has looked the function up when it was imported.
     if hasattr(threading, "_start_new_thread"):
         threading._start_new_thread = start_new_thread
     else:  # Python 3.13 and later have joinable threads
@@ -190,6 +198,7 @@ def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Cal
         while green_thread is not None and not getattr(self, "_grader_finished", False):
             if timeouts.over(deadline_ns):
                 return
+            # In the thread itself, so that the list ends with it.
             joiners: list[GreenThread] = self.__dict__.setdefault("_grader_joiners", [])
             joiners.append(green_thread)
             try:
@@ -230,12 +239,14 @@ def install_selectors(scheduler: Scheduler, clock: VirtualClock, give_up: Callab
         while True:
             ready = poll()
             if not empty(ready):
+                # A descriptor that became ready may be what other selectors wait for too.
                 scheduler.progress()
                 clock.busy()
                 return ready
             if timeouts.over(deadline_ns):
                 clock.idle_look()
                 return ready
+            # Only now, when nothing is ready: a program may open what it never waits for.
             if any_outside(descriptors):
                 give_up()
             scheduler.pause(deadline_ns, polls=True)

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from .virtual import VirtualTime
 
 NS_PER_S = 1_000_000_000
+#: How often the watchdog looks: often enough for limits of seconds, and rarely enough to take no processor time that
+#: counts.
 INTERVAL_S = 0.1
 
 

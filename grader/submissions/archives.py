@@ -16,12 +16,21 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
 from grader.core.errors import SubmissionError
-from grader.submissions.collected import (
+from grader.core.limits import (
+    MAX_ARCHIVE_BYTES,
     MAX_DEPTH,
     MAX_ENTRIES,
+    MAX_EXTENDED_BYTES,
     MAX_FILE_BYTES,
     MAX_FILES,
+    MAX_RATIO,
+    MAX_STREAMS,
     MAX_TOTAL_BYTES,
+    MAX_UNPACKED_BYTES,
+    MAX_XZ_BYTES,
+    RATIO_FREE_BYTES,
+)
+from grader.submissions.collected import (
     Collected,
     LeftOut,
     collision,
@@ -38,14 +47,6 @@ HAND_IN_ZIP = "pack the folder with your .py files as a zip"
 
 BLOCK = 512
 
-#: Largest header that only describes the next member, in bytes.
-MAX_EXTENDED_BYTES = 64 << 10
-
-#: Maximum number of concatenated compressed streams; parallel compressors write several.
-MAX_STREAMS = 100
-
-#: Memory limit of the xz decompressor, in bytes; `xz -9` needs 65 MiB.
-MAX_XZ_BYTES = 128 << 20
 
 _ENCODING, _ERRORS = "utf-8", "surrogateescape"
 _PAX = (tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.SOLARIS_XHDTYPE)
@@ -253,15 +254,6 @@ def _kind(info: zipfile.ZipInfo, name: str) -> str:
     return FOLDER if name.endswith("/") else FILE
 
 
-#: Largest archive, in bytes.
-MAX_ARCHIVE_BYTES = 64 << 20
-
-#: Maximum size of an unpacked tar archive, including headers and skipped files, in bytes.
-MAX_UNPACKED_BYTES = 64 << 20
-
-#: Maximum expansion: bytes of content per byte of archive, once the content exceeds `RATIO_FREE_BYTES`.
-MAX_RATIO = 200
-RATIO_FREE_BYTES = 4 << 20
 _RATIO = f"{MAX_RATIO} times the size of the archive"
 
 #: Number of leading bytes that identify the kind of an archive.

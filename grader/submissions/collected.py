@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field
 
 from grader.core.dataclass import dataclass
+from grader.core.limits import MAX_NAME_BYTES, MAX_PATH_BYTES
 
 #: Longest piece of foreign text in a message, in characters.
 SHOWN_LENGTH = 80
@@ -40,11 +41,6 @@ def first_of(names: Sequence[str]) -> str:
 #: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`.
 GENERATED_MARKERS = ("pyvenv.cfg", "COLCON_IGNORE")
 
-#: Longest path inside a submission: with the staging folder in front, the system rejects longer ones.
-MAX_PATH_BYTES = 2_000
-
-#: Longest name of one file or folder on Linux, in bytes.
-MAX_NAME_BYTES = 255
 
 _BY_SYSTEMS = frozenset({"__pycache__", "__MACOSX"})
 _SKIPPED_FOLDERS = _BY_SYSTEMS | {"venv", "node_modules"}
@@ -150,15 +146,6 @@ def _bytes(name: str) -> int:
 
 def _longest_part(path: str) -> int:
     return max(map(_bytes, path.split("/")))
-
-
-MAX_FILES = 2_000
-MAX_TOTAL_BYTES = 50 << 20
-MAX_FILE_BYTES = 8 << 20
-MAX_DEPTH = 20
-
-#: Entries of any kind that are examined before a folder or an archive is rejected as not being a submission.
-MAX_ENTRIES = 20_000
 
 
 @dataclass(frozen=True, slots=True)

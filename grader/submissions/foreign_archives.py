@@ -24,11 +24,11 @@ KINDS = ("7z", "rar")
 
 #: Limits of the process that unpacks: memory in bytes, processor time in seconds.
 MEMORY_BYTES = 768 << 20
+#: 50 MiB, the most that a submission may have, unpack in a few seconds.
 PROCESSOR_S = 60
 _KINDS = {"file": FILE, "folder": FOLDER, "link": LINK, "other": "a device, pipe or other special file"}
 # The exit codes of grader.submissions.unpacker, which is not imported, because only its process needs the sandbox.
 _ENCRYPTED, _TOO_MANY, _TOO_MUCH, _NO_LIBRARY = 11, 12, 13, 14
-_HEAD_BYTES = 1 << 20
 
 
 def install_command() -> str:

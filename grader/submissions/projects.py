@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from grader.core.errors import HarnessError
+from grader.core.limits import MAX_FILES, MAX_NAME_BYTES, MAX_PATH_BYTES
 from grader.core.projects import Project
 from grader.execution.contained import run_contained
 from grader.execution.executables import CMAKE_LISTS, files_below, project_folders
-from grader.submissions.collected import MAX_FILES, MAX_NAME_BYTES, MAX_PATH_BYTES, first_of, name_problem
+from grader.submissions.collected import first_of, name_problem
 
 MODULE = "grader.submissions.project_reader"
 #: The files of a package that are read.

@@ -9,6 +9,7 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from grader.core.limits import MAX_PROGRAM_BYTES, MAX_SOURCE_BYTES
 from grader.core.submission import Submission
 from grader.judging.source import LONGEST_SOURCE, Source, chain, read
 from grader.submissions.revealing import ORDER, orders, read_attributes, shown_functions
@@ -385,10 +386,6 @@ def _is_date(node: ast.AST, source: Source) -> bool:
 _WAITING = _words("sleep wait spin spin_once spin_until_future_complete join get publish sleep_for sleep_until")
 
 
-#: Longer files are not read, in bytes.
-MAX_SOURCE_BYTES = 1 << 20
-#: Maximum total size of the files read, in bytes.
-MAX_PROGRAM_BYTES = 4 << 20
 #: Suffixes of modules that Python imports without their source, and of archives that it imports from.
 COMPILED = (".so", ".pyc", ".pyo", ".pth", ".zip", ".egg", ".whl", ".pyz")
 #: Encodings in which editors save programs.

@@ -12,19 +12,8 @@ from pathlib import Path
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError, SubmissionError
-from grader.submissions.collected import (
-    GENERATED_MARKERS,
-    MAX_DEPTH,
-    MAX_ENTRIES,
-    MAX_FILE_BYTES,
-    MAX_FILES,
-    MAX_PATH_BYTES,
-    MAX_TOTAL_BYTES,
-    Collected,
-    LeftOut,
-    is_skipped_file,
-    is_skipped_folder,
-)
+from grader.core.limits import MAX_DEPTH, MAX_ENTRIES, MAX_FILE_BYTES, MAX_FILES, MAX_PATH_BYTES, MAX_TOTAL_BYTES
+from grader.submissions.collected import GENERATED_MARKERS, Collected, LeftOut, is_skipped_file, is_skipped_folder
 
 _OPEN_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 

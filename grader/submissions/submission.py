@@ -12,10 +12,11 @@ from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
 from grader.core.errors import SubmissionError
+from grader.core.limits import MAX_ARCHIVE_BYTES, MAX_FILE_BYTES
 from grader.core.projects import Project
 from grader.core.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
 from grader.execution.executables import Executable, executables, find_executables
-from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, listed, shown
+from grader.submissions.collected import Collected, first_of, listed, shown
 from grader.submissions.projects import read_projects
 from grader.submissions.staging import collect_folder, read_start, write_files
 
@@ -143,7 +144,6 @@ def _every_file_of(source: Path, wanted: Sequence[str], where: str) -> Collected
     from grader.submissions.archives import (  # noqa: PLC0415 - most submissions are folders
         ARCHIVE_SUFFIXES,
         HEAD_BYTES,
-        MAX_ARCHIVE_BYTES,
         archive_kind,
         collect_archive,
     )

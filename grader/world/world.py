@@ -29,7 +29,6 @@ from grader.core.trace import (
     Response,
     Trace,
 )
-from grader.execution.exchanges import PlannedGoal
 from grader.execution.interfaces import built, plain_fields
 from grader.execution.plan import Plan, PlannedStart, derive, ros_arguments
 from grader.execution.recording_session import RecordingSession
@@ -48,6 +47,7 @@ from grader.execution.stepping import SteppedRun
 from grader.execution.steps import Advance, Call, Command, Interrupt, Kill, Publish, SendGoal, Serve, Simulate, Start
 from grader.simulation.loading import made
 from grader.simulation.participant import Moment, Simulation
+from grader.stimuli.goals import PlannedGoal
 from grader.world import telling
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout
 from grader.world.programs import Found, Program, Runnable, find_launch_file, find_program, parameter_values
@@ -198,8 +198,6 @@ class World:
             duration_ns=0,
             first_message_on="",
             wait_at_most_ns=0,
-            numbers=(),
-            recordings=(),
             clock=ClockKind.VIRTUAL.value,
             limits=OWN_LIMITS,
             drawn_order=drawn_order,

@@ -11,7 +11,8 @@ from click.testing import CliRunner, Result
 from grader.app.inputs import messages, read_sent, read_simulations, simulated
 from grader.cli import main
 from grader.core.errors import GraderError
-from grader.core.scenario import MessageStream, Simulated
+from grader.stimuli.messages import MessageStream
+from grader.stimuli.simulation import Simulated
 
 WORLD = """\
 from dataclasses import dataclass

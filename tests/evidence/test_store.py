@@ -13,10 +13,12 @@ import pytest
 from kept_runs import kept_run, velocity_exercise, velocity_run, velocity_trace
 
 from grader.core.errors import EvidenceError
-from grader.core.scenario import MessageStream, Scenario, Simulated, Span
+from grader.core.scenario import Scenario, Span
 from grader.core.trace import Delivery, Message, Request, Response, Trace
 from grader.execution.evidence.manifest import scenario_digest
 from grader.execution.evidence.store import check_place, first_report, found_under, open_evidence, run_of
+from grader.stimuli.messages import MessageStream
+from grader.stimuli.simulation import Simulated
 
 RECORDING = "velocity_publisher.alone/velocity_publisher.alone_0.mcap"
 OWN = {"evidence.json", "report.json", RECORDING, "velocity_publisher.alone/metadata.yaml"}

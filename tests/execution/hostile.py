@@ -104,8 +104,6 @@ def planned(folder: Path, *programs: str, limits: Limits | None = None, **fields
         "duration_ns": 10_000 * MS,
         "first_message_on": "",
         "wait_at_most_ns": 60_000 * MS,
-        "numbers": (),
-        "recordings": (),
         "clock": "virtual",
         "limits": limits or Limits(),
     }

@@ -11,8 +11,9 @@ from grader.core.trace import Endpoint, Fault, GraphSnapshot, OutputLine
 from grader.execution.ending import ended_by
 from grader.execution.notes import Places
 from grader.execution.observer import Taken
-from grader.execution.plan import Plan, PlannedNumbers
+from grader.execution.plan import Plan
 from grader.execution.workload import Delay
+from grader.stimuli.numbers import PlannedNumbers
 from grader.student_host.clock import EPOCH_NS
 
 #: Stands for the submission: this file is in it.
@@ -35,8 +36,6 @@ def plan(**fields: Any) -> Plan:
         "duration_ns": 1000 * MS,
         "first_message_on": "",
         "wait_at_most_ns": 5000 * MS,
-        "numbers": (),
-        "recordings": (),
         "clock": "virtual",
     }
     return Plan(**{**usual, **fields})

@@ -24,8 +24,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from grader.core.errors import RecordingError
 from grader.core.quantities import NS_PER_S
-from grader.core.scenario import TimedMessage
-from grader.execution.bag import Least, Recording, read_bag, window
+from grader.execution.bag import Least, read_bag
+from grader.stimuli.recorded import Recording, TimedMessage, window
 
 ROOT = Path(__file__).parents[2]
 OWN = ROOT / "rubrics" / "exercise_2" / "odometry"

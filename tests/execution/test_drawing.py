@@ -21,22 +21,24 @@ from grader.core.scenario import (
     Between,
     CountBetween,
     InOrder,
-    NumberStream,
-    RecordedStream,
     Scenario,
     SomeOf,
     Span,
     TimeBetween,
-    TimedMessage,
     cases,
 )
 from grader.core.submission import StudentFile, Submission
-from grader.execution.bag import Recording
 from grader.execution.codec import to_json
 from grader.execution.evidence.manifest import scenario_digest
-from grader.execution.plan import Plan, PlannedNumbers, plan_scenario
+from grader.execution.plan import Plan, plan_scenario
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
+from grader.stimuli.calls import PlannedCalls
+from grader.stimuli.goals import PlannedGoal
+from grader.stimuli.messages import PlannedMessages
+from grader.stimuli.numbers import NumberStream, PlannedNumbers
+from grader.stimuli.recorded import PlannedRecording, RecordedStream, Recording, TimedMessage
+from grader.stimuli.server import PlannedServer
 
 MS, S = 1_000_000, 1_000_000_000
 SEEDS = st.integers(0, 2**48 - 1)
@@ -77,7 +79,7 @@ def held(numbers: PlannedNumbers) -> list[list[Any]]:
 def test_the_fan_is_asked_everything_in_any_order(seed: int) -> None:
     """The limit after a lower and a higher temperature, just above it from below, and just below it from above."""
     plan_ = planned("two_node_communication", "controller_alone", seed)
-    (numbers,) = plan_.numbers
+    (numbers,) = plan_.of(PlannedNumbers)
     found = held(numbers)
     order = [number for number, _ in found]
     steps = set(pairwise([("low" if v < 25 else "high" if v > 25 else "limit", side) for v, side in order]))
@@ -93,7 +95,7 @@ def test_the_fan_is_asked_everything_in_any_order(seed: int) -> None:
 @given(SEEDS, st.integers(2, 10))
 def test_an_average_is_told_from_the_last_temperature_on_both_sides(seed: int, window: int) -> None:
     """Whatever the order, it is on the wrong side of the limit at the first message of some value on either side."""
-    asked = planned("two_node_communication", "controller_alone", seed).numbers[0].numbers
+    asked = planned("two_node_communication", "controller_alone", seed).of(PlannedNumbers)[0].numbers
     numbers = [value + side * 1e-6 for value, side in asked]
     changes = [k for k, (before, now) in enumerate(pairwise(numbers), 1) if before != now]
     smooth = averages(numbers, window)
@@ -105,7 +107,7 @@ def test_an_average_is_told_from_the_last_temperature_on_both_sides(seed: int, w
 def test_the_sensor_hears_every_kind_of_speed(seed: int) -> None:
     """Full, none and two drawn ones, all before the observation can end."""
     plan_ = planned("two_node_communication", "sensor_alone", seed)
-    (numbers,) = plan_.numbers
+    (numbers,) = plan_.of(PlannedNumbers)
     values = [value for (value, _), _ in held(numbers)]
     assert {100.0, 0.0} <= set(values)
     assert any(51 <= v <= 99 for v in values)
@@ -115,7 +117,7 @@ def test_the_sensor_hears_every_kind_of_speed(seed: int) -> None:
 
 
 def angles(seed: int) -> list[float]:
-    (messages,) = planned("joint_subscriber", "late_publisher", seed).messages
+    (messages,) = planned("joint_subscriber", "late_publisher", seed).of(PlannedMessages)
     return [fields["data"] for fields in messages.values]
 
 
@@ -123,7 +125,7 @@ def angles(seed: int) -> list[float]:
 def test_every_angle_comes_whatever_the_order(seed: int) -> None:
     """Once each, all before the observation ends."""
     plan_ = planned("joint_subscriber", "late_publisher", seed)
-    (messages,) = plan_.messages
+    (messages,) = plan_.of(PlannedMessages)
     found = angles(seed)
     kinds = ((0.2, 0.4), (-1.0, -0.2), (0.5, 0.5), (1.8, 3.1), (-1.5707963267948966,) * 2)
     assert all(any(low <= value <= high for value in found[:-1]) for low, high in kinds)
@@ -157,7 +159,7 @@ def test_every_mistake_with_angles_shows(logged: Callable[[list[float]], list[fl
 
 
 def charges(seed: int, scenario: str) -> list[tuple[bool, str]]:
-    (server,) = planned("battery_service", scenario, seed).servers
+    (server,) = planned("battery_service", scenario, seed).of(PlannedServer)
     return [(r["success"], r["message"]) for r in server.responses]
 
 
@@ -198,7 +200,7 @@ def test_a_useless_answer_comes_between_good_ones_and_two_low_ones(scenario: str
 @given(SEEDS)
 def test_a_server_goes_away_after_a_good_answer_and_some_time_after_a_refusal(seed: int) -> None:
     """So that what is written after any answer is told from a start."""
-    (server,) = planned("battery_service", "client_deserted", seed).servers
+    (server,) = planned("battery_service", "client_deserted", seed).of(PlannedServer)
     answers = [server.responses[min(k, len(server.responses) - 1)] for k in range(server.answers)]
     told = [r["success"] and charge_of((True, r["message"])) > 20 for r in answers]
     assert told[:3] == [True, False, True]
@@ -289,10 +291,10 @@ def test_every_built_in_plan_fits_its_observation(seed: int) -> None:
     for id_, exercise in EXERCISES.items():
         for scenario in exercise.scenarios:
             plan_ = plan(id_, scenario, seed)
-            for calls in plan_.calls:
+            for calls in plan_.of(PlannedCalls):
                 count = len(calls.requests) // calls.clients
                 assert calls.start_ns + (count - 1) * calls.period_ns < plan_.duration_ns
-            for recording in plan_.recordings:
+            for recording in plan_.of(PlannedRecording):
                 assert recording.stop_ns < plan_.duration_ns
             assert all(t_ns < plan_.duration_ns for _, t_ns in plan_.starts_ns)
 
@@ -302,10 +304,12 @@ def test_no_length_is_known_beforehand() -> None:
     rate = {planned("velocity_publisher", "alone", seed).duration_ns for seed in range(20)}
     assert len(rate) > 15
     assert all(11 * S <= duration_ns <= 15 * S for duration_ns in rate)
-    orders = {tuple(planned("two_node_communication", "controller_alone", n).numbers[0].numbers) for n in range(50)}
+    orders = {
+        tuple(planned("two_node_communication", "controller_alone", n).of(PlannedNumbers)[0].numbers) for n in range(50)
+    }
     shapes = {tuple((round(v) // 26, side) for v, side in order) for order in orders}
     assert len(shapes) == 50
-    asked = {len(planned("battery_service", "server_asked", seed).calls[0].requests) for seed in range(50)}
+    asked = {len(planned("battery_service", "server_asked", seed).of(PlannedCalls)[0].requests) for seed in range(50)}
     assert asked == {3 * calls for calls in range(16, 25)}
 
 
@@ -337,7 +341,7 @@ def fixed(items: Sequence[Any]) -> Iterator[Any]:
 def test_every_required_case_comes_under_any_seed(items: tuple[Any, ...], seed: int) -> None:
     """And no more than may."""
     stream = NumberStream("/a", "std_msgs/msg/Float32", items, 100 * MS, 100 * MS, 0)
-    found = [v for v, _ in plan("x", Scenario("a", ("a.py",), Span(S), (stream,)), seed).numbers[0].numbers]
+    found = [v for v, _ in plan("x", Scenario("a", ("a.py",), Span(S), (stream,)), seed).of(PlannedNumbers)[0].numbers]
     assert not Counter(fixed(items)) - Counter(found)
     low, high = cases(items)
     assert low <= len(found) <= high
@@ -353,7 +357,10 @@ def test_a_drawn_time_lies_between_its_ends(seed: int, low_ns: int, more_ns: int
 def test_a_stream_without_numbers_is_one() -> None:
     """Where the seed draws none of those that may come."""
     stream = NumberStream("/a", "t", (SomeOf((1.0,), CountBetween(0, 1)),), 100 * MS, TimeBetween(S, 2 * S), 0)
-    counts = {len(plan("x", Scenario("a", ("a.py",), Span(3 * S), (stream,)), n).numbers[0].numbers) for n in range(9)}
+    counts = {
+        len(plan("x", Scenario("a", ("a.py",), Span(3 * S), (stream,)), n).of(PlannedNumbers)[0].numbers)
+        for n in range(9)
+    }
     assert counts == {0, 30}  # the last one goes on until the end
 
 
@@ -365,14 +372,33 @@ SCENARIOS = (
 )
 
 
+#: Plans had one list for each of these kinds.
+LISTS = {
+    "numbers": PlannedNumbers,
+    "recordings": PlannedRecording,
+    "messages": PlannedMessages,
+    "servers": PlannedServer,
+    "calls": PlannedCalls,
+    "goals": PlannedGoal,
+}
+
+
+def _of_old(made: Plan) -> dict[str, Any]:
+    """Return the drawn parts of a plan as they were written when the digest was made."""
+    data = to_json(made)
+    lists: dict[str, list[Any]] = {name: [] for name in LISTS}
+    for planned, written in zip(made.stimuli, data["stimuli"], strict=True):
+        assert written.pop("is") == type(planned).__name__
+        assert written.pop("field", "") == ""  # which is younger
+        lists[next(name for name, kind in LISTS.items() if isinstance(planned, kind))].append(written)
+    return {**lists, **{name: data[name] for name in ("duration_ns", "starts_ns", "host_seed")}}
+
+
 def test_what_leaves_nothing_open_is_planned_as_ever() -> None:
     """Byte for byte: evidence stays comparable, and a seed that somebody noted still gives the same run."""
     exercise = read_rubric(Path(__file__).with_name("fixed_course.yaml"))
-    kept = ("numbers", "recordings", "messages", "servers", "calls", "goals", "duration_ns", "starts_ns", "host_seed")
-    plans = [to_json(plan("fixed", s, seed)) for s in exercise.scenarios for seed in (1, 2, 2**40)]
-    for numbers in (numbers for data in plans for numbers in data["numbers"]):
-        assert numbers.pop("field") == ""  # which is younger than the digest
-    text = json.dumps([{name: data[name] for name in kept} for data in plans])
+    plans = [_of_old(plan("fixed", s, seed)) for s in exercise.scenarios for seed in (1, 2, 2**40)]
+    text = json.dumps(plans)
     assert hashlib.sha256(text.encode()).hexdigest() == PLANS
     assert tuple(map(scenario_digest, exercise.scenarios)) == SCENARIOS
 
@@ -382,5 +408,5 @@ def test_one_stimulus_more_changes_nothing_before_it(seed: int) -> None:
     """Orders, counts and times are drawn for each by itself."""
     open_ = (AnyOrder((1.0, 2.0, Between(3, 9))), SomeOf((4.0,), CountBetween(0, 5)))
     one = NumberStream("/a", "t", open_, 100 * MS, TimeBetween(S, 2 * S), TimeBetween(0, S))
-    alone = plan("x", Scenario("a", ("a.py",), Span(30 * S), (one,)), seed).numbers
-    assert plan("x", Scenario("a", ("a.py",), Span(30 * S), (one, one)), seed).numbers[:1] == alone
+    alone = plan("x", Scenario("a", ("a.py",), Span(30 * S), (one,)), seed).of(PlannedNumbers)
+    assert plan("x", Scenario("a", ("a.py",), Span(30 * S), (one, one)), seed).of(PlannedNumbers)[:1] == alone

@@ -15,7 +15,10 @@ pytest.importorskip("rclpy")
 from hostile import MS, record
 
 from grader.core.quantities import NS_PER_S
-from grader.execution.exchanges import PlannedCalls, PlannedGoal, PlannedMessages, PlannedServer
+from grader.stimuli.calls import PlannedCalls
+from grader.stimuli.goals import PlannedGoal
+from grader.stimuli.messages import PlannedMessages
+from grader.stimuli.server import PlannedServer
 
 pytestmark = pytest.mark.ros
 
@@ -306,7 +309,7 @@ rclpy.spin(Server())
 @pytest.mark.parametrize("program", ANEW.values(), ids=ANEW)
 def test_a_client_made_anew_for_each_question_finds_the_graders_server(run: Callable[..., Trace], program: str) -> None:
     server = PlannedServer("/status", "std_srvs/srv/Trigger", 0, 0, 0, cycle=False, answers=0, responses=ANSWERS)
-    trace = run(ASKING + textwrap.dedent(program), servers=(server,), duration_ns=8 * NS_PER_S)
+    trace = run(ASKING + textwrap.dedent(program), stimuli=(server,), duration_ns=8 * NS_PER_S)
     assert [line.text for line in trace.lines()] == ["n0", "n1", "n2"]
     assert [request.t_ns // NS_PER_S for request in trace.requests("/status", "student")] == [0, 1, 2]
 
@@ -348,7 +351,7 @@ time.sleep(1)
 """
     calls = PlannedCalls("/status", "std_srvs/srv/Trigger", 500 * MS, NS_PER_S, 1, ({},))
     ends: Any = {"clock": clock, "duration_ns": ITS_END_NS}
-    assert len(run(program, calls=(calls,), **ends).responses("/status", "student")) == 1
+    assert len(run(program, stimuli=(calls,), **ends).responses("/status", "student")) == 1
     client = "rclpy.init()\nasker.node = Node('asker')\nclient = asker.node.create_client(Trigger, '/status')\n"
     client += "client.wait_for_service()\nasker.ask(client)\n"
     assert [line.text for line in run(program, ASKING + client, **ends).lines()] == ["n0"]
@@ -366,7 +369,7 @@ def test_a_client_that_asks_and_leaves_has_asked(run: Callable[..., Trace], endi
         client.call_async(Trigger.Request())
         {ending}
         """
-    trace = run(program, servers=(server,), clock=clock, duration_ns=ITS_END_NS)
+    trace = run(program, stimuli=(server,), clock=clock, duration_ns=ITS_END_NS)
     assert len(trace.requests("/status", "student")) == 1
 
 
@@ -471,7 +474,7 @@ def test_an_action_server_that_leaves_has_told_everything(run: Callable[..., Tra
     """Feedback and the result reach the grader's client."""
     pytest.importorskip("test_msgs")
     goal = PlannedGoal("/count", "test_msgs/action/Fibonacci", NS_PER_S, 0, {"order": 3}, (7,) * 16)
-    trace = run(ACTION + ending, goals=(goal,))
+    trace = run(ACTION + ending, stimuli=(goal,))
     assert len(trace.messages("/count/_action/feedback")) == 3
     assert len(trace.responses("/count/_action/get_result", "student")) == 1
 
@@ -528,7 +531,7 @@ def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run: Callab
         node.create_timer(0.251, renew)
         rclpy.spin(node)
         """,
-        messages=(numbers,),
+        stimuli=(numbers,),
     )
     assert [line.text for line in trace.lines()] == [str(n) for n in range(3, 30)]
 

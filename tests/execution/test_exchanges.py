@@ -16,31 +16,17 @@ pytest.importorskip("rclpy")
 from scripted import plan
 
 from grader.core.errors import HarnessError
-from grader.core.scenario import (
-    ActionGoal,
-    Between,
-    Choose,
-    MessageStream,
-    Scenario,
-    ServiceCalls,
-    ServiceServer,
-    Span,
-    Written,
-)
+from grader.core.scenario import Between, Choose, Planned, Scenario, Span, Written
 from grader.execution.codec import from_json, to_json
 from grader.execution.evidence.manifest import scenario_digest
-from grader.execution.exchanges import (
-    PlannedServer,
-    drawn_fields,
-    drawn_number,
-    plan_calls,
-    plan_goal,
-    plan_messages,
-    plan_server,
-)
 from grader.execution.interfaces import built, interface_class, plain_fields
 from grader.execution.plan import Plan
 from grader.execution.service_peers import check_types
+from grader.stimuli.calls import ServiceCalls
+from grader.stimuli.drawing import Draws, drawn_fields, drawn_number
+from grader.stimuli.goals import ActionGoal
+from grader.stimuli.messages import MessageStream
+from grader.stimuli.server import PlannedServer, ServiceServer
 
 TRIGGER, SCAN = "std_srvs/srv/Trigger", "sensor_msgs/msg/LaserScan"
 TOLD: Mapping[str, FieldSpec] = {
@@ -51,6 +37,10 @@ TOLD: Mapping[str, FieldSpec] = {
 
 def draw(seed: int = 1) -> random.Random:
     return random.Random(seed)
+
+
+def draws() -> Draws:
+    return Draws(own=draw(), shared=draw())
 
 
 def test_everything_is_drawn_and_follows_from_the_seed() -> None:
@@ -78,7 +68,7 @@ def test_a_drawn_fraction_has_as_many_decimals_as_its_range_needs(low: float, hi
 
 def test_calls_are_drawn_for_each_client() -> None:
     """Requests begin again after the last one, and no two drawn ones need be alike."""
-    calls = plan_calls(ServiceCalls("/s", "t", ({"a": Between(0, 999999)}, {"a": 7}), calls=3, clients=2), draw())
+    calls = ServiceCalls("/s", "t", ({"a": Between(0, 999999)}, {"a": 7}), calls=3, clients=2).planned(draws())
     assert [r["a"] == 7 for r in calls.requests] == [False, False, True, True, False, False]
     assert len({r["a"] for r in calls.requests}) == 5
 
@@ -94,7 +84,7 @@ def test_calls_are_drawn_for_each_client() -> None:
 )
 def test_responses_are_given_in_order(server: dict[str, Any], answers: list[int | None]) -> None:
     """The last one is repeated, or the first one follows, or nothing does."""
-    planned = plan_server(ServiceServer("/s", TRIGGER, **server), draw())
+    planned = ServiceServer("/s", TRIGGER, **server).planned(draws())
     given = [planned.response(index) for index in range(4)]
     assert [None if g is None else g["n"] for g in given] == answers
 
@@ -102,10 +92,12 @@ def test_responses_are_given_in_order(server: dict[str, Any], answers: list[int 
 def test_a_plan_crosses_the_line() -> None:
     """With everything that was drawn."""
     exchanges = plan(
-        messages=(plan_messages(MessageStream("/a", SCAN, ({"ranges": (1, Between(1, 2))},), 5), draw()),),
-        servers=(plan_server(ServiceServer("/s", TRIGGER, (TOLD,)), draw()),),
-        calls=(plan_calls(ServiceCalls("/s", TRIGGER, ({},), calls=2), draw()),),
-        goals=(plan_goal(ActionGoal("/g", "test_msgs/action/Fibonacci", {"order": 5}), draw()),),
+        stimuli=(
+            MessageStream("/a", SCAN, ({"ranges": (1, Between(1, 2))},), 5).planned(draws()),
+            ServiceServer("/s", TRIGGER, (TOLD,)).planned(draws()),
+            ServiceCalls("/s", TRIGGER, ({},), calls=2).planned(draws()),
+            ActionGoal("/g", "test_msgs/action/Fibonacci", {"order": 5}).planned(draws()),
+        ),
         starts_ns=(("a.py", 5),),
         may_exit=("a.py",),
         shutdown_ns=7,
@@ -141,30 +133,30 @@ def test_a_field_that_the_type_lacks_is_named(interface: str, fields: dict[str, 
 
 
 @pytest.mark.parametrize(
-    ("stimuli", "message"),
+    ("planned", "message"),
     [
         (
-            {"servers": (PlannedServer("/s", "no_msgs/srv/None", 0, 0, 0, False, 0, ()),)},
+            PlannedServer("/s", "no_msgs/srv/None", 0, 0, 0, False, 0, ()),
             "scenario alone, server of /s: expected the type no_msgs/srv/None on this machine, found none",
         ),
         (
-            {"servers": (PlannedServer("/s", TRIGGER, 0, 0, 0, False, 0, ({"succes": True},)),)},
+            PlannedServer("/s", TRIGGER, 0, 0, 0, False, 0, ({"succes": True},)),
             "scenario alone, server of /s: expected a field of std_srvs/Trigger_Response (success, message)",
         ),
         (
-            {"calls": (plan_calls(ServiceCalls("/s", TRIGGER, ({"data": 1},)), draw()),)},
+            ServiceCalls("/s", TRIGGER, ({"data": 1},)).planned(draws()),
             "scenario alone, calls of /s: expected a field of std_srvs/Trigger_Request (no fields)",
         ),
         (
-            {"messages": (plan_messages(MessageStream("/a", "std_msgs/srv/Trigger", ({},), 5), draw()),)},
+            MessageStream("/a", "std_msgs/srv/Trigger", ({},), 5).planned(draws()),
             "scenario alone, messages on /a: expected the type std_msgs/srv/Trigger on this machine",
         ),
     ],
 )
-def test_what_a_plan_needs_is_looked_for_before_it_runs(stimuli: dict[str, Any], message: str) -> None:
+def test_what_a_plan_needs_is_looked_for_before_it_runs(planned: Planned, message: str) -> None:
     """A type that this machine lacks is not the student's fault."""
     with pytest.raises(HarnessError) as refused:
-        check_types(plan(**stimuli))
+        check_types(plan(stimuli=(planned,)))
     assert refused.value.message.startswith(message)
 
 

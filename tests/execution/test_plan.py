@@ -12,22 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.core.scenario import (
-    ODOMETRY,
-    Between,
-    JustAbove,
-    JustBelow,
-    NumberStream,
-    RecordedStream,
-    Scenario,
-    Span,
-    Stimulus,
-    TimedMessage,
-)
+from grader.core.scenario import ODOMETRY, Between, JustAbove, JustBelow, Scenario, Span, Stimulus
 from grader.core.submission import StudentFile, Submission
-from grader.execution.bag import Recording
 from grader.execution.codec import from_json, to_json
 from grader.execution.plan import Plan, derive, plan_scenario
+from grader.stimuli.numbers import NumberStream, PlannedNumbers
+from grader.stimuli.recorded import PlannedRecording, RecordedStream, Recording, TimedMessage
 from grader.student_host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 
 MS = 1_000_000
@@ -69,13 +59,13 @@ DRAWN = stream(Between(20.5, 24), Between(0, 10**9), Between(27.25, 30))
 def test_the_same_seed_draws_the_same_values() -> None:
     """A run can be repeated."""
     assert plan(DRAWN, seed=7) == plan(DRAWN, seed=7)
-    assert plan(DRAWN, seed=7).numbers != plan(DRAWN, seed=8).numbers
+    assert plan(DRAWN, seed=7).of(PlannedNumbers) != plan(DRAWN, seed=8).of(PlannedNumbers)
 
 
 def test_scenarios_and_exercises_draw_for_themselves() -> None:
     """What is known of one says nothing of another."""
     drawn = {
-        plan(DRAWN, name=name, exercise=exercise).numbers[0].numbers
+        plan(DRAWN, name=name, exercise=exercise).of(PlannedNumbers)[0].numbers
         for name in ("alone", "together")
         for exercise in "xy"
     }
@@ -84,7 +74,7 @@ def test_scenarios_and_exercises_draw_for_themselves() -> None:
 
 def test_a_stimulus_more_does_not_change_those_before_it() -> None:
     """Draws are made in order."""
-    assert plan(DRAWN).numbers[0] == plan(DRAWN, stream(Between(0, 1))).numbers[0]
+    assert plan(DRAWN).of(PlannedNumbers)[0] == plan(DRAWN, stream(Between(0, 1))).of(PlannedNumbers)[0]
 
 
 def test_students_cannot_tell_the_stimuli_from_their_seed() -> None:
@@ -122,7 +112,7 @@ def test_the_date_follows_from_the_seed_alone() -> None:
 @given(st.integers(0, 2**32 - 1), st.integers(-50, 50), st.integers(0, 50))
 def test_whole_bounds_draw_whole_numbers_inside_them(seed: int, low: int, width: int) -> None:
     """A student's whole type carries them without rounding."""
-    ((value, side),) = plan(stream(Between(low, low + width)), seed=seed).numbers[0].numbers
+    ((value, side),) = plan(stream(Between(low, low + width)), seed=seed).of(PlannedNumbers)[0].numbers
     assert low <= value <= low + width
     assert value == int(value)
     assert side == 0
@@ -131,27 +121,27 @@ def test_whole_bounds_draw_whole_numbers_inside_them(seed: int, low: int, width:
 @given(st.integers(0, 2**32 - 1))
 def test_other_bounds_draw_two_decimals_inside_them(seed: int) -> None:
     """Exactly what two printed decimals show."""
-    ((value, _),) = plan(stream(Between(20.5, 24)), seed=seed).numbers[0].numbers
+    ((value, _),) = plan(stream(Between(20.5, 24)), seed=seed).of(PlannedNumbers)[0].numbers
     assert 20.5 <= value <= 24
     assert float(f"{value:.2f}") == value
 
 
 def test_both_ends_of_whole_bounds_can_be_drawn() -> None:
     """The bounds are inside."""
-    drawn = {plan(stream(Between(1, 3)), seed=seed).numbers[0].numbers[0][0] for seed in range(50)}
+    drawn = {plan(stream(Between(1, 3)), seed=seed).of(PlannedNumbers)[0].numbers[0][0] for seed in range(50)}
     assert drawn == {1.0, 2.0, 3.0}
 
 
 def test_limits_are_left_to_the_student_s_type() -> None:
     """How far above is just above depends on it."""
-    planned = plan(stream(25, JustAbove(25), JustBelow(25))).numbers[0]
+    planned = plan(stream(25, JustAbove(25), JustBelow(25))).of(PlannedNumbers)[0]
     assert planned.numbers == ((25, 0), (25, 1), (25, -1))
 
 
 @pytest.mark.parametrize(("hold_ms", "repeats"), [(2000, 10), (200, 1), (100, 1), (399, 1), (400, 2)])
 def test_a_number_is_repeated_while_it_is_held(hold_ms: int, repeats: int) -> None:
     """At least once."""
-    assert plan(stream(1, hold_ns=hold_ms * MS)).numbers[0].repeats == repeats
+    assert plan(stream(1, hold_ns=hold_ms * MS)).of(PlannedNumbers)[0].repeats == repeats
 
 
 def test_processes_run_the_files_that_were_found() -> None:
@@ -172,7 +162,7 @@ def drive(count: int = 600, period_ms: int = 33) -> Recording:
 def test_a_recording_is_played_from_its_start_time() -> None:
     """With its own pace, no longer than asked for, and the publisher goes just after the last message."""
     asked = RecordedStream("/odom", ODOMETRY, "drive", 5000 * MS, 12_000 * MS)
-    (recording,) = plan(asked, recording=drive()).recordings
+    (recording,) = plan(asked, recording=drive()).of(PlannedRecording)
     times = [t for t, _, _ in recording.messages]
     assert (recording.topic, recording.type, recording.start_ns) == ("/odom", "nav_msgs/msg/Odometry", 5000 * MS)
     assert times[0] == 5000 * MS
@@ -184,7 +174,9 @@ def test_a_recording_is_played_from_its_start_time() -> None:
 def test_which_part_of_a_recording_is_played_is_drawn() -> None:
     """A position that was written into the code does not help."""
     asked = RecordedStream("/odom", ODOMETRY, "drive", 0, 5000 * MS)
-    starts = {plan(asked, seed=seed, recording=drive()).recordings[0].messages[0][2]["n"] for seed in range(20)}
+    starts = {
+        plan(asked, seed=seed, recording=drive()).of(PlannedRecording)[0].messages[0][2]["n"] for seed in range(20)
+    }
     assert len(starts) > 5
 
 

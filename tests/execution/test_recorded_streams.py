@@ -22,10 +22,11 @@ from grader.authoring.checking import check_rubric
 from grader.classroom.sending import checks_of
 from grader.core.errors import RecordingError, RubricError
 from grader.core.quantities import NS_PER_S
-from grader.core.scenario import ODOMETRY, RecordedStream
+from grader.core.scenario import ODOMETRY
 from grader.execution.bag import read_bag
 from grader.execution.evidence.manifest import scenario_digest
 from grader.rubrics.loader import read_rubric
+from grader.stimuli.recorded import RecordedStream
 
 GRADE = Path(sys.executable).with_name("grade")
 SCAN, POSE = "sensor_msgs/msg/LaserScan", "geometry_msgs/msg/PoseStamped"

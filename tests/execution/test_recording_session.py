@@ -34,7 +34,7 @@ class Recorder:
 
 
 def job(scenario: str) -> Job:
-    plan = Plan(scenario, (), "/", "00", 1, "", 1, (), (), VIRTUAL)
+    plan = Plan(scenario, (), "/", "00", 1, "", 1, VIRTUAL)
     return Job(scenario, plan)
 
 

@@ -16,11 +16,11 @@ from std_srvs.srv import Trigger
 from grader.core.limits import Limits
 from grader.core.trace import Mark, Request, Response
 from grader.execution.ending import is_free_exit, is_normal_stop
-from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedServer
 from grader.execution.service_ends import Arrived, ServiceEnds
 from grader.execution.service_peers import ServicePeers
-from grader.execution.stimuli import Ask, Respond
 from grader.execution.trace_recorder import TraceRecorder
+from grader.stimuli.calls import Ask, PlannedCall, PlannedCalls
+from grader.stimuli.server import PlannedServer, Respond
 
 #: ROS loads a type's support when it is first used, and imports what Python would rather see gone.
 pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")

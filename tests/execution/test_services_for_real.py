@@ -16,11 +16,15 @@ from grader.execution.recording_session import RecordingSession
 pytest.importorskip("rclpy")
 
 from grader.core.quantities import NS_PER_MS, NS_PER_S
-from grader.core.scenario import ActionGoal, MessageStream, Scenario, ServiceCalls, ServiceServer, Span
+from grader.core.scenario import Scenario, Span
 from grader.core.trace import ClockKind, Fault, LogRecord, Mark, Request, Response
 from grader.execution.codec import trace_to_json
 from grader.execution.plan import plan_scenario
 from grader.execution.supervisor import Job
+from grader.stimuli.calls import ServiceCalls
+from grader.stimuli.goals import ActionGoal
+from grader.stimuli.messages import MessageStream
+from grader.stimuli.server import ServiceServer
 from grader.submissions.submission import stage_submission
 
 pytestmark = pytest.mark.ros

@@ -8,21 +8,15 @@ pytest.importorskip("rclpy")
 
 from scripted import FLOAT, MS, numbers, plan
 
-from grader.execution.plan import PlannedRecording
-from grader.execution.stimuli import (
-    Appear,
-    Disappear,
-    PublishNumber,
-    PublishRecorded,
-    number_message,
-    numeric_field,
-    schedule,
-)
+from grader.execution.interfaces import number_message, numeric_field
+from grader.stimuli.events import Appear, Disappear
+from grader.stimuli.numbers import PublishNumber
+from grader.stimuli.recorded import PlannedRecording, PublishRecorded
 
 
 def test_numbers_follow_each_other_in_their_period() -> None:
     """Each as often as it is held; the publisher is there from the start and stays."""
-    due = schedule(plan(numbers=(numbers((20.0, 0), (30.0, 0), start_ms=500, period_ms=200, repeats=2),)))
+    due = plan(stimuli=(numbers((20.0, 0), (30.0, 0), start_ms=500, period_ms=200, repeats=2),)).events()
     assert due == [
         Appear(0, "/temperature", FLOAT),
         PublishNumber(500 * MS, "/temperature", (20.0, 0)),
@@ -36,7 +30,7 @@ def test_streams_are_merged_by_time_and_keep_their_order() -> None:
     """At one instant, the one named first goes first; a publisher appears before it publishes."""
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 500 * MS, 501 * MS, ((500 * MS, b"", {}),))
     streams = (numbers((1.0, 0), topic="/a", start_ms=500), numbers((2.0, 0), topic="/b", start_ms=500))
-    due = schedule(plan(numbers=streams, recordings=(recording,)))
+    due = plan(stimuli=(*streams, recording)).events()
     assert due == [
         Appear(0, "/a", FLOAT),
         Appear(0, "/b", FLOAT),

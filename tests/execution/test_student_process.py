@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from grader.core.limits import Limits
 from grader.core.trace import FaultKind, LogRecord, OutputLine, Start, StartWay
 from grader.execution import student_process as module
+from grader.execution.console import TEXT_CHARACTERS
 from grader.execution.notes import Places
 from grader.execution.sandbox.protocol import Command
 from grader.execution.student_process import NodeProcess
@@ -261,13 +262,13 @@ def test_a_megabyte_of_beginnings_is_read_in_one_go() -> None:
     text = f"\x1e{TOKEN}\x1fINFO\x1fa\x1fb\x1f1\x1f".encode() * 30_000
     found = read(text + b"\n", final=True)
     assert len(found) == 1
-    assert len(found[0].text) == module.TEXT_CHARACTERS
+    assert len(found[0].text) == TEXT_CHARACTERS
 
 
 def test_long_texts_are_cut() -> None:
     """One line may not fill a report."""
-    assert len(read(record("x" * 10_000))[0].text) == module.TEXT_CHARACTERS
-    assert len(read(b"", b"x" * 10_000 + b"\n")[0].text) == module.TEXT_CHARACTERS
+    assert len(read(record("x" * 10_000))[0].text) == TEXT_CHARACTERS
+    assert len(read(b"", b"x" * 10_000 + b"\n")[0].text) == TEXT_CHARACTERS
 
 
 @settings(deadline=None)

@@ -154,7 +154,7 @@ class Stage:
 
 
 def plan(scenario: str = "alone", clock: str = "virtual") -> Plan:
-    return Plan(scenario, (("a.py", "a.py"),), "/nowhere", "ab" * 32, 5, "", 5, (), (), clock)
+    return Plan(scenario, (("a.py", "a.py"),), "/nowhere", "ab" * 32, 5, "", 5, clock)
 
 
 def jobs(*scenarios: str) -> list[Job]:

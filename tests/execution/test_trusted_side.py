@@ -23,9 +23,9 @@ from hostile import MS, hostile, record, staging
 from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import FaultKind
-from grader.execution.plan import PlannedNumbers
 from grader.execution.recording_session import open_session
 from grader.execution.usage import usage
+from grader.stimuli.numbers import PlannedNumbers
 
 pytestmark = pytest.mark.ros
 
@@ -252,7 +252,7 @@ def test_forged_stimuli_are_no_evidence(run: Callable[..., Trace]) -> None:
 for info in self.get_publishers_info_by_topic("/temperature"):
     forge(info.endpoint_gid, self.heard + 1, bytes([0, 1, 0, 0]) + struct.pack("<f", 99.0))
 """)
-    trace = run(forged, numbers=(STREAM,), duration_ns=3 * NS_PER_S, clock="wall")
+    trace = run(forged, stimuli=(STREAM,), duration_ns=3 * NS_PER_S, clock="wall")
     assert "99.0" in {line.text for line in trace.lines()}, "the forgery itself has to succeed"
     assert [d.value["data"] for d in trace.deliveries("/temperature")] == [21.0, 26.0] * 5
 
@@ -269,7 +269,7 @@ for info in self.get_publishers_info_by_topic("/temperature"):
 print(len(self.get_node_names()), flush=True)
 """)
     good = hostile()
-    trace = run(farewell, good, numbers=(STREAM,), duration_ns=3 * NS_PER_S)
+    trace = run(farewell, good, stimuli=(STREAM,), duration_ns=3 * NS_PER_S)
     assert "2" in {line.text for line in trace.lines()}, "the farewell itself has to be believed"
     assert [d.value["data"] for d in trace.deliveries("/temperature")] == [21.0, 26.0] * 5
     assert len(trace.messages("/cmd_vel")) <= 59

@@ -35,7 +35,7 @@ ACCEPTED = {
 
 def _plan(folder: Path, *names: str) -> Plan:
     processes = tuple((name, name) for name in names)
-    return Plan("alone", processes, str(folder), "ab" * 32, 10_000_000_000, "", 60_000_000_000, (), (), "virtual")
+    return Plan("alone", processes, str(folder), "ab" * 32, 10_000_000_000, "", 60_000_000_000, "virtual")
 
 
 @pytest.mark.parametrize("name", BROKEN | INERT)

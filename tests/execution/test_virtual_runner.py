@@ -32,10 +32,10 @@ from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapsh
 from grader.execution import discovery, machine, trace_recorder
 from grader.execution import virtual_runner as module
 from grader.execution.observer import Observer, Taken
-from grader.execution.plan import PlannedRecording
 from grader.execution.student_process import NodeProcess
 from grader.execution.virtual_runner import VirtualRunner
 from grader.execution.workload import HOPELESS_NS
+from grader.stimuli.recorded import PlannedRecording
 from grader.student_host import clock as host_clock
 from grader.student_host.clock import EPOCH_NS
 
@@ -163,7 +163,7 @@ def test_processes_take_turns_in_their_order() -> None:
 
 def test_a_stimulus_comes_before_what_processes_do_at_its_instant() -> None:
     """It is published first, and everybody who listens has it when woken."""
-    run = Run(sleeper(100, 200), listener("/temperature"), numbers=(numbers((20.5, 0), (25.0, 0)),))
+    run = Run(sleeper(100, 200), listener("/temperature"), stimuli=(numbers((20.5, 0), (25.0, 0)),))
     assert run.seen() == [
         "0 stream_starts /temperature",
         "100 to /temperature: 20.5",
@@ -229,7 +229,7 @@ def test_messages_of_one_instant_come_in_one_order(monkeypatch: pytest.MonkeyPat
 
 def test_a_process_may_go_on_alone_until_somebody_else_wants_something() -> None:
     """It is told how far: the next stimulus, the other's wish, or the end."""
-    run = Run(sleeper(50), sleeper(400), numbers=(numbers((1.0, 0), start_ms=300),))
+    run = Run(sleeper(50), sleeper(400), stimuli=(numbers((1.0, 0), start_ms=300),))
     free = [[(a["free_until_ns"] - EPOCH_NS) / MS for a in s.heard if "free_until_ns" in a] for s in run.students]
     assert free[0] == [0, 300] or free[0] == [300, 300]
     assert free[1][-1] == 1000
@@ -413,7 +413,7 @@ def test_an_end_is_a_fault_and_the_others_go_on() -> None:
 
 def test_stimuli_are_played_to_nobody_as_well() -> None:
     """What was to happen has happened, though nobody is left to hear it."""
-    run = Run(saying(), numbers=(numbers((1.0, 0), (2.0, 0)),))
+    run = Run(saying(), stimuli=(numbers((1.0, 0), (2.0, 0)),))
     assert [d.t_ns // MS for d in run.trace.deliveries("/temperature")] == [100, 200]
 
 
@@ -430,15 +430,15 @@ def test_numbers_come_in_the_type_that_is_asked_for() -> None:
     """Whole types get whole steps above and below a limit, others a thousandth; the default serves nobody."""
     values = ((25.0, 0), (25.0, 1), (25.0, -1), (20.4, 0))
     for interface, wanted in ((INT, [25, 26, 24, 20]), (FLOAT, [25.0, 25.001, 24.999, 20.4])):
-        run = Run(listener("/temperature", interface), numbers=(numbers(*values),))
+        run = Run(listener("/temperature", interface), stimuli=(numbers(*values),))
         assert [d.value["data"] for d in run.trace.deliveries("/temperature")] == pytest.approx(wanted, abs=1e-5)
         assert {d.type for d in run.trace.deliveries("/temperature")} == {interface}
-    assert {d.type for d in Run(numbers=(numbers(*values),)).trace.deliveries("/temperature")} == {FLOAT}
+    assert {d.type for d in Run(stimuli=(numbers(*values),)).trace.deliveries("/temperature")} == {FLOAT}
 
 
 def test_a_type_that_carries_no_number_is_not_followed() -> None:
     """The stimulus keeps its own; nothing arrives, which is what the graph says."""
-    run = Run(listener("/temperature", "std_msgs/msg/String"), numbers=(numbers((1.0, 0)),))
+    run = Run(listener("/temperature", "std_msgs/msg/String"), stimuli=(numbers((1.0, 0)),))
     assert [d.type for d in run.trace.deliveries("/temperature")] == [FLOAT]
     assert not any("got" in line for line in run.seen())
 
@@ -446,7 +446,7 @@ def test_a_type_that_carries_no_number_is_not_followed() -> None:
 def test_a_subscription_that_cannot_be_served_is_told_of_nothing() -> None:
     """Its host would wait, in real time, for messages that never come."""
     for qos in ({"deadline_ns": 5 * MS}, {"manual": True}):
-        run = Run(listener("/temperature", **qos), numbers=(numbers((1.0, 0)),))
+        run = Run(listener("/temperature", **qos), stimuli=(numbers((1.0, 0)),))
         assert not any("got" in line for line in run.seen())
 
 
@@ -483,7 +483,7 @@ def test_a_recording_appears_plays_and_disappears() -> None:
     """As it was recorded, in the types and bytes it has."""
     messages = tuple((t * MS, b"cdr", {"data": t}) for t in (200, 233, 266))
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, messages)
-    run = Run(sleeper(500), recordings=(recording,))
+    run = Run(sleeper(500), stimuli=(recording,))
     assert run.seen() == [
         "200 stream_starts /odom",
         "200 to /odom: 200",
@@ -609,7 +609,7 @@ def test_nothing_is_announced_to_an_end_without_a_counterpart(missing: list[str]
         me.missing = missing
         yield from listener("/temperature")(me, world)
 
-    run = Run(deaf, numbers=(numbers((1.0, 0)),))
+    run = Run(deaf, stimuli=(numbers((1.0, 0)),))
     reached = missing != ["subscription /temperature"]
     assert any("got {'topic /temperature': 1}" in line for line in run.seen()) is reached
     assert run.trace.incomplete is bool(missing)
@@ -690,7 +690,7 @@ REPORT = st.fixed_dictionaries(
 @given(st.lists(REPORT, max_size=6), JSON)
 def test_nothing_that_a_process_says_breaks_the_conductor(reports: list[Any], missing: Any) -> None:
     """Every field is untrusted: the worst that a report does is to end its own process."""
-    run = Run(saying(*reports, missing=missing), sleeper(500), numbers=(numbers((1.0, 0)),))
+    run = Run(saying(*reports, missing=missing), sleeper(500), stimuli=(numbers((1.0, 0)),))
     assert "500 b.py: awake for 500" in run.seen()
     assert all(type(note) is str for note in run.trace.notes)
     for o in run.trace.faults():

@@ -15,9 +15,9 @@ from grader.core.limits import Limits
 from grader.core.trace import ClockKind, FaultKind
 from grader.execution import wall_runner as module
 from grader.execution.observer import Observer
-from grader.execution.plan import PlannedRecording
 from grader.execution.student_process import NodeProcess
 from grader.execution.wall_runner import WallRunner
+from grader.stimuli.recorded import PlannedRecording
 
 SILENT = {"kind": "silent"}
 
@@ -158,7 +158,7 @@ def test_numbers_are_published_when_they_are_due(clock: Clock) -> None:
         world.have(me.name, claim("subscription", "/temperature", INT))
         yield from quiet(me, world)
 
-    run = Run(program, numbers=(numbers((25.0, 1), (20.0, 0)),))
+    run = Run(program, stimuli=(numbers((25.0, 1), (20.0, 0)),))
     deliveries = run.trace.deliveries("/temperature")
     assert [d.t_ns // MS for d in deliveries] == [100, 200]
     assert [(d.type, d.value["data"]) for d in deliveries] == [(INT, 26), (INT, 20)]
@@ -169,7 +169,7 @@ def test_a_recording_appears_plays_and_disappears(clock: Clock) -> None:
     """The publisher is there exactly while it plays."""
     messages = tuple((t * MS, b"cdr", {"data": t}) for t in (200, 233, 266))
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, messages)
-    trace = Run(quiet, recordings=(recording,)).trace
+    trace = Run(quiet, stimuli=(recording,)).trace
     assert [d.t_ns // MS for d in trace.deliveries("/odom")] == [200, 233, 266]
     assert [m.t_ns // MS for m in (*trace.marks("stream_starts", "/odom"), *trace.marks("stream_stops", "/odom"))] == [
         200,
@@ -221,8 +221,8 @@ def test_a_recording_s_publisher_stays_until_its_last_message_has_arrived(clock:
     """A publisher that goes at once takes with it what is still on its way."""
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, ((200 * MS, b"cdr", {}),))
     gone = ("/odom", "", False)
-    assert Run(quiet, recordings=(recording,), duration_ns=600 * MS).observer.advertised[-1] != gone
-    assert Run(quiet, recordings=(recording,), duration_ns=700 * MS).observer.advertised[-1] == gone
+    assert Run(quiet, stimuli=(recording,), duration_ns=600 * MS).observer.advertised[-1] != gone
+    assert Run(quiet, stimuli=(recording,), duration_ns=700 * MS).observer.advertised[-1] == gone
 
 
 def test_a_node_that_floods_is_no_excuse(clock: Clock) -> None:
@@ -236,7 +236,7 @@ def test_two_recordings_on_one_topic_do_not_end_each_other(clock: Clock) -> None
     """The first one's publisher, which stays for its last message, goes before the second one's comes."""
     first = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 300 * MS, ((200 * MS, b"cdr", {}),))
     second = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 400 * MS, 900 * MS, ((800 * MS, b"cdr", {}),))
-    run = Run(quiet, recordings=(first, second))
+    run = Run(quiet, stimuli=(first, second))
     assert [(topic, bool(kind)) for topic, kind, _ in run.observer.advertised] == [
         ("/odom", True),
         ("/odom", False),

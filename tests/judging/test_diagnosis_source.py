@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from work import calls_in
 
+from grader.core.limits import MAX_SOURCE_BYTES
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import FaultKind, Trace
 from grader.judging import diagnosis
@@ -21,7 +22,7 @@ from grader.judging.diagnosis import placed
 from grader.judging.diagnosis.rules import Case, Clue
 from grader.judging.diagnosis.wiring import constant, goes_to, made
 from grader.judging.source import LONGEST_SOURCE, chain, last_line, read
-from grader.submissions.sources import MAX_SOURCE_BYTES, read_sources
+from grader.submissions.sources import read_sources
 
 FILE = "velocity_publisher.py"
 DEEP = 3_000

@@ -8,7 +8,7 @@ import pytest
 from tracing import TWIST, Recording
 
 from grader.core.exercise import Finding
-from grader.execution.stimuli import number_message, numeric_field
+from grader.execution.interfaces import number_message, numeric_field
 from grader.judging.checks.fields import RandomInRange
 from grader.judging.checks.received import LogsReceived
 from grader.judging.values import number_of, number_path, published

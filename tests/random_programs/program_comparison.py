@@ -47,8 +47,6 @@ def plan_of(program: Program, folder: Path, clock: str = "virtual") -> Plan:
         duration_ns=program.duration_ms * NS_PER_MS,
         first_message_on="",
         wait_at_most_ns=60_000 * NS_PER_MS,
-        numbers=(),
-        recordings=(),
         clock=clock,
     )
 

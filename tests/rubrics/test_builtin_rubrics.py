@@ -16,12 +16,13 @@ from ruamel.yaml import YAML
 from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S
 from grader.core.rubric_files import rubrics_in
-from grader.core.scenario import RecordedStream, longest_course_ns, shortest
+from grader.core.scenario import shortest
 from grader.judging.checks import CHECKS
 from grader.rubrics.builtin import builtin_headers, builtin_rubrics
 from grader.rubrics.exercise_checks import known_checks
 from grader.rubrics.loader import read_rubric
 from grader.rubrics.schema import rubric_schema, schema_text
+from grader.stimuli.recorded import RecordedStream
 
 RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"
 
@@ -111,14 +112,14 @@ def test_odometry_comes_late_and_goes_early() -> None:
     assert shortest(stream.start_ns) == 5 * NS_PER_S
     assert shortest(stream.duration_ns) == 15 * NS_PER_S
     assert isinstance(scenario.span.duration_ns, int)
-    assert scenario.span.duration_ns - longest_course_ns(stream) >= 3 * NS_PER_S
+    assert scenario.span.duration_ns - stream.course_ns() >= 3 * NS_PER_S
 
 
 def test_every_scripted_number_is_held_for_its_whole_time() -> None:
     """No scripted value of exercise 3 is cut off by the end of its scenario."""
     for scenario in exercise("two_node_communication").scenarios:
         for stream in scenario.stimuli:
-            assert longest_course_ns(stream) <= shortest(scenario.span.duration_ns)
+            assert stream.course_ns() <= shortest(scenario.span.duration_ns)
 
 
 def test_the_shipped_schema_is_up_to_date() -> None:

@@ -15,8 +15,11 @@ from stand_in_checks import CHECKS, Everything, FieldValues, Point, Publishes, T
 
 from grader.core.errors import RubricError
 from grader.core.exercise import Criterion, Exercise
-from grader.core.scenario import ODOMETRY, Between, JustAbove, JustBelow, NumberStream, RecordedStream, Scenario, Span
-from grader.rubrics.loader import MAX_BYTES, MAX_MISTAKES, RubricMistakes, read_rubric
+from grader.core.limits import MAX_RUBRIC_BYTES
+from grader.core.scenario import ODOMETRY, Between, JustAbove, JustBelow, Scenario, Span
+from grader.rubrics.loader import MAX_MISTAKES, RubricMistakes, read_rubric
+from grader.stimuli.numbers import NumberStream
+from grader.stimuli.recorded import RecordedStream
 
 GOOD = """\
 schema: grader/rubric/v1
@@ -219,8 +222,8 @@ def test_a_file_full_of_mistakes_is_cut_short(rubric: Callable[..., Any]) -> Non
         (b"a: \xe9\n", "r.yaml:1:4: expected UTF-8 text, found the byte 0xe9"),
         ("é: x\nab: ü".encode() + b"\xff", "r.yaml:2:6: expected UTF-8 text, found the byte 0xff"),
         (GOOD.encode("utf-16"), "r.yaml:1:1: expected UTF-8 text, found the byte 0xff"),
-        (b"x" * (MAX_BYTES + 1), "r.yaml: expected at most 256 KiB, found more"),
-        (b"[" * MAX_BYTES, "r.yaml:1:25: expected at most 24 levels, found more"),
+        (b"x" * (MAX_RUBRIC_BYTES + 1), "r.yaml: expected at most 256 KiB, found more"),
+        (b"[" * MAX_RUBRIC_BYTES, "r.yaml:1:25: expected at most 24 levels, found more"),
         (b"a: &a [*a]", "r.yaml:1:4: expected a small document, found aliases that multiply it"),
         (b"%YAML 3.0\n---\na: 1", "r.yaml:1:1: not valid YAML"),
         (b'a: "\\U00110000"', "r.yaml:1:1: not valid YAML"),

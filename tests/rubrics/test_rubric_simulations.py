@@ -9,10 +9,11 @@ import pytest
 
 from grader.app.interface_packages import known_interfaces
 from grader.core.errors import RubricError
-from grader.core.scenario import Between, Choose, FieldSpec, Scenario, Simulated
+from grader.core.scenario import Between, Choose, FieldSpec, Scenario
 from grader.packaging import Chosen, classroom50
 from grader.rubrics.loader import read_rubric, side_files
 from grader.rubrics.schema import rubric_schema
+from grader.stimuli.simulation import Simulated
 
 RUBRIC = """\
 schema: grader/rubric/v1

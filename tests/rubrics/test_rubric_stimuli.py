@@ -10,17 +10,12 @@ from typing import Any
 import pytest
 
 from grader.core.errors import RubricError
-from grader.core.scenario import (
-    ActionGoal,
-    Between,
-    Choose,
-    MessageStream,
-    Scenario,
-    ServiceCalls,
-    ServiceServer,
-    Written,
-)
+from grader.core.scenario import Between, Choose, Scenario, Written
 from grader.rubrics.loader import read_rubric
+from grader.stimuli.calls import ServiceCalls
+from grader.stimuli.goals import ActionGoal
+from grader.stimuli.messages import MessageStream
+from grader.stimuli.server import ServiceServer
 
 MS, S = 1_000_000, 1_000_000_000
 HEAD = """\

@@ -14,10 +14,10 @@ from stand_in_checks import CHECKS
 
 from grader.core.errors import RubricError
 from grader.core.exercise import Drawn, Exercise, Variant
-from grader.core.scenario import NumberStream
 from grader.rubrics.draws import First, Options, Recorded
 from grader.rubrics.loader import read_rubric
 from grader.rubrics.schema import rubric_schema
+from grader.stimuli.numbers import NumberStream
 
 RUBRIC = """\
 schema: grader/rubric/v1

@@ -30,6 +30,7 @@ from grader.core.errors import EnvironmentFault, HarnessError
 SCATTERED_BYTES = 1 << 20
 #: Most attempts for a submission after failures that neither it nor the death of its worker caused.
 TRIES = 3
+#: How long to wait for an answer before looking whether the scheduler is still there, which nothing announces.
 _POLL_S = 0.5
 _CLUSTER = "cluster"
 _PACKAGE = "rclpy-grader"
@@ -369,6 +370,7 @@ class ClusterScheduler:
 
 #: Longest wait for the connection to the scheduler, and for closing it.
 CONNECT_S = 15.0
+#: Closing waits for a scheduler that may be gone; all results are there by then.
 _CLOSE_S = 5.0
 _LOGGERS = ("distributed", "distributed.client")
 

@@ -20,9 +20,10 @@ import msgspec
 
 from grader.core.errors import EvidenceError
 from grader.core.report import BroughtPackage, Environment
-from grader.core.scenario import ODOMETRY, RecordedStream, Scenario
+from grader.core.scenario import ODOMETRY, Scenario
 from grader.core.submission import Definition, StudentFile
 from grader.files import replace_file
+from grader.stimuli.recorded import RecordedStream
 
 #: Describes the run and lists its recordings; written last.
 MANIFEST = "evidence.json"
@@ -108,8 +109,6 @@ def read(path: Path, most: int) -> bytes:
 
 
 FORMAT = "grader/evidence/v1"
-#: The grader never writes a longer manifest.
-MOST_BYTES = 64 << 20
 
 
 class _Strict(msgspec.Struct, forbid_unknown_fields=True, frozen=True):

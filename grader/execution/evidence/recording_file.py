@@ -25,6 +25,7 @@ from ruamel.yaml import YAML
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import EvidenceError
+from grader.core.limits import MAX_TRACE_BYTES
 from grader.core.quantities import NS_PER_S
 from grader.core.releases import DEFAULT
 from grader.core.submission import Definition
@@ -53,8 +54,6 @@ WRITTEN = "written"
 FACTS = "grader"
 #: Version of rosbag2's metadata format in Jazzy.
 ROSBAG2_VERSION = 9
-#: The grader never writes a longer trace.
-MOST_BYTES = 256 << 20
 _LIBRARY = "rclpy-grader evidence v1"
 _Key = tuple[str, str, str]
 #: Deepest nesting of a message that is built from its fields.
@@ -148,6 +147,7 @@ _TOPICS = {
     Request: CALLS,
     Response: CALLS,
 }
+#: MCAP has 64 bits for a time, and rosbag2 reads them as a signed number.
 _MOST_NS = 2**63 - 1
 
 
@@ -347,8 +347,8 @@ def _reading() -> Iterator[None]:
 
 def _unpressed(packed: bytes) -> bytes:
     size = zstandard.frame_content_size(packed)
-    if not 0 <= size <= MOST_BYTES:
-        raise EvidenceError(f"expected a trace of at most {MOST_BYTES >> 20} MiB, found {size} bytes")
+    if not 0 <= size <= MAX_TRACE_BYTES:
+        raise EvidenceError(f"expected a trace of at most {MAX_TRACE_BYTES >> 20} MiB, found {size} bytes")
     return _decompressor().decompress(packed)
 
 

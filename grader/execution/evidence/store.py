@@ -15,6 +15,7 @@ import msgspec
 from grader.core.dataclass import dataclass
 from grader.core.errors import EvidenceError
 from grader.core.exercise import Exercise
+from grader.core.limits import MAX_MANIFEST_BYTES, MAX_RECORDING_BYTES
 from grader.core.report import Environment, Reproduction
 from grader.core.scenario import Scenario
 from grader.core.submission import Run, Submission
@@ -23,8 +24,6 @@ from grader.execution.evidence import manifest as files
 from grader.execution.evidence import manifest as kept
 from grader.execution.evidence.recording_file import place_of_trace, recording_bytes, trace_at, trace_of
 
-#: The grader never writes a longer recording.
-MOST_BYTES = 512 << 20
 #: How much of a digest messages show, including its prefix.
 _SHOWN = len("sha256:") + 12
 #: The root of a submission that will not be run.
@@ -116,7 +115,7 @@ def _link_or_copy(old: Path, new: Path) -> None:
 def open_evidence(folder: Path) -> Evidence:
     """Open the evidence in a folder; raises EvidenceError if there is none, or it has another version or is damaged."""
     path = folder / files.MANIFEST
-    data = files.read(path, kept.MOST_BYTES)
+    data = files.read(path, MAX_MANIFEST_BYTES)
     try:
         manifest = kept.parse(data)
     except EvidenceError as error:
@@ -166,7 +165,7 @@ def run_from(manifest: kept.Manifest, exercises: Sequence[Exercise], traces: Map
 def first_report(evidence: Evidence) -> Mapping[str, Any] | None:
     """Return the report that was made when the submission was graded; None if it is missing or invalid."""
     try:
-        report = json.loads(files.read(evidence.folder / files.REPORT, kept.MOST_BYTES))
+        report = json.loads(files.read(evidence.folder / files.REPORT, MAX_MANIFEST_BYTES))
     except (EvidenceError, ValueError, RecursionError):
         return None
     return report if isinstance(report, dict) else None
@@ -196,7 +195,7 @@ def _trace(
         return Trace(recording.scenario, ClockKind.VIRTUAL, 0, (), harness_problem=f"{problem}; grade again")
     name = files.recording_name(owner.id, recording.scenario)
     path = evidence.folder / name
-    data = files.read(path, MOST_BYTES)
+    data = files.read(path, MAX_RECORDING_BYTES)
     try:
         found = kept.sha256(data)
         if found != recording.digest:
@@ -225,7 +224,7 @@ def _compare(
 def _own(folder: Path) -> tuple[str, ...]:
     """Return the files in a folder that an earlier run wrote, from its manifest; none without a manifest."""
     try:
-        manifest = kept.parse(files.read(folder / files.MANIFEST, kept.MOST_BYTES))
+        manifest = kept.parse(files.read(folder / files.MANIFEST, MAX_MANIFEST_BYTES))
     except EvidenceError:
         return ()
     return tuple(name for name in manifest.files if files.is_own(name))

@@ -95,6 +95,8 @@ def _follow(path: Path) -> tuple[Path | None, dict[Path, str]]:
 # not map others.
 STUDENT_GROUP = 61234
 STUDENT_USERS = range(61234, 65234)
+#: Drawing again finds a free user among 4,000 as long as a few are free. After that one is shared, and the limit of its
+#: processes with it.
 TRIES = 1000
 
 
@@ -174,7 +176,8 @@ def worker_view(runtime: PythonRuntime, folder: Path) -> WorkerView:
     package = Path(grader.__file__).resolve().parent
     read = (*runtime.read_paths, runtime.executable, *runtime.library_paths, *runtime.python_paths)
     hidden = tuple(secrets_within(view_of(read).bound, runtime.python_paths))
-    own = tuple(package / name for name in ("__init__.py", "api.py", "core", "simulation", "student_host", "execution"))
+    parts = ("__init__.py", "api.py", "core", "simulation", "stimuli", "student_host", "execution")
+    own = tuple(package / name for name in parts)
     return WorkerView(read, hidden, own, (folder,))
 
 

@@ -23,6 +23,7 @@ from grader.execution.sandbox.bubblewrap import SYSTEM_PROGRAMS
 from grader.execution.sandbox.properties import SETTINGS
 from grader.execution.temp_dirs import own_folder
 
+#: A larger file is not one that the grader wrote.
 LARGEST = 64 << 10
 #: What reading a file that anything may have happened to raises.
 UNUSABLE = (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError)

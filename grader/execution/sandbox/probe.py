@@ -35,6 +35,7 @@ SIOCGIFFLAGS = 0x8913  # linux/sockios.h
 #: What the kernel puts into every network of its own accord, switched off.
 TUNNELS = ("tunl0", "sit0", "ip6tnl0", "gre0", "gretap0", "erspan0", "ip_vti0", "ip6_vti0", "ip6gre0")
 SMALL_STACK = 64 << 10
+#: An address on the same machine answers at once, if it can be reached at all.
 PATIENCE_S = 0.2
 #: Whoever watches the scratch folder may be slow on a busy machine.
 END_S = 4.0

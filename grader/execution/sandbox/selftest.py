@@ -26,6 +26,7 @@ from grader.execution.sandbox.exposure import worker_view
 from grader.execution.sandbox.properties import EXCHANGE, NO_EXCHANGE, mechanism
 from grader.execution.sandbox.protocol import Isolation
 
+#: A sandbox that does not work may hang; a busy machine needs tens of seconds for the starts in one that does.
 TRIAL_S = 45.0
 STAGED = "probe.txt"
 ANSWERED = {"achieved", "outgrown", "said"}

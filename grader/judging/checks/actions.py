@@ -86,9 +86,11 @@ class ActionResult:
             return ("accepted, expected that it is rejected", "") if accepted else ("", "")
         if not accepted:
             return f"rejected, expected that it {_ends(self.status)}", "accept the goal: GoalResponse.ACCEPT"
+        # By the id: results come in the order in which goals end, not in which they were sent.
         mine = next((r for r in results if _goal_id(r.request.value) == _goal_id(goal.request.value)), None)
         if mine is None or mine.response is None:
             running = self.within is not None and goal.request.t_ns + self.within >= trace.stop_ns
+            # The request for the result was sent, so the server had accepted; it may still be at work.
             if mine is not None and running:
                 raise HarnessError(f"{self.action}: the recording ends before the result is due")
             return f"no result in {span(trace.stop_ns - goal.request.t_ns)}", ""
@@ -98,6 +100,7 @@ class ActionResult:
         assert mine.response is not None
         took = mine.response.t_ns - goal.request.t_ns
         ended = status_of(mine.response)
+        # The status before the content: a goal that was canceled has another result by right.
         if ended != self.status:
             return f"{ended}, expected that it {_ends(self.status)}", _FINISH_HINTS.get(self.status, "")
         result = mine.response.value.get("result")
@@ -154,6 +157,7 @@ class ActionFeedback:
         for place, goal in enumerate(accepted, 1):
             mine = [m for m in messages if _goal_id(m.value) == _goal_id(goal.request.value)]
             counts.append(len(mine))
+            # In this order: without messages there is no content, and with wrong content the pace does not matter.
             flaw = self._count_flaw(mine) or self._content_flaw(mine) or self._pace_flaw(mine)
             if flaw:
                 evidence = {"goals": len(accepted), "feedback": counts}
@@ -198,6 +202,7 @@ class ActionFeedback:
         if self.period is None or len(mine) < 2:
             return ""
         average = (mine[-1].t_ns - mine[0].t_ns) / (len(mine) - 1)
+        # The slack keeps the edge inside, which floating point would put outside now and then.
         if abs(average - self.period) <= self.tolerance * self.period * (1 + 1e-9):
             return ""
         wanted = f"{number(seconds(self.period))} s ± {number(100 * self.tolerance)} %"
@@ -232,6 +237,7 @@ def _size(message: Message, path: str | None) -> float | None:
 def _unless_crashed(trace: Trace, finding: Finding, goal: Call) -> Finding:
     """Return the finding, or the fault after the goal was sent that explains it."""
     fault = first_fault(trace)
+    # A fault before the goal did not keep the server from answering it, or there would be no such goal.
     if fault is None or fault.t_ns < goal.request.t_ns:
         return finding
     return faulted(fault, finding.reason, finding.evidence)
@@ -352,6 +358,7 @@ class LifecycleStates:
     def _state_flaw(self, trace: Trace, asked: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         if not self.states:
             return None
+        # Fewer requests than states: the recording ended early, or the rubric asks too rarely.
         if len(asked) < len(self.states):
             asked_said = f"the state was requested {len(asked)} times, expected {len(self.states)}"
             if crashed := explain_fault(trace, asked_said, evidence, last=True):
@@ -369,6 +376,7 @@ class LifecycleStates:
         jitter = JITTER_NS[trace.clock]
         spans = _active(changes, trace.stop_ns)
         times = [m.t_ns for m in published(trace, topic)]
+        # On the wall clock, the response to a transition and a message may be recorded in the wrong order.
         stray = next((t for t in times if not any(a - jitter <= t <= b + jitter for a, b in spans)), None)
         if stray is not None:
             reason = f"{moment(stray)}, {topic}: a message while the node is not active"
@@ -376,6 +384,7 @@ class LifecycleStates:
             return not_met(
                 reason, evidence | {"first_stray_s": seconds(stray)}, hint=hint, problem=ProblemKind.TOO_MANY
             )
+        # In every interval: a node that publishes after its first activation only has lost its timer or publisher.
         mute = next(((a, b) for a, b in spans if not any(a <= t <= b for t in times)), None)
         if mute is None:
             return None
@@ -391,6 +400,7 @@ class LifecycleStates:
         if self.node is not None and self.node not in nodes:
             reason, problem = f"{self.node}: not in the ROS graph", ProblemKind.OTHER_NAME
             return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=problem)
+        # A lifecycle node was there, so that the scenario lacks its stimuli.
         if any(e.service.endswith("/change_state") for e in trace.service_ends("service")):
             raise HarnessError("the recording requests neither a transition nor a state")
         reason = "the program has no lifecycle node, so no transition can be requested"
@@ -402,6 +412,7 @@ def _label(call: Call) -> str:
     if not isinstance(transition, Mapping):
         return "?"
     label, number = transition.get("label"), transition.get("id")
+    # The label decides, as in the request itself: shutdown has three numbers.
     if isinstance(label, str) and label:
         return quote(label, 30)
     return _TRANSITIONS.get(number, "?") if isinstance(number, int) else "?"

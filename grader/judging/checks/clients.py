@@ -82,6 +82,7 @@ class CallsOfClient:
             "requests": len(calls),
             "times_s": [seconds(c.request.t_ns) for c in calls[:100]],
         }
+        # The number first: with calls missing, the gaps between the others are not those of the task.
         if not self.calls <= len(calls) <= max(self.calls, self.at_most or 0):
             return self._miscounted(trace, calls, evidence)
         for request in (c.request for c in calls):
@@ -119,6 +120,7 @@ class CallsOfClient:
         period = self.period or 0
         for place, (one, following) in enumerate(pairwise(calls), 1):
             gap = following.request.t_ns - one.request.t_ns
+            # A client may count its pause from the request or from the response, and both are right.
             took = 0 if one.response is None else max(0, one.response.t_ns - one.request.t_ns)
             if gap < period - slack or (one.response is not None and gap > period + slack + took):
                 return place, gap
@@ -135,6 +137,7 @@ class CallsOfClient:
         waiting = "; the last one got no response" if last.response is None else ""
         ended = trace.marks("exited")
         ended_said = f"; {ended[0].detail} ended at {moment(ended[0].t_ns)}" if ended else ""
+        # It would have sent the next one after the end: then the rubric observes too briefly.
         if not ended and not waiting and last.request.t_ns + (self.period or 0) + self.tolerance >= trace.stop_ns:
             raise HarnessError(f"{self.service}: the recording ends before {self.calls} requests could be sent")
         return not_met(reason + waiting + ended_said, evidence, problem=ProblemKind.TOO_FEW)
@@ -164,7 +167,9 @@ class WaitsForService:
 
     def judge(self, trace: Trace) -> Finding:
         starts = trace.marks("server_starts", self.service)
+        # Without a server, the whole recording is the time before it.
         appears_ns = starts[0].t_ns if starts else trace.stop_ns + 1
+        # First: a client that gave up has not called later either, and that is not its mistake.
         gave_up = self._gave_up(trace, appears_ns)
         if gave_up is not None:
             return gave_up
@@ -200,6 +205,7 @@ class WaitsForService:
             reason = f"{self.process} ended at {moment(ended.t_ns)}, {when}"
             return not_met(reason, {"ended_s": seconds(ended.t_ns)}, hint=_WAIT_HINT, problem=ProblemKind.ENDED)
         records = [r for r in student_records(trace, self.process) if r.t_ns < appears_ns]
+        # Waiting is what is asked for, so that a program which calls it an error has not understood the task.
         bad = [r for r in records if r.severity in ("ERROR", "FATAL")]
         if not bad:
             return None
@@ -209,6 +215,7 @@ class WaitsForService:
         there = f"{self.service} appeared at {moment(appears_ns)}"
         if crashed := explain_fault(trace, f"{there}, no request was sent", process=self.process):
             return crashed
+        # A client whose QoS fits no server is there and reaches none, which another check explains.
         usual = [e for e in trace.service_ends("client", self.service) if not e.unusual]
         if not trace.requests(self.service, "student") and not usual:
             return waiting_for("service_calls", explain_no_client(trace, self.service))

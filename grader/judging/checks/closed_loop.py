@@ -63,6 +63,7 @@ class ReachesGoal:
         return f"{self.topic} within {number(self.tolerance)} of each goal after {span(self.within)} at most{stays}"
 
     def judge(self, trace: Trace) -> Finding:
+        # One that was replaced or cut off before its time may still have been reached in time.
         goals = [g for g in self._goals(trace) if g.stop_ns - g.t_ns > self.within]
         if not goals:
             return _cut_short(trace, f"{self.goals}: no goal was observed for {span(self.within)}")
@@ -85,6 +86,7 @@ class ReachesGoal:
         states = delivered(trace, self.topic)
         sent: list[Delivery] = []
         for one in delivered(trace, self.goals):
+            # A goal that is repeated does not give more time, as a stimulus may send it once a second.
             if not sent or one.value != sent[-1].value:
                 sent.append(one)
         stops = [*(one.t_ns for one in sent[1:]), trace.stop_ns]
@@ -101,6 +103,7 @@ class ReachesGoal:
         if any(a is None or b is None for a, b in pairs):
             raise HarnessError(f"{self.topic} and {self.goals}: expected numbers at {', '.join(self.fields)}")
         away = math.dist([a for a, _ in pairs if a is not None], [b for _, b in pairs if b is not None])
+        # NaN compares as neither near nor far, and would be the nearest of all in `min`.
         return math.inf if math.isnan(away) else away
 
     def _flaw(self, goal: _Goal, jitter_ns: int) -> str:
@@ -113,6 +116,7 @@ class ReachesGoal:
             best = min(d for s, d in pairs if s.t_ns <= due_ns)
             text = f"{told} was not reached within {span(self.within)}, the closest was {number(best)} away"
             return f"{text}, expected at most {number(self.tolerance)}"
+        # Only after the time is over: on the way, a robot may pass through the goal and come back.
         left = next(((s, d) for s, d in pairs if s.t_ns > due_ns and d > self.tolerance + _EDGE), None)
         if left is None or not self.stays:
             return ""
@@ -155,6 +159,7 @@ class StaysInRange(InRange):
         if not states:
             after = f" after {span(self.after)}" if self.after else ""
             return _cut_short(trace, f"{self.topic}: the simulation published nothing{after}")
+        # An empty list has no number outside the range: a laser scan may be empty.
         if not all(self.numbers(s.value) or value_at(s.value, self.field) in ([], ()) for s in states):
             raise HarnessError(f"{self.topic}: expected a number at {self.field}, found none")
         return self.judged(states, first_fault(trace))
@@ -169,6 +174,7 @@ class StaysInRange(InRange):
 
 def _cut_short(trace: Trace, what: str) -> Finding:
     """Return no credit if a fault or a flood of the nodes has ended the recording early; raises HarnessError if not."""
+    # A limit before a crash: a flood is why the recording ended, and often why the node died.
     limits = trace.marks("limit")
     if limits:
         return not_met(f"{what}: {limits[0].detail}", problem=ProblemKind.TOO_FEW)

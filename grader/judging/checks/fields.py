@@ -94,6 +94,7 @@ class EqualFields:
         got = {path: value for path in paths if (value := value_at(first.value, path)) is not None}
         told = {path: read for path, value in got.items() if (read := as_number(value)) is not None}
         evidence |= {"first_wrong_s": seconds(first.t_ns), "found": told, "field": paths[0]}
+        # A missing field before a wrong value: the type is then another one, and so are the other fields.
         if paths[0] not in got:
             reason = f"{moment(first.t_ns)}, {self.topic}: {quote(first.type)} has no field {paths[0]}"
             return not_met(reason, evidence, problem=ProblemKind.NO_FIELD)
@@ -154,6 +155,7 @@ class InRange:
 
     def numbers(self, value: Mapping[str, object]) -> list[float]:
         """Return the number of a message, or those of a list; none if something else is among them."""
+        # Something else among them makes the whole list useless.
         found = value_at(value, self.field)
         read = [as_number(v) for v in (found if isinstance(found, (list, tuple)) else (found,))]
         return [] if None in read else [v for v in read if v is not None]
@@ -173,6 +175,7 @@ class InRange:
         reason = f"{moment(message.t_ns)}, {self.topic}: {self.field} is {number(value)}, expected {self.rule.wanted}; "
         reason += f"outside in {len(outside)} of {counted(len(each), 'message')}"
         known = evidence | {"first_outside_s": seconds(message.t_ns)}
+        # A crash after the first wrong number does not explain it.
         if fault is not None and fault.t_ns <= message.t_ns:
             return faulted(fault, reason, known, last=True)
         return not_met(reason, known, problem=ProblemKind.WRONG_VALUE)
@@ -265,6 +268,7 @@ class FieldMonotone(FewSuffice):
             known = evidence | {"first_wrong_s": seconds(messages[k].t_ns)}
             return not_met(reason, known, problem=ProblemKind.WRONG_VALUE)
         ends = f"from {number(values[0])} to {number(values[-1])} in {counted(len(values), 'message')}"
+        # A series that only rises or falls and ends where it began is constant, which obeys the rule and shows nothing.
         if values[0] == values[-1]:
             reason = f"{self.topic}: {self.field} never changes, {ends}, expected {self.direction} values"
             return not_met(reason, evidence, problem=ProblemKind.CONSTANT)
@@ -274,6 +278,7 @@ class FieldMonotone(FewSuffice):
         step = after - before if self.direction == "rising" else before - after
         if math.isnan(step):
             return False
+        # The slack is for sums of decimal fractions, whose last bit may fall while they stand still.
         return step > 0 if self.strictly else step >= -SLACK * max(1.0, abs(before))
 
 
@@ -383,10 +388,12 @@ class FieldFunction:
         """Return the number of the first message that gives the fewest errors; 0 unless another is better."""
         starts = range(max(0, self.start_tolerance) + 1)
         ways = [[s for s in samples if not self._right(wanted, s, jitter_s, start)] for start in starts]
+        # The fewest errors, and of equal ones the lowest number: `min` keeps the first.
         best = min(starts, key=lambda start: len(ways[start]))
         return best, ways[best]
 
     def _right(self, wanted: Curve, sample: Sample, jitter_s: float, start: int) -> bool:
+        # Both ends of the jitter: in so short a time, a formula hardly turns.
         got = [wanted.at(sample.n + start, sample.t_s + shift) for shift in (0.0, -jitter_s, jitter_s)]
         if within(sample.value, got[0], self.tolerance):
             return True
@@ -473,12 +480,15 @@ class RandomInRange:
     def judge(self, trace: Trace) -> Finding:
         messages = published(trace, self.topic, self.after_discovery)
         if not messages:
+            # Silence is the problem of the check on the rate, and is explained there: the same lost point is not
+            # explained twice.
             silent = explain_no_message(trace, self.topic)
             return not_met(silent.reason, silent.evidence, blocked_by="topic_rate", problem=silent.problem)
         values = published_numbers(trace, self.topic, self.field)
         if len(values) < len(messages):
             reason = f"{self.topic}: {quote(messages[0].type)} carries no number"
             return not_met(reason, {"type": messages[0].type}, problem=ProblemKind.NO_NUMBER)
+        # The range first: a constant outside of it would be called constant, and mending that would not help.
         return self._outside(values) or self._computed(values) or self._drawn(values)
 
     @property
@@ -509,6 +519,7 @@ class RandomInRange:
         pattern = "constant" if len(got) == 1 else pattern_of(got)
         if pattern is None:
             return None
+        # Too few to tell, and too few messages is what the check on the rate is about.
         if pattern == "constant" and len(got) < _FEWEST_FOR_CONSTANT:
             few = f"{counted(len(got), 'value')} ({numbers(got)}{in_unit(self.unit)})"
             reason = f"{self.topic}: {few} cannot show whether they are random"

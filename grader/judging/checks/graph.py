@@ -65,12 +65,15 @@ class GraphEdges:
 
     def judged(self, trace: Trace, *, both_ways: bool = False) -> Finding:
         """Judge a recording; `both_ways`: the two edges must lead there and back between the same two processes."""
+        # What is there after the stop signal is on its way out.
         snapshots = [g for g in trace.graphs() if g.t_ns < trace.stop_ns]
         found = [[self._pairs(g, edge) for edge in self.edges] for g in snapshots]
         first = {edge: next((p[k][0] for p in found if p[k]), None) for k, edge in enumerate(self.edges)}
         wanted: dict[str, object] = {} if both_ways else {"edges": [str(edge) for edge in self.edges if first[edge]]}
         key = "edges" if both_ways else "found"
         for snapshot, pairs in zip(snapshots, found, strict=True):
+            # All edges in one snapshot first, even where they may come at different times: reports can then name a
+            # moment.
             chosen = next((c for c in product(*pairs) if not both_ways or _lead_back(*c)), None)
             if chosen is not None:
                 drawn = {"t_s": seconds(snapshot.t_ns), key: [_edge(*pair) for pair in chosen]}
@@ -82,6 +85,7 @@ class GraphEdges:
         evidence = wanted | {key: [list(e) for e in dict.fromkeys(tuple(_edge(*pair)) for pair in between)]}
         missing = [edge for edge, pair in first.items() if pair is None]
         topics = _topics(missing or self.edges)
+        # Only what is missing can be due to a crash; edges that were there, but never together, are not.
         if missing and (crashed := explain_fault(trace, f"no edge over {' and '.join(topics)}", evidence)):
             return crashed
         reason, hint = self._explain(snapshots, missing, between, both_ways=both_ways)
@@ -101,6 +105,7 @@ class GraphEdges:
         if not missing:
             between = "between the same two processes " if both_ways else ""
             return f"{' and '.join(_topics(self.edges))}: every edge is there, but not {between}at once", ""
+        # Without the grader's own endpoints: an edge to one of them proves nothing about the student's nodes.
         endpoints = [e for g in graphs for e in g.endpoints if e.participant != -1]
         gaps = [self._gap(edge, endpoints, pairs) for edge in missing]
         one_way = "; connected in one direction only" if both_ways and len(missing) == 1 else ""
@@ -119,6 +124,7 @@ class GraphEdges:
             said = f"{topic}: {quote(publishers[0].node)} publishes it, nothing subscribes to it"
             return said, f"subscribe to {topic} in {edge.target or ('the other node' if apart else 'a node')}"
         found = [pair for pair in pairs if pair[0].topic == topic]
+        # Other nodes before other types: an edge that is there shows that the types agree.
         if found and not any(edge.joins(*pair) for pair in found):
             return f"no edge {edge}, found {listed(list(dict.fromkeys(_drawn(*pair) for pair in found)))}", ""
         if publishers[0].type != subscriptions[0].type:
@@ -226,6 +232,7 @@ class Qos:
         if not mine:
             return self._absent(trace)
         fitting = [e for e in mine if self._fits(e) and (self.depth is None or e.depth >= self.depth)]
+        # The middleware does not report every depth, and no student may lose a point for that.
         unknown = [e for e in mine if self._fits(e) and e.depth == 0]
         evidence = {"endpoints": [[e.node, e.reliability, e.durability, seconds(e.deadline_ns), e.depth] for e in mine]}
         if fitting:
@@ -279,6 +286,7 @@ class NodeName:
         if wanted in nodes:
             return met(f"{wanted} is in the ROS graph", {"nodes": nodes[:20]})
         fault = first_fault(trace)
+        # With a node in the graph, its name is wrong, whatever happened to it later.
         if fault is not None and not nodes:
             return faulted(fault, f"no node {wanted}")
         found = f"{counted(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node"
@@ -322,6 +330,7 @@ class TopicNames:
         if not flaws:
             return met(f"published: {listed(out) or 'nothing'}; subscribed to: {listed(back) or 'nothing'}", evidence)
         fault = first_fault(trace)
+        # With an endpoint in the graph, the program came as far as creating some, so that the others are missing in it.
         if fault is not None and not made:
             return faulted(fault, flaws[0], evidence)
         return not_met(f"{'; '.join(flaws[:3])}; expected that {self.expected}", evidence)

@@ -118,7 +118,9 @@ class _Source:
 def _judged(trace: Trace, process: str, heard: Sequence[_Heard], within_ns: int, source: _Source) -> Finding:
     """Return the finding about what came from a source."""
     jitter_ns = JITTER_NS[trace.clock]
+    # One nanosecond more, because windows are half-open and a log at the very limit is in time.
     late_ns = within_ns + jitter_ns + 1
+    # What came shortly before the end could still have been logged after it, unless the process had ended by itself.
     due = [one for one in heard if one.t_ns + late_ns <= trace.stop_ns or _ended(trace, process)]
     if not due:
         if crashed := explain_fault(trace, "nothing was logged after it", process=process):
@@ -136,6 +138,7 @@ def _judged(trace: Trace, process: str, heard: Sequence[_Heard], within_ns: int,
     evidence: dict[str, object] = {f"{source.word}s": len(due), "missing": [shown(one.value) for one in missing[:20]]}
     if not missing:
         return met(f"{process}: {source.all(len(due))} logged, such as {shown(due[0].value)}", evidence)
+    # Logged and printed together: a program that logs some and prints the others has written all of them.
     if not unlogged(sorted([*records, *printed_lines(trace, process)], key=lambda o: o.t_ns)):
         return only_printed(f"{process}: {source.all(len(due))} printed, not all of them logged", evidence)
     first = missing[0]
@@ -145,6 +148,7 @@ def _judged(trace: Trace, process: str, heard: Sequence[_Heard], within_ns: int,
     reason = f"{process}: {len(missing)} of {counted(len(due), source.word)} of {source.name} not logged, the first at "
     reason += f"{moment(first.t_ns)}: {wanted}"
     fault = first_fault(trace, process)
+    # A crash after that time is not why this one was not logged.
     if fault is not None and fault.t_ns < first.t_ns + late_ns:
         return faulted(fault, reason, evidence, last=True)
     problem = ProblemKind.WRONG_VALUE if found else ProblemKind.NOT_LOGGED

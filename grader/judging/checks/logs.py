@@ -29,7 +29,7 @@ from grader.judging.findings import (
 )
 from grader.judging.logs.outputs import Output, is_no_node, numbers_in, printed_lines, shape_of, student_records
 from grader.judging.plots import Drawing, Plot
-from grader.judging.values import JITTER_NS, number_at, published
+from grader.judging.values import JITTER_NS, LONGEST_MATCHED, number_at, published
 from grader.judging.wording import listed, moment, number, quote, span
 
 
@@ -74,6 +74,7 @@ class UsesLogger:
         records = student_records(trace, self.process)
         lines = printed_lines(trace, self.process)
         evidence = {"process": self.process, "records": len(records), "printed_lines": len(lines)}
+        # Without any output, the missing log is the first thing to say; the missing node has criteria of its own.
         if (records or lines) and is_no_node(trace, self.process):
             return no_node(trace, self.process, evidence)
         if records:
@@ -93,7 +94,6 @@ class UsesLogger:
 
 
 _LEVELS = ("DEBUG", "INFO", "WARN", "ERROR", "FATAL")
-_LONGEST = 2_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +135,7 @@ class LogsMatching:
         mine = [r for r in records if self._of_level(r) and self._matches(r)]
         flaw = self._flaw(mine)
         evidence = self._evidence(mine)
+        # A program may log without a node, through rclpy's own loggers; the exercise asks for what nodes do.
         if mine and is_no_node(trace, self.process):
             return no_node(trace, self.process, evidence)
         if not flaw:
@@ -150,6 +151,7 @@ class LogsMatching:
             return only_printed(f"{reason}; expected {self.expected}", evidence)
         reason = f"{self.process}: {flaw}; expected {self.expected}"
         fault = first_fault(trace, self.process)
+        # Too many records, or a wrong period, were there before the crash.
         if fault is not None and len(mine) < self.at_least:
             return faulted(fault, flaw, evidence)
         return not_met(reason + self._others(records), evidence)
@@ -185,7 +187,7 @@ class LogsMatching:
         return rank == 0 if self.exactly else rank >= 0
 
     def _matches(self, output: Output) -> bool:
-        return self.pattern is None or re.search(self.pattern, output.text[:_LONGEST]) is not None
+        return self.pattern is None or re.search(self.pattern, output.text[:LONGEST_MATCHED]) is not None
 
     def _flaw(self, found: Sequence[Output]) -> str:
         if len(found) < self.at_least or (self.at_most is not None and len(found) > self.at_most):
@@ -255,6 +257,7 @@ class LogsEvery:
         messages = published(trace, self.topic)
         if not messages:
             return waiting_for("publishes", explain_no_message(trace, self.topic))
+        # Two whole distances: with one, a program that logs once at all would pass.
         if len(messages) < 2 * self.every + 1:
             return self._few(trace, messages)
         records, lines = student_records(trace, self.process), printed_lines(trace, self.process)
@@ -262,6 +265,8 @@ class LogsEvery:
         flood = self._flooded(logged, messages)
         if flood:
             return flood
+        # One right reading suffices: a program may log other things as well, and nothing says which of its logs is
+        # meant.
         right = next((r for r in logged if not self._flaw(r, messages)), None)
         if right is not None:
             return met(self._said(right, records, "logged"), self._evidence(right, messages))
@@ -290,11 +295,15 @@ class LogsEvery:
         """Return the possible interpretations of the outputs, the likeliest first, including that of all outputs."""
         jitter_ns = JITTER_NS[trace.clock]
         times = [m.t_ns for m in messages]
+        # A log belongs to the last message before it: programs log while or after they publish.
         placed = [(bisect_right(times, o.t_ns + jitter_ns) - 1, o) for o in outputs]
+        # What was written before the first message is about something else.
         placed = [(place, o) for place, o in placed if place >= 0]
         shapes: dict[str, list[tuple[int, Output]]] = {}
         for place, output in placed:
             shapes.setdefault(shape_of(output.text), []).append((place, output))
+        # Texts of one shape are one statement of the program; those with the published number are meant, if there are
+        # any.
         showing = [group for group in shapes.values() if self._shows(group, messages)]
         groups = [[pair for group in showing for pair in group], *showing] if showing else [placed, *shapes.values()]
         rhythms = [_Rhythm(tuple(sorted({place for place, _ in group}))) for group in [*groups, placed] if group]
@@ -303,6 +312,7 @@ class LogsEvery:
     def _shows(self, group: Sequence[tuple[int, Output]], messages: Sequence[Message]) -> bool:
         hits = 0
         for place, output in group:
+            # A program may log before it publishes, or count before it logs.
             near = messages[max(0, place - 1) : place + 2]
             values = [v for m in near if (v := number_at(m.value, self.field)) is not None]
             hits += any(printed.shows(value) for printed in numbers_in(output.text) for value in values)
@@ -313,12 +323,14 @@ class LogsEvery:
         places, last = found.places, len(messages) - 1
         if len(places) < 2:
             return f"only with message {places[0] + 1}"
+        # With a log for every second message, a gap that is off by one would be a log for each.
         slack = 1 if self.every > 2 else 0
         if not within(found.average, self.every, _AVERAGE * self.every):
             return f"one for {number(found.average)} messages on average"
         gap = next(((a, b) for a, b in pairwise(places) if abs(b - a - self.every) > slack), None)
         if gap is not None:
             return f"{gap[1] - gap[0]} messages from number {gap[0] + 1} to number {gap[1] + 1}"
+        # Counting from 0 or from 1, the first log comes with one of the first messages.
         if places[0] > self.every:
             return f"none before message {places[0] + 1}"
         return f"none after message {places[-1] + 1}" if last - places[-1] > self.every + slack else ""
@@ -326,6 +338,7 @@ class LogsEvery:
     def _flooded(self, found: Sequence[_Rhythm], messages: Sequence[Message]) -> Finding | None:
         """Return a finding if there is a log for nearly every message; None otherwise."""
         most = max(found, key=lambda rhythm: len(rhythm.places), default=_Rhythm(()))
+        # Half of the messages is right if every second one is asked for.
         if self.every < 3 or len(most.places) < _FLOOD * len(messages):
             return None
         reason = f"{self.process}: there is output for {len(most.places)} of {len(messages)} messages; "

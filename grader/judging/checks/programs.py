@@ -74,6 +74,7 @@ class ParameterDeclared:
         answers = [found for call in calls if (found := reported_parameter(call, self.name)) is not None]
         if not answers:
             return _unanswered(trace, self.name, self.node, asked=bool(calls))
+        # The first answer: later ones may be about a value that the grader has set.
         found = min(answers, key=lambda a: a.t_ns)
         evidence = {"node": found.node, "name": self.name, "type": found.type, "value": found.value}
         if not found.type:
@@ -102,6 +103,7 @@ def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Fi
     if crashed := explain_fault(trace, f"the parameter {name} could not be read"):
         return crashed
     nodes = list(dict.fromkeys(n for graph in trace.graphs() for n in graph.nodes))
+    # A node of another name is the problem of the check on names; here it only prevents the question.
     if node is not None and node not in nodes:
         reason = f"{node}: not in the ROS graph, so {name} could not be read; found {listed(nodes) or 'no node'}"
         return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=ProblemKind.OTHER_NAME)
@@ -170,6 +172,7 @@ class ParameterTakesEffect:
             if flaw:
                 fault = first_fault(trace)
                 reason = f"{moment(one.t_ns)}, {self.name} = {shown(one.value)}: {flaw}"
+                # A crash while this value applied is why its effect is missing; one after it is not.
                 if fault is not None and fault.t_ns <= stop_ns:
                     return faulted(fault, reason, evidence, last=True)
                 return not_met(reason, evidence, hint=hint)
@@ -213,6 +216,8 @@ class ParameterTakesEffect:
             at_once = [m for m in messages if one.t_ns <= m.t_ns < stop_ns]
             rate = None if self.effect == "field" else self._rate(one)
             # A recording that is full of messages ends early.
+            # Twice as many as asked for, and some: a flood ends the recording before the effect is due, and is the
+            # student's. Anything else is a mistake of the rubric.
             if rate is None or len(at_once) <= _FLOOD + 2 * rate * seconds(self.within):
                 raise HarnessError(f"{self.name}: the next value or the end comes before the effect is due")
             took_s = seconds(stop_ns - one.t_ns)
@@ -245,11 +250,14 @@ class ParameterTakesEffect:
 
     def _pace_flaw(self, one: ParameterSetting, after: Sequence[Message], stop_ns: int) -> str:
         rate = self._rate(one)
+        # Two messages have one interval, and the first of them may come between two values.
         if len(after) < 3:
             return f"{len(after)} messages on {self.topic} afterwards, expected {number(rate)} Hz"
+        # At least a nanosecond: messages of one instant are infinitely fast, and judged as such.
         measured = (len(after) - 1) / seconds(max(1, after[-1].t_ns - after[0].t_ns))
         if not within(measured, rate, self.tolerance * rate):
             return f"{measured:.3f} Hz on {self.topic} afterwards, expected {number(rate)} Hz"
+        # The rate of some messages followed by silence is right on average.
         if seconds(stop_ns - after[-1].t_ns) > _LONGEST_GAP / rate:
             return f"no message on {self.topic} after {moment(after[-1].t_ns)}, expected {number(rate)} Hz"
         return ""
@@ -328,12 +336,14 @@ class CleanShutdown:
         if stopped and not after:
             took = stopped[0].t_ns - asked_ns
             reason = f"{self.process}: ended {seconds(took):.3f} s after Ctrl-C"
+            # On the wall clock, the end of a process is noticed a little later.
             if took <= self.within + LATENESS_NS[trace.clock]:
                 return met(reason, {"took_s": seconds(took)})
             reason += f", expected within {number(seconds(self.within))} s"
             return not_met(reason, {"took_s": seconds(took)}, problem=ProblemKind.TOO_LATE)
         if after:
             reason = f"{moment(after[0].t_ns)}, after Ctrl-C: {fault_sentence(after[0])}"
+            # An exception has a cause of its own, which a rule of diagnosis names.
             hint = "" if after[0].kind is FaultKind.EXCEPTION else _SHUTDOWN_HINT
             return not_met(reason, hint=hint, fault=after[0])
         reason = f"{self.process}: still running {span(self.within)} after Ctrl-C at {moment(asked_ns)}"
@@ -435,6 +445,7 @@ class SourceAvoids(_OfSource):
         return replace(not_met(reason, evidence, hint=hint), location=Location(self.process, line))
 
     def _found(self, source: Source) -> list[tuple[int, str]]:
+        # By identity: two calls that read alike are different nodes, and only one may be in a callback.
         inside = {id(n) for f in source.called_back() for n in subtree(f)} if self.where == "callbacks" else None
         calls = [(c, name) for name in self.calls for c in source.calling(name)]
         places: Sequence[tuple[ast.stmt | ast.expr, str]] = calls
@@ -455,6 +466,7 @@ def _source(trace: Trace, sources: Mapping[str, str], process: str) -> Source | 
     if source.tree is not None:
         return source
     fault = first_fault(trace, process)
+    # Any other file that cannot be read here could be run, so that it is the grader's fault.
     if fault is not None and fault.kind is FaultKind.SYNTAX_ERROR:
         return faulted(fault, "the file cannot be read")
     raise HarnessError(f"{process}: cannot be read as Python, or is too long")

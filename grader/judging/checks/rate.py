@@ -44,6 +44,8 @@ class _Measured:
     @property
     def steady(self) -> bool:
         """Whether at least half of the intervals are within half of the average."""
+        # Half of the intervals, not all: a machine that is late once gives one long interval and one short, and in
+        # bursts of two none is near the average.
         least, most = 0.5 * self.average_ns, 1.5 * self.average_ns
         usual = sum(least <= b - a <= most for a, b in pairwise(self.times_ns))
         return 2 * usual >= len(self.times_ns) - 1
@@ -93,11 +95,15 @@ class TopicRate:
         if not times:
             return explain_no_message(trace, self.topic)
         stop_ns = trace.stop_ns if self.window is None else min(trace.stop_ns, times[0] + self.window)
+        # Half-open, like every window: at 20 Hz, ten seconds hold 200 messages whether or not one comes at the very
+        # end.
         inside = tuple(sorted(t for t in times if t < stop_ns))
+        # One instant has no rate: the division below would be by zero.
         if inside[-1] == inside[0]:
             return self._too_few(trace, inside)
         found = _measure(inside, stop_ns)
         evidence = self._evidence(found)
+        # A flaw first: with bursts, a stop or a late start, the average says nothing, however right it is.
         graded = self._flaw(trace, found, evidence) or self._grade(found, evidence)
         finding = (self._slack(found, evidence) if graded.credit else None) or graded
         return replace(finding, facts=RateFacts(len(inside), seconds(inside[0]), found.rate_hz, found.max_s))
@@ -118,10 +124,14 @@ class TopicRate:
     def _slack(self, found: _Measured, evidence: dict[str, object]) -> Finding | None:
         """Return a finding if the rate changed at the end, which the average hides; None otherwise."""
         first, last = found.times_ns[0], found.times_ns[-1]
+        # The last quarter: an average over ten seconds stays within 5 % if the rate is halved in the last second only,
+        # but not what is measured there alone.
         later = tuple(t for t in found.times_ns if t >= (first + 3 * last) // 4)
         if self.window is not None or len(later) < _FEWEST_LATER or later[-1] == later[0]:
             return None
         rate_hz = _measure(later, found.stop_ns).rate_hz
+        # Twice the tolerance, because a quarter of the messages measures a rate less surely; where half the points are
+        # given, twice that tolerance.
         if within(rate_hz, self.rate, 2 * max(self.tolerance, self.partly_tolerance or 0)):
             return None
         reason = f"{self.topic}: {found.sentence()}; {rate_hz:.3f} Hz from {moment(later[0])} on; "
@@ -154,6 +164,7 @@ class TopicRate:
 
     def _brief(self, rate_hz: float, when: str = "") -> str:
         """Return the rate in a few words, with as many decimals as show that it is wrong."""
+        # With one decimal, 20.96 Hz would read as 21.0, which 20 ± 1 Hz includes.
         digits = next((n for n in (1, 2) if not within(round(rate_hz, n), self.rate, self.tolerance)), 3)
         return f"{self.topic}: {rate_hz:.{digits}f} Hz{when}, {self._wanted}"
 
@@ -161,12 +172,14 @@ class TopicRate:
         """Return why the average of a window is not meaningful, or None if it is."""
         first, last = found.times_ns[0], found.times_ns[-1]
         seen = f"{self.topic}: {found.sentence()}"
+        # Bursts first: a long interval between two of them looks like a stop.
         if not found.steady:
             hint = f"publish one message every {self._period_s} s rather than several at once"
             reason, problem = f"{seen}; the messages come in bursts; {self._wanted}", ProblemKind.BURSTS
             brief = f"{self.topic}: the messages come in bursts, {self._wanted}"
             return not_met(reason, evidence, hint=hint, problem=problem, brief=brief)
         silence = found.stop_ns - last
+        # Two periods, of what is expected or of what comes: a slow node is judged for its rate, not for having stopped.
         if silence > max(2 * self._period_ns, 2 * found.average_ns) + _END_SLACK_NS[trace.clock]:
             ended, fault = _ending(trace, first, last)
             hint = fault_hint(fault) if fault else ""
@@ -178,6 +191,7 @@ class TopicRate:
             observed = f"only {span(length)} could be observed, the first message was published at {moment(first)}"
             fault = first_fault(trace)
             observed += f"; {fault_sentence(fault)}" if fault else ""
+            # A window that could not be observed whole says nothing about the rate unless that is wrong too.
             off = fault is None and not within(found.rate_hz, self.rate, self.tolerance)
             hint = self._hint(found.rate_hz) if off else ""
             reason, problem = f"{seen}; {observed}; {self._wanted}", ProblemKind.TOO_LATE
@@ -202,8 +216,10 @@ class TopicRate:
     def _hint(self, rate_hz: float) -> str:
         period = self._period_s
         rule = f"create_timer({period}, ...): the argument is the period in seconds, 1/{number(self.rate)} = {period}"
+        # A wrong period is rarely off by so much, and a loop without a pause always is.
         if rate_hz > 20 * self.rate:
             return f"the loop has no pause; use {rule}"
+        # A sleep in a loop comes after the work, which takes at most a fifth of a period here.
         if 0.8 * self.rate <= rate_hz < self.rate:
             return f"a loop with sleep adds the time of its own work to each period; use {rule}"
         return rule
@@ -266,6 +282,7 @@ def _rates(times: Sequence[int], trailing_ns: int) -> list[Point]:
     points = []
     for k, t in enumerate(times):
         first = bisect_left(times, t - trailing_ns)
+        # Before that, a single short interval would show as a peak that was never there.
         whole = t - times[0] >= trailing_ns or k == len(times) - 1
         if whole and t > times[first]:
             points.append((seconds(t), (k - first) * NS_PER_S / (t - times[first])))

@@ -135,15 +135,19 @@ class LogsValues:
     ) -> Finding:
         """Return the finding if something was never written."""
         records = student_records(trace, self.process)
+        # The cause is looked for in one of the two: prints for debugging beside right logs would lead it astray.
         outputs = records if any(numbers_in(r.text) for r in records) else printed_lines(trace, self.process)
         return self._explain(received, absent, outputs, evidence)
 
     def swapped_units(self, received: Sequence[_Received], outputs: Sequence[Output]) -> str:
         """Return that two products of every message are followed by each other's units; empty if they are not."""
+        # Only units of other products: a program may name the right unit of a product in any words.
         others = [f for f in dict.fromkeys(self.units.values()) if f not in self.unit_factors]
         for mine, other in ((f, o) for f in self.unit_factors for o in others):
             if all(
-                self._named(one, outputs, mine, other) and self._named(one, outputs, other, mine) for one in received
+                # At every message, and both ways: numbers that happen to be alike do not swap their units all the time.
+                self._named(one, outputs, mine, other) and self._named(one, outputs, other, mine)
+                for one in received
             ):
                 first = received[0]
                 found = quote(" / ".join(o.text for o in in_window(outputs, first.t_ns, first.stop_ns)), 80)
@@ -208,12 +212,14 @@ class LogsValues:
         jitter_ns = JITTER_NS[trace.clock]
         from_ns = heard_from_ns(trace, self.topic)
         sent = [d for d in trace.deliveries(self.topic) if from_ns <= d.t_ns < trace.stop_ns - jitter_ns]
+        # A log belongs to a message until the next one comes, so that no log is counted for two.
         stops = [*(d.t_ns + jitter_ns for d in sent), trace.stop_ns][1:]
         pairs = [(d, stop, number_at(d.value, self.field)) for d, stop in zip(sent, stops, strict=True)]
         return [_Received(d.t_ns - jitter_ns, stop, value) for d, stop, value in pairs if value is not None]
 
     def is_enough(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> bool:
         """Return whether enough is logged."""
+        # The slack is for shares such as 0.9 of 10, which floating point puts above 9.
         return len(received) - len(unlogged) >= self.share * len(received) - 1e-9
 
     def unlogged_in(
@@ -226,6 +232,8 @@ class LogsValues:
         """Return what is not logged in some outputs."""
         punctual = self._unshown(received, [r.stop_ns for r in received], outputs, logged)
         written = sum(len(numbers_in(o.text)) for o in outputs if o.t_ns >= received[0].t_ns)
+        # Late logs count only if there are as many numbers as messages: else those of one message would stand for
+        # several.
         if not punctual or written < self.share * len(received) * len(self.unit_factors):
             return punctual
         late = self._unshown(received, [r.t_ns + _LATE_NS for r in received], outputs, logged)
@@ -290,6 +298,7 @@ class LogsValues:
     ) -> tuple[str, str]:
         silent = [r for r in unlogged if not in_window(outputs, r.t_ns, r.stop_ns)]
         rule = f"log in the callback of the subscription to {self.topic}, once for each message"
+        # From the plainest cause to the subtlest: no log, few logs, the message before, a wrong factor.
         if len(silent) == len(received):
             return "", rule
         if len(silent) > len(received) / 2:
@@ -298,6 +307,7 @@ class LogsValues:
         if any(self._behind(logged, f) for f in self.unit_factors):
             return "each log has the number of the previous message", "store the number before you log it, not after"
         largest = max(abs(r.value) for r in received)
+        # Mostly, because a log or two may hold another number; what all but a fifth of the messages show is meant.
         right = [f for f in self.unit_factors if self._mostly(logged, f, _FINE * abs(f) * largest)]
         for factor in (f for f in self.unit_factors if f not in right):
             cause, hint = wrong_conversion(logged, factor, right)
@@ -316,6 +326,7 @@ class LogsValues:
         def shows(here: LoggedNumbers, value: float) -> bool:
             return any(shows_about(n, factor * value, coarsest=_FINE * abs(factor * value)) for n in here.numbers)
 
+        # Between equal values, being one message behind cannot be seen.
         pairs = [(a, b) for a, b in pairwise(logged) if a.value != b.value]
         return bool(pairs) and all(shows(b, a.value) and not shows(b, b.value) for a, b in pairs)
 
@@ -368,6 +379,7 @@ class LogsReceived:
         subscriptions = student_endpoints(trace, "subscription", self.topic)
         if not subscriptions and fault is None:
             return explain_no_subscription(trace, self.topic)
+        # A subscription of a type without numbers cannot have received any, whatever the grader published.
         if not values or (subscriptions and not (self.field or any(carries_number(e.type) for e in subscriptions))):
             return self._no_values(trace, subscriptions)
         return _judged(self, trace, values)
@@ -414,6 +426,8 @@ class LogsReceived:
         """
         sent = {r.t_ns for r in delivered_numbers(trace, self.topic, self.field) if r.t_ns >= values[0].start_ns}
         ticks = {m.t_ns for m in trace.of(Message)}
+        # A program that also publishes at these instants acts in a timer of the same period, which may run before the
+        # callback of the subscription.
         if trace.clock is not ClockKind.VIRTUAL or len(values) < _CHANGES or len(sent & ticks) > _IN_STEP * len(sent):
             return ""
         found: dict[int, list[Printed]] = {}
@@ -445,6 +459,7 @@ class LogsReceived:
 
     def _sought(self, values: Sequence[Held], trace: Trace) -> list[Sought]:
         scale = max(abs(v.value) for v in values)
+        # The last value has no later time; one nanosecond includes the end of the recording itself.
         stops = [v.stop_ns + (_LATE_NS if v.stop_ns < trace.stop_ns else 1) for v in values]
         return [
             Sought(v.start_ns, stop_ns, v.value, scale, partial(Printed.shows, value=v.value))
@@ -460,6 +475,7 @@ class LogsReceived:
         reason = f"{self.process}: {len(unlogged)} of {len(values)} values of {self.topic} are never logged, "
         reason += f"the first is {number(first.value)} at {moment(first.start_ns)}"
         sent, logged = {v.value for v in values}, {v.value for v in values} - {v.value for v in unlogged}
+        # Programs that map a number to on and off log only its two ends, whatever comes between them.
         if logged and logged <= (ends := {min(sent), max(sent)}) and len(sent - ends) >= _BETWEEN:
             only = f"{' and '.join(map(number, sorted(logged)))} {'is' if len(logged) == 1 else 'are'}"
             reason += f"; only {only}, so the log does not show what was received"
@@ -490,6 +506,8 @@ def _judged(check: LogsValues | LogsReceived, trace: Trace, came: Sequence[Any])
     unwritten: list[Any] = list(check.unlogged_in(trace, came, written))
     if check.is_enough(came, unwritten):
         return replace(check.when_printed(came, check.evidence_of(came, unlogged)), facts=facts)
+    # `standing` asks whether a number stands somewhere at all, `followed` whether a place in the text follows the
+    # values.
     absent: list[Any] = list(check.unlogged_in(trace, came, records, standing))
     hidden = check.is_enough(came, absent)
     lost = unlogged if hidden else absent

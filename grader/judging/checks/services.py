@@ -51,6 +51,7 @@ class ServiceAvailable:
     def judge(self, trace: Trace) -> Finding:
         answers = [r for r in trace.responses(self.service, "student") if r.type == self.type]
         ends = [e for e in trace.service_ends("service", self.service) if e.type == self.type]
+        # A response proves the server even if the graph was never looked at while it was there.
         if not answers and all(end.unusual for end in ends):
             return explain_no_server(trace, self.service, self.type)
         node = quote(ends[0].node) if ends else "a node"
@@ -142,6 +143,7 @@ class ServiceResponse(FewSuffice):
         found = [r for r in trace.responses(self.service, "student") if r.t_ns < trace.stop_ns]
         if len(found) < max(1, self.at_least):
             return too_few_responses(trace, self.service, len(found), self.at_least)
+        # Counted from 1, as people count responses.
         wrong = [(k, r) for k, r in enumerate(found, 1) if broken_rules(r.value, self.fields)]
         evidence = {"service": self.service, "responses": len(found), "wrong": len(wrong)}
         if not wrong:
@@ -180,6 +182,7 @@ def never_asked(trace: Trace, service: str) -> Finding:
     Raises:
         HarnessError: The server existed and was running.
     """
+    # Also if there is none at all: `all` of nothing is true.
     if all(end.unusual for end in trace.service_ends("service", service)):
         return waiting_for("service_available", explain_no_server(trace, service))
     if crashed := explain_fault(trace, f"{service} could not be called"):
@@ -246,6 +249,7 @@ class ServiceFunction(FewSuffice):
         brief = f"{self.service}: {self.field} is {found}, expected {self.formula} = {number(first.wanted)}"
         reason = f"{moment(first.response.t_ns)}, {brief}; wrong in {len(wrong)} of "
         reason += counted(len(answers), "response")
+        # Only if all of them are 0 or missing: one other number shows that the field is set.
         hint = f"set response.{self.field} before the response is returned" if not any(a.got for a in answers) else ""
         known = evidence | {"first_wrong_s": seconds(first.response.t_ns)}
         return not_met(reason, known, hint=hint, problem=ProblemKind.WRONG_VALUE, brief=brief)
@@ -263,6 +267,7 @@ class ServiceFunction(FewSuffice):
         for call in calls:
             given = {name: number_at(call.request.value, name) for name in wanted.names}
             known = {name: value for name, value in given.items() if value is not None}
+            # A field that is missing or no number, and a division by zero, have no answer that could be right or wrong.
             value = wanted.of(known) if len(known) == len(given) else math.nan
             if call.response is not None and math.isfinite(value):
                 found.append(_Answer(call.response, number_at(call.response.value, self.field), value))

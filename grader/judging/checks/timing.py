@@ -88,6 +88,7 @@ class Period:
 
     def judge(self, trace: Trace) -> Finding:
         times = [m.t_ns for m in published(trace, self.topic)]
+        # Two messages have one gap, and fewer none.
         if len(times) < max(2, self.at_least):
             return too_few_messages(trace, self.topic, len(times), max(2, self.at_least))
         gaps = [(a, b - a) for a, b in pairwise(times)]
@@ -101,6 +102,7 @@ class Period:
         }
         text = f"{self.topic}: gaps from {min(lengths):.3f} s to {max(lengths):.3f} s, "
         text += f"{evidence['average_s']:.3f} s on average"
+        # Single gaps before the average: one that is wrong is a moment that a student can look at.
         wrong = self._wrong(trace, gaps)
         if wrong is not None:
             t_ns, gap = wrong
@@ -130,6 +132,7 @@ class Period:
 
     def _wrong(self, trace: Trace, gaps: Sequence[tuple[int, int]]) -> tuple[int, int] | None:
         jitter = JITTER_NS[trace.clock]
+        # The jitter of the wall clock in both directions: a late message makes one gap longer and the next one shorter.
         least, largest = (self.least or 0) - jitter, self.largest
         for t_ns, gap in gaps:
             if gap < least or (largest is not None and gap > largest + jitter):
@@ -166,6 +169,7 @@ class Latency:
             return explain_no_message(trace, self.output)
         jitter = JITTER_NS[trace.clock]
         sent = (given.t_ns for given in _inputs(trace, self.input))
+        # Others could still have been answered after the end.
         inputs = [t for t in sent if t + self.within + jitter < trace.stop_ns]
         if not inputs:
             return _no_input(trace, self.input)
@@ -174,6 +178,7 @@ class Latency:
         evidence: dict[str, object] = {"inputs": len(inputs), "outputs": len(outputs), "late": len(late)}
         known = [d for d in delays if d is not None]
         evidence["slowest_s"] = seconds(max(known, default=0))
+        # The slack is for shares such as 0.9 of 10, which floating point puts above 9.
         if len(inputs) - len(late) >= self.share * len(inputs) - 1e-9:
             reason = f"{self.output}: within {evidence['slowest_s']:.3f} s after {counted(len(inputs), 'input')}"
             return met(f"{reason} on {self.input}", evidence)
@@ -182,6 +187,7 @@ class Latency:
         reason = f"{moment(t_ns)}, {self.output}: {took} after an input on {self.input}, expected one within "
         reason += f"{_ms(self.within)}; so after {len(late)} of {counted(len(inputs), 'input')}"
         fault = first_fault(trace)
+        # A late answer was late before the crash; only what never came is due to it.
         if fault is not None and delay is None:
             return faulted(fault, reason, evidence, last=True)
         problem = ProblemKind.NO_ANSWER if delay is None else ProblemKind.TOO_LATE
@@ -204,6 +210,7 @@ class Latency:
         return Drawing(panels=panels, title=f"From {self.input} to {self.output}")
 
     def _delay(self, t_ns: int, outputs: Sequence[int], jitter: int) -> int | None:
+        # On the wall clock, both may be recorded late, and so in the wrong order.
         place = bisect_left(outputs, t_ns - jitter)
         return max(0, outputs[place] - t_ns) if place < len(outputs) else None
 
@@ -211,6 +218,7 @@ class Latency:
 def _inputs(trace: Trace, topic: str) -> list[Delivery | Message]:
     """Return the grader's messages on a topic that had a subscriber; without any, those of the student's nodes."""
     from_ns = heard_from_ns(trace, topic)
+    # The input of a node may come from another one of the student's.
     return [d for d in trace.deliveries(topic) if d.t_ns >= from_ns] or [*published(trace, topic)]
 
 
@@ -250,6 +258,7 @@ class Silence:
             if fault is not None:
                 return faulted(fault, "it ended before the silent period began")
             raise HarnessError(f"{self.topic}: the recording has no moment {self.after or self.before}")
+        # That is a mistake in the rubric, not the student's: there is nothing to be silent in.
         if stop_ns <= start_ns and fault is None:
             raise HarnessError(f"{self.topic}: the silent period has no length")
         found = [m.t_ns for m in published(trace, self.topic) if start_ns <= m.t_ns < stop_ns]
@@ -258,6 +267,7 @@ class Silence:
         if found:
             reason = f"{self.topic}: {counted(len(found), 'message')} {window}, the first at {moment(found[0])}"
             return not_met(f"{reason}; expected none", evidence | {"first_s": seconds(found[0])})
+        # Any crash before the end of the window counts: nobody knows what the node would have sent after it.
         if fault is not None and fault.t_ns < stop_ns:
             return faulted(fault, f"the silence {window} earns no points", evidence)
         return met(f"{self.topic}: no message {window}", evidence)
@@ -268,6 +278,8 @@ class Silence:
         stop_ns = self._moment(trace, self.before, trace.stop_ns)
         if start_ns is None or stop_ns is None:
             return None, None
+        # At the edges, the recorded order of a mark and of a message says nothing on the wall clock; the ends of the
+        # recording need no such margin.
         start_ns += self.grace + (JITTER_NS[trace.clock] if self.after else 0)
         stop_ns -= JITTER_NS[trace.clock] if self.before else 0
         return start_ns, min(stop_ns, start_ns + self.duration) if self.duration else stop_ns
@@ -299,6 +311,7 @@ def _ms(duration_ns: int) -> str:
 def _no_input(trace: Trace, topic: str) -> Finding:
     if crashed := explain_fault(trace, f"nothing had been published on {topic} by then"):
         return crashed
+    # There was input, and none of it could be judged: the recording is too short.
     if trace.deliveries(topic) or published(trace, topic):
         raise HarnessError(f"{topic}: no input was published early enough in {span(trace.stop_ns)}")
     return waiting_for("publishes", explain_no_message(trace, topic))
@@ -390,6 +403,7 @@ class Reaction:
     def judge(self, trace: Trace) -> Finding:
         asked = self._asked(trace)
         outputs = published(trace, self.output)
+        # Before anything else: a check whose case was never tried has judged less than it is worth.
         missing = [case for case in self.cases if not any(a.case is case for a in asked)]
         if missing:
             return self._untried(trace, missing)
@@ -409,9 +423,11 @@ class Reaction:
         found = []
         for one, stop_ns in zip(given, stops, strict=False):
             case = next((c for c in self.cases if not broken_rules(one.value, c.when)), None)
+            # An input shortly before the end could still have been answered after it.
             last_chance = stop_ns == trace.stop_ns + jitter_ns and stop_ns - one.t_ns <= self.within
             if case is None or last_chance:
                 continue
+            # The same shift at both ends, so that each output belongs to one input.
             during = tuple(o for o in outputs if one.t_ns - jitter_ns <= o.t_ns < stop_ns - jitter_ns)
             found.append(_Asked(one, case, during))
         return found
@@ -454,6 +470,7 @@ class Reaction:
         first = next((k for k, fit in enumerate(fits) if fit and asked.outputs[k].t_ns <= due_ns), None)
         if first is None:
             return self._missing(asked, rules, fits)
+        # Only outputs after the first right one: before it, a node may repeat the answer to the input before.
         spoilt = next((o for o, fit in zip(asked.outputs[first:], fits[first:], strict=True) if not fit), None)
         return "" if spoilt is None else f"right at first, then {self._difference(spoilt, rules)}"
 

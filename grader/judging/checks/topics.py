@@ -78,6 +78,7 @@ class Subscribes:
         mine = [e for e in student_endpoints(trace, "subscription") if (e.topic, e.type) == (self.topic, self.type)]
         if not mine:
             return explain_no_subscription(trace, self.topic, self.type)
+        # One that fits suffices: a node may have others for other purposes.
         fitting = [e for e in mine if unusual_request(e) is None]
         chosen = (fitting or mine)[0]
         evidence = {
@@ -122,11 +123,14 @@ class FieldValues(EqualFields):
         got = {p: g for p in paths if (g := number_at(first.value, p)) is not None}
         for path, value in got.items():
             want = self.values[path]
+            # Zero in another field proves nothing: most fields of a message are zero.
             if abs(want) <= self.tolerance:
                 continue
+            # A value in another field first: with it, sign and unit of this one mean nothing.
             hint = self._misplaced(first, path, want) or _sign_or_unit(path, value, want)
             if hint:
                 return hint
+        # If several fields differ, one that should be zero is a symptom of the others.
         stray = next((p for p, g in got.items() if within(self.values[p], 0.0, SLACK) and not within(g, 0.0, 1e-6)), "")
         return f"leave {stray} at 0.0" if stray and len(got) == 1 else ""
 
@@ -146,11 +150,13 @@ def _sign_or_unit(path: str, got: float, want: float) -> str:
     if math.isclose(ratio, -1.0, rel_tol=1e-6):
         return f"the sign of {path} is inverted"
     if "angular" in path and (
+        # 1 %, because programs convert with 3.14 or 57; no other unit is near.
         math.isclose(abs(ratio), 180 / math.pi, rel_tol=0.01) or math.isclose(abs(ratio), math.pi / 180, rel_tol=0.01)
     ):
         return f"{path} is in rad/s; {number(got)} looks like a conversion between degrees and radians"
     if "linear" not in path:
         return ""
+    # Other factors are rarely units, and a hint that is wrong costs more time than none.
     factors = {1000.0: "mm/s", 100.0: "cm/s", 3.6: "km/h"}
     unit = next((u for f, u in factors.items() if math.isclose(ratio, f, rel_tol=1e-3)), "")
     return f"{path} is in m/s; {number(got)} looks like {unit}" if unit else ""
@@ -171,6 +177,7 @@ class _Found:
     @property
     def frames(self) -> tuple[str, str]:
         parent, child = text_at(self.value, "header.frame_id"), text_at(self.value, "child_frame_id")
+        # tf2 refuses a leading slash today, and older code still writes it; the frame meant is the same.
         return (parent or "").lstrip("/"), (child or "").lstrip("/")
 
     def numbers(self, part: str, names: tuple[str, ...]) -> list[float]:
@@ -233,6 +240,7 @@ class Transform:
         text = f"{self.parent} → {self.child}: {counted(len(mine), 'transform')}"
         if not pace:
             return met(text, evidence)
+        # A node that crashed stops sending, which is why the rate is wrong.
         return explain_fault(trace, f"{text}, {pace}", evidence, last=True) or not_met(
             f"{text}, {pace}", evidence, problem=ProblemKind.WRONG_RATE
         )
@@ -247,6 +255,7 @@ class Transform:
             return ""
         asked = [self.rotation.get(name, 0.0) for name in _QUATERNION]
         turned = one.numbers("rotation", _QUATERNION)
+        # As a whole: with a sign for each number, other rotations would pass too.
         same = any(all(within(g, s * w, self.tolerance) for g, w in zip(turned, asked, strict=True)) for s in (1, -1))
         return "" if same else f"rotation is ({numbers(turned)}), expected ({numbers(asked)}) as x, y, z, w"
 

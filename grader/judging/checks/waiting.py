@@ -44,6 +44,7 @@ class WaitsGracefully:
         fault = first_fault(trace, self.process)
         if fault is not None:
             return self._faulted(trace, fault)
+        # All of the recording: an error once data has arrived is as wrong as one before.
         bad = [r for r in student_records(trace, self.process) if r.severity in ("ERROR", "FATAL")]
         if bad:
             more = {"first_s": seconds(bad[0].t_ns), "first": quote(bad[0].text)}
@@ -51,6 +52,7 @@ class WaitsGracefully:
                 self.process, bad, "", more, "waiting for data is not an error: log nothing, or use info or warn"
             )
         deliveries = trace.deliveries(self.topic)
+        # That is a scenario without the situation that is asked about.
         if not deliveries or deliveries[0].t_ns < self.silence:
             raise HarnessError(
                 f"{self.topic}: the recording has no silence of {span(self.silence)} before the first message"
@@ -62,6 +64,7 @@ class WaitsGracefully:
         early = not deliveries or fault.t_ns < deliveries[0].t_ns
         when = f"while nothing was published on {self.topic}" if early else f"after messages arrived on {self.topic}"
         hint = fault_hint(fault)
+        # The usual mistake: a callback of a timer uses the last message before there is one.
         if fault.said("NoneType"):
             hint = "start with None and return early until a message has arrived"
         return not_met(f"{fault_sentence(fault)}, {when}", {"fault_s": seconds(fault.t_ns)}, hint=hint, fault=fault)

@@ -24,6 +24,7 @@ from grader.judging.source import (
 )
 from grader.judging.wording import quote
 
+#: Names that stand for names, and operators in operators: a program of the course needs two or three.
 _DEEPEST = 12
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
