@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -409,3 +412,35 @@ def test_a_recording_keeps_the_verdict(grade: Grade, tmp_path: Path) -> None:
         "has changed the scenario test_rate since it was recorded; grade again"
         in changed.exercises[0].verdicts[0].reason
     )
+
+
+PAGE = Path(__file__).resolve().parents[2] / "docs/how-to/tests-as-criteria.md"
+
+
+def test_the_page_about_tests_shows_what_works(grade: Grade) -> None:
+    """The rubric and the tests of the how-to grade the program of the tutorial."""
+    rubric, tests = re.findall(r"^```(?:yaml|python)\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
+    own = rubric.replace("test_wall.py", "test_robot.py")
+    right = grade(RIGHT, tests, rubric=own)
+    assert [(v.id, v.score) for v in right.exercises[0].verdicts] == [
+        ("test_rate", 4),
+        ("test_stops_0_5", 3),
+        ("test_stops_1_5", 3),
+    ]
+    wrong = grade(RIGHT.replace("self.nearest > self.distance", "False"), tests, rubric=own)
+    assert verdicts(wrong)["test_stops_0_5"].reason == "the robot stands although nothing is near"
+
+
+def test_a_class_is_graded_by_tests(tmp_path: Path) -> None:
+    """`grade batch` runs the tests on every submission."""
+    (tmp_path / "rubric.yaml").write_text(RUBRIC)
+    (tmp_path / "test_robot.py").write_text(TESTS)
+    for name, program in (("ada", RIGHT), ("bob", RIGHT.replace("0.05", "0.1"))):
+        (tmp_path / "class" / name).mkdir(parents=True)
+        (tmp_path / "class" / name / "obstacle_stop.py").write_text(program)
+    command = ["grade", "batch", "class", "--rubric", "rubric.yaml", "-o", "results"]
+    command[0] = str(Path(sys.executable).with_name("grade"))
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 1), done.stdout + done.stderr
+    results = json.loads((tmp_path / "results/batch.json").read_text())["students"]
+    assert [one["score"] for one in results] == [7, 4]
