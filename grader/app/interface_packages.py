@@ -18,7 +18,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.app.ros_packages import LENDABLE, Lent, copied, lent_to
+from grader.app.ros_packages import LENDABLE, LENT, Lent, copied, lent_to
 from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault, RubricError
 from grader.core.exercise import Exercise
@@ -165,6 +165,28 @@ def modules_for(exercise: Exercise, course: tuple[Path, ...] = ()) -> tuple[Path
     own = [offer.package for offer in offers(map(Path, exercise.interfaces), course, ros)]
     ready = [package for package in shipped_packages() if not is_installed(package.name, ros)]
     return (built(needed(own, [*_of_class(course, ros), *ready]), ros).python,)
+
+
+def modules_named(sources: Iterable[bytes], own: Sequence[InterfacePackage], ros: RosInstallation) -> tuple[Path, ...]:
+    """Return where the modules of packages are, those given and those of the grader that own programs name.
+
+    Args:
+        sources: The text of the programs, which need no sandbox.
+        own: Message packages that lie beside them.
+        ros: What is installed, which nothing replaces.
+
+    Raises:
+        DefinitionError: A definition cannot be used; it has file and line.
+    """
+    taken = {package.name for package in own}
+    ready = [p for p in shipped_packages() if p.name not in taken and not is_installed(p.name, ros)]
+    names = {*(package.name for package in ready), *LENDABLE}
+    mentioned = _named_in(sources, names)
+    lent = lent_to(mentioned, lambda name: is_installed(name, ros))
+    mentioned |= _named_in([lent.text], names)
+    used = needed([*own, *(package for package in ready if package.name in mentioned)], ready)
+    found = [built(used, ros).python] if used else []
+    return (*found, LENT) if lent.names else tuple(found)
 
 
 def described(course: tuple[Path, ...], *, ready: bool = True) -> list[DescribedPackage]:

@@ -148,6 +148,8 @@ class Worker:
                 _await_ready(student)
                 yield student, dict(added.starts_ns).get(name, 0)
 
+        sys.path += [folder for folder in plan.interfaces if folder not in sys.path]
+
         def ask(question: Mapping[str, Any]) -> Any:
             tell(question)
             return next(commands)["answer"]

@@ -9,8 +9,9 @@ from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from random import Random
-from typing import Any, ParamSpec, TypeVar, overload
+from typing import Any, ParamSpec, TypeVar
 
+from grader.app.programs import package_of
 from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError
 from grader.core.limits import Limits
@@ -50,7 +51,8 @@ from grader.simulation.loading import made
 from grader.simulation.participant import Moment, Simulation
 from grader.world import telling
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
-from grader.world.programs import Found, Program, Runnable, find_launch_file, find_program, parameter_values
+from grader.world.interfaces import let_import, modules_for
+from grader.world.programs import Found, Messages, Program, Runnable, find_launch_file, find_program, parameter_values
 
 Value = TypeVar("Value")
 Given = ParamSpec("Given")
@@ -98,26 +100,6 @@ class Received:
 
     t: float  # when, in seconds since the test began
     message: Any  # the message, an object of its class
-
-
-class Messages(list[Value]):
-    """The messages of a topic so far; asking for one that has not arrived says why there is none."""
-
-    def __init__(self, found: Sequence[Value], why: Callable[[], NoMessage]) -> None:
-        super().__init__(found)
-        self._why = why
-
-    @overload  # type: ignore[override]
-    def __getitem__(self, index: int) -> Value: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Value]: ...
-    def __getitem__(self, index: int | slice) -> Value | list[Value]:
-        """Return a message or some of them; raises NoMessage for one that has not arrived."""
-        __tracebackhide__ = True
-        try:
-            return super().__getitem__(index)
-        except IndexError:
-            raise (NoMessage(f"only {len(self)} messages so far") if self else self._why()) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +188,7 @@ class World:
             limits=OWN_LIMITS,
             drawn_order=drawn_order,
             working=str(Path.cwd()),
+            interfaces=_modules_for(self._near[:1]),
         )
         self._observations: list[Observation] = []
         self._messages: dict[str, list[Message]] = {}
@@ -301,6 +284,7 @@ class World:
         return find_launch_file(file, self._near)
 
     def _plan_of(self, found: Found, start: PlannedStart, env: Mapping[str, str]) -> Plan:
+        package = package_of(found.root / Path(found.file).parent) if found.projects else found.root
         installed = self.session.folder / f"installed_{derive(0, str(found.root))[:16]}"
         prefixes, _ = install_shares(found.root, found.projects, installed, self.session.ros)
         return replace(
@@ -311,6 +295,7 @@ class World:
             starts=(start,),
             projects=found.projects,
             prefixes=prefixes,
+            interfaces=tuple(dict.fromkeys((*self._plan.interfaces, *_modules_for((package,))))),
             environment=tuple((name, str(value)) for name, value in env.items()),
         )
 
@@ -828,6 +813,13 @@ class World:
             found = type(response).__name__
             raise TypeError(f"{name}: expected a {kind.__name__}.Response from its function, found {found}")
         return plain_fields(response)
+
+
+def _modules_for(folders: Sequence[Path]) -> tuple[str, ...]:
+    """Return where packages are that programs of folders need and nobody has installed; a test may import them too."""
+    found = tuple(str(path) for folder in folders for path in modules_for(folder))
+    let_import(found)
+    return found
 
 
 def _absolute(name: str) -> str:
