@@ -173,7 +173,7 @@ class Worker:
                     answer = runner.perform(command)
                 except HarnessError as error:
                     answer = {"problem": error.message, "launch_failed": isinstance(error, LaunchFailedError)}
-                news = [_compact(o) if plan.working else observation_to_json(o) for o in runner.news()]
+                news = [_compact(o) if plan.working else _whole(o) for o in runner.news()]
                 common = {"now_ns": runner.now_ns, "ended": runner.programs(), "full": runner.full(), "news": news}
                 is_last = isinstance(command, Finish)
                 last = {"notes": runner.notes(), "unsuitable": runner.unsuitable()} if is_last else {}
@@ -527,6 +527,15 @@ def _compact(observation: Observation) -> list[Any]:
     """Convert an observation for the other side of a run of own programs, which reads messages from their bytes."""
     if isinstance(observation, (Message, Delivery)) and observation.cdr:
         return observation_to_json(replace(observation, value={}))
+    return observation_to_json(observation)
+
+
+def _whole(observation: Observation) -> list[Any]:
+    """Convert an observation for a rubric's test, with the fields of what the test has published as bytes."""
+    if isinstance(observation, Delivery) and not observation.value:
+        from grader.execution.serialization import fields_of  # noqa: PLC0415 - imports rclpy, which takes long
+
+        observation = replace(observation, value=fields_of(observation))
     return observation_to_json(observation)
 
 

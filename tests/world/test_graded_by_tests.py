@@ -109,15 +109,19 @@ def without_time(report: Report) -> str:
     return json.dumps(report_to_json(report) | {"duration_s": 0})
 
 
-def test_a_right_program_gets_all_points_twice(grade: Grade) -> None:
-    """Each test is a criterion, and the same file gets the same report again."""
-    first, second = grade(RIGHT), grade(RIGHT)
+def test_a_right_program_gets_all_points_twice(grade: Grade, tmp_path: Path) -> None:
+    """Each test is a criterion, and the same file gets the same report and the same recordings again."""
+    first, second = (grade(RIGHT, evidence=tmp_path / name) for name in ("first", "second"))
     assert [(v.id, v.title, v.score, v.max_score) for v in first.exercises[0].verdicts] == [
         ("test_rate", "Publishes at 20 Hz", 3, 3),
         ("test_stops_0_1", "Stops before a wall (0.1)", 2, 2),
         ("test_stops_0_4", "Stops before a wall (0.4)", 2, 2),
     ]
     assert without_time(first) == without_time(second)
+    recordings = sorted((tmp_path / "first").rglob("*.mcap"))
+    assert len(recordings) == 3
+    for path in recordings:
+        assert path.read_bytes() == (tmp_path / "second" / path.relative_to(tmp_path / "first")).read_bytes()
 
 
 def test_a_failed_assertion_is_the_reason(grade: Grade) -> None:
