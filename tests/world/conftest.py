@@ -2,5 +2,5 @@
 
 from grader.pytest_plugin import ros as ros  # noqa: PLC0414 - instead of the one of the other tests
 
-#: A workspace whose tests run as colcon runs them: `test_workspace.py`.
-collect_ignore = ["workspace"]
+#: Tests that run in other folders: `test_guests.py` and `test_workspace.py`.
+collect_ignore = ["guests", "workspace"]
