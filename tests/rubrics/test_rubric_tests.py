@@ -13,6 +13,7 @@ from grader.authoring.checking import check_rubric
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
 from grader.execution.evidence.manifest import scenario_digest
+from grader.packaging import Chosen, gradescope
 from grader.rubrics.loader import read_rubric, side_files
 
 RUBRIC = """\
@@ -254,3 +255,10 @@ def test_check_counts_them(write: Write) -> None:
     assert [warning.partition(": ")[2] for warning in checked.warnings] == [
         "test_a has no hint: a student who does not meet it may get no advice"
     ]
+
+
+def test_bundles_for_platforms_refuse_tests(write: Write) -> None:
+    """They would lack pytest: that is said when a bundle is made, and not to the first student."""
+    rubric = write("@pytest.mark.points(5)\ndef test_a(ros): pass\n")
+    with pytest.raises(RubricError, match="expected a rubric without tests for pytest, which bundles do not bring"):
+        gradescope(Chosen((), (rubric,), "auto"))
