@@ -231,6 +231,7 @@ if TYPE_CHECKING:
     from grader.world.errors import ParameterRejected as ParameterRejected
     from grader.world.errors import ProgramFailed as ProgramFailed
     from grader.world.errors import StepTimeout as StepTimeout
+    from grader.world.errors import WrongType as WrongType
     from grader.world.opening import Worlds as Worlds
     from grader.world.opening import open_world as open_world
     from grader.world.programs import Program as Program
@@ -329,7 +330,7 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.world.opening": "open_world Worlds",
         "grader.world.world": "World Received GoalResult Launched Failure",
         "grader.world.programs": "Program",
-        "grader.world.errors": "ProgramFailed StepTimeout NoMessage ParameterRejected",
+        "grader.world.errors": "ProgramFailed StepTimeout NoMessage ParameterRejected WrongType",
     },
     "Tests": {
         "grader.testing": "TraceBuilder judge explain builtin_check",

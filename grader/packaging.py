@@ -227,4 +227,9 @@ def _check(chosen: Chosen) -> None:
         if found.variant is not None:
             text = f"{path}: expected a rubric that is the same for everybody, found one with variants"
             raise RubricError(text, "grade it with grade batch: no platform keeps the course key from students")
+        if any(scenario.test is not None for scenario in found.scenarios):
+            text = (
+                f"{path}: expected a rubric without tests for pytest, which bundles do not bring, found one with some"
+            )
+            raise RubricError(text, "grade it with grade batch, where pytest is installed")
     exercise_ids(chosen.exercises, exercises)

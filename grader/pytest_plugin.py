@@ -5,9 +5,14 @@ It is loaded wherever the package is installed, and imports nothing of ROS befor
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+import re
+import sys
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import ExitStack
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -21,6 +26,8 @@ _OPTIONS = ("seed", "seeds", "delay", "lose")
 _WORLD: pytest.StashKey[World] = pytest.StashKey()
 _SHARED: pytest.StashKey[str] = pytest.StashKey()
 _OF_WORKER = "ros_shared"
+#: Names that packages of ROS have. Outside of a package, any other module is missing for reasons of its own.
+_MAY_BE_OF_ROS = re.compile(r"_msgs$|_interfaces$|^tf2?_|^cv_bridge$|^message_filters$|^sensor_msgs_py$")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -42,6 +49,68 @@ def pytest_configure(config: pytest.Config) -> None:
         "options of the fixture `ros`: the seed of everything drawn, the number of seeds to run the test with, "
         "seconds that messages of the test are on their way, and the share of them that is lost",
     )
+    config.addinivalue_line(
+        "markers",
+        "points(N, hint=TEXT, needs=ID): what the test is worth where a rubric names its file; it does nothing here",
+    )
+
+    sys.meta_path.append(_Finder(config.rootpath))
+
+
+def pytest_unconfigure() -> None:
+    """Find no more packages that are not installed."""
+    sys.meta_path[:] = [finder for finder in sys.meta_path if not isinstance(finder, _Finder)]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> None:
+    """Look for packages beside the file that is about to be imported."""
+    if isinstance(collector, pytest.Module):
+        _look_beside(collector.path)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Look for packages beside the file of the test that is about to run."""
+    _look_beside(item.path)
+
+
+def _look_beside(file: Path) -> None:
+    for finder in sys.meta_path:
+        if isinstance(finder, _Finder):
+            finder.folder = file.parent
+
+
+class _Finder(MetaPathFinder):
+    """Finds packages of ROS that are not installed; what it needs for that is imported when such a module is missing.
+
+    Args:
+        folder: Where to look first.
+
+    Attributes:
+        folder: In the workspace, if there is one.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._is_looking = False
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return the place of a package, if it is one."""
+        if path is not None or self._is_looking or not (_MAY_BE_OF_ROS.search(fullname) or self._is_in_package()):
+            return None
+        self._is_looking = True  # whatever is missing meanwhile is not looked for
+        try:
+            from grader.world.interfaces import PackageFinder  # noqa: PLC0415 - most tests miss no such module
+
+            return PackageFinder(self.folder).find_spec(fullname, path, target)
+        finally:
+            self._is_looking = False
+
+    def _is_in_package(self) -> bool:
+        return any((up / "package.xml").is_file() for up in (self.folder, *self.folder.parents))
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

@@ -147,6 +147,9 @@ def _unit(annotation: object) -> Unit | None:
 
 def _situation(scenario: Scenario) -> str:
     """Describe in one sentence what runs, for how long, and what the grader publishes meanwhile."""
+    if scenario.test is not None:
+        test, programs = scenario.test, ", ".join(scenario.processes)
+        return f"the test {test.name} of {test.file} runs what it needs of {programs}"
     span = scenario.span
     text = f"{' and '.join(scenario.processes)} observed for {time_phrase(span.duration_ns)}"
     if span.after_first_message_on:

@@ -24,11 +24,12 @@ from grader.core.releases import TRIED
 from grader.core.report import Environment, Report
 from grader.core.submission import Run, Submission
 from grader.core.trace import Trace
-from grader.execution.plan import plan_scenario
+from grader.execution.plan import derive, known_programs, plan_scenario
 from grader.execution.real_time_budget import RealTimeBudget
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
 from grader.execution.shares import install_shares
 from grader.execution.supervisor import Job
+from grader.execution.test_runs import TestJob, record_tests
 from grader.judging.beginnings import BeginningJudge
 from grader.judging.judge_run import judge_run
 from grader.rubrics.builtin import builtin_exercises, exercise_ids
@@ -93,18 +94,20 @@ def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
     started = time.perf_counter() if started is None else started
     with prepared(session, request, progress, started) as ready:
         exercises, submission, run = ready.exercises, ready.submission, ready.run
-        take = EarlyReports(exercises, ready.jobs, run, on_partial_report).take if on_partial_report else None
+        asked = {*ready.jobs, *ready.tests}
+        take = EarlyReports(exercises, asked, run, on_partial_report).take if on_partial_report else None
         checks = SpotChecks(request.spot_checks, run.seed, submission.digest, ready.reaches)
         later = request.clock == AUTO and checks.certain
         first = None if later else take
         budget = RealTimeBudget(request.time_budget_s, spent_s=ready.provided.spent_s)
         traces = session.record(ready.jobs, request.clock, progress, first, budget=budget)
+        tested = record_tests(session.recorder, ready.tests, progress, budget)
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
             judge_of = partial(_judge_of, exercises, submission, run.sources)
             traces = check(checks, ready.jobs, traces, record, take or (lambda *_: None), judge_of)
-        run = replace(run, traces={**run.traces, **traces}, duration_s=time.perf_counter() - started)
+        run = replace(run, traces={**run.traces, **traces, **tested}, duration_s=time.perf_counter() - started)
         run = replace(run, definitions=definitions(run.traces.values(), ready.provided))
         if on_recorded is not None:
             on_recorded(run, exercises)
@@ -120,6 +123,7 @@ class Prepared:
     provided: Provided
     reaches: tuple[str, ...]  # what its files use that reaches into their process
     jobs: Mapping[Key, Job]  # by exercise and scenario
+    tests: Mapping[Key, TestJob]  # the tests to run, in the same way
     run: Run  # all but the recordings to make
 
 
@@ -160,6 +164,9 @@ def prepared(
         reaches = read_reaches(submission.root)
         folders, own_hashes = provided.folders, not HASHES.isdisjoint(reaches)
         jobs = plan_jobs(request, unrecorded, submission, recordings, seed, folders, prefixes, own_hashes=own_hashes)
+        tests = plan_tests(
+            unrecorded, submission, seed, folders, prefixes, own_hashes=own_hashes, trusted=provided.trusted
+        )
         run = Run(
             submission=submission,
             traces=kept,
@@ -172,7 +179,7 @@ def prepared(
             interfaces=provided.packages,
             offered=provided.offered,
         )
-        yield Prepared(exercises, submission, provided, reaches, jobs, run)
+        yield Prepared(exercises, submission, provided, reaches, jobs, tests, run)
 
 
 def _judge_of(
@@ -276,8 +283,52 @@ def plan_jobs(  # noqa: PLR0913  each comes from a different stage
         )
         for exercise in exercises
         for scenario in exercise.scenarios
-        if all(submission.files[name].found for name in scenario.handed_in)
+        if scenario.test is None and all(submission.files[name].found for name in scenario.handed_in)
     }
+
+
+def plan_tests(  # noqa: PLR0913  each comes from a different stage
+    exercises: Sequence[Exercise],
+    submission: Submission,
+    seed: int,
+    interfaces: Sequence[Path] = (),
+    prefixes: tuple[str, ...] = (),
+    *,
+    own_hashes: bool = False,
+    trusted: Sequence[Path] = (),
+) -> dict[Key, TestJob]:
+    """Plan the tests of rubrics, by exercise and scenario; the arguments are those of `plan_jobs`.
+
+    `trusted` are those of the interface packages that the submission does not bring: a test imports no others.
+    """
+    jobs: dict[Key, TestJob] = {}
+    for exercise in exercises:
+        for scenario in exercise.scenarios:
+            if scenario.test is None:
+                continue
+            plan = plan_scenario(
+                exercise.id,
+                scenario,
+                submission,
+                seed=seed,
+                recordings={},
+                clock=planned_clock(AUTO),
+                own_hashes=own_hashes,
+            )
+            handed_in = {name: submission.files[name] for name in scenario.processes}
+            there = {name: file for name, file in handed_in.items() if file.found}
+            jobs[exercise.id, scenario.id] = TestJob(
+                f"{exercise_name(exercise.number)}: {scenario.test.name}",
+                replace(plan, interfaces=tuple(map(str, interfaces)), prefixes=prefixes),
+                scenario.test,
+                int(derive(seed, "test", exercise.id, scenario.id), 16),
+                files=tuple((name, file.found or "", file.executable) for name, file in there.items()),
+                missing=tuple(name for name in handed_in if name not in there),
+                known=tuple(known_programs(submission)),
+                provided=scenario.provided,
+                paths=tuple(map(str, trusted)),
+            )
+    return jobs
 
 
 def begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[Exercise], Submission]:

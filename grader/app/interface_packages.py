@@ -18,7 +18,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.app.ros_packages import LENDABLE, Lent, copied, lent_to
+from grader.app.ros_packages import LENDABLE, LENT, Lent, copied, lent_to
 from grader.core.dataclass import dataclass
 from grader.core.errors import EnvironmentFault, RubricError
 from grader.core.exercise import Exercise
@@ -67,6 +67,13 @@ class Provided:
     problems: tuple[str, ...] = ()  # sentences for the student, about packages of the submission
     lent: tuple[Path, ...] = ()  # the folder of the other Python packages of ROS that the run gets, if it gets any
     spent_s: float = 0.0  # real time that the build of the submission's packages took
+    own_builds: int = 0  # how many of the builds, at the end, are of packages that the submission brings
+
+    @property
+    def trusted(self) -> tuple[Path, ...]:
+        """Where the modules of packages are that the submission does not bring."""
+        trusted = self.builds[: len(self.builds) - self.own_builds]
+        return tuple(BuiltInterfaces(prefix, ()).python for prefix in trusted)
 
     @property
     def folders(self) -> tuple[Path, ...]:
@@ -150,6 +157,38 @@ def _of_class(course: tuple[Path, ...], ros: RosInstallation) -> list[InterfaceP
     return [offer.package for offer in offers((), course, ros)]
 
 
+def modules_for(exercise: Exercise, course: tuple[Path, ...] = ()) -> tuple[Path, ...]:
+    """Return where the modules of a rubric's own interface packages are; empty if it brings none."""
+    if not exercise.interfaces:
+        return ()
+    ros = find_ros()
+    own = [offer.package for offer in offers(map(Path, exercise.interfaces), course, ros)]
+    ready = [package for package in shipped_packages() if not is_installed(package.name, ros)]
+    return (built(needed(own, [*_of_class(course, ros), *ready]), ros).python,)
+
+
+def modules_named(sources: Iterable[bytes], own: Sequence[InterfacePackage], ros: RosInstallation) -> tuple[Path, ...]:
+    """Return where the modules of packages are, those given and those of the grader that own programs name.
+
+    Args:
+        sources: The text of the programs, which need no sandbox.
+        own: Message packages that lie beside them.
+        ros: What is installed, which nothing replaces.
+
+    Raises:
+        DefinitionError: A definition cannot be used; it has file and line.
+    """
+    taken = {package.name for package in own}
+    ready = [p for p in shipped_packages() if p.name not in taken and not is_installed(p.name, ros)]
+    names = {*(package.name for package in ready), *LENDABLE}
+    mentioned = _named_in(sources, names)
+    lent = lent_to(mentioned, lambda name: is_installed(name, ros))
+    mentioned |= _named_in([lent.text], names)
+    used = needed([*own, *(package for package in ready if package.name in mentioned)], ready)
+    found = [built(used, ros).python] if used else []
+    return (*found, LENT) if lent.names else tuple(found)
+
+
 def described(course: tuple[Path, ...], *, ready: bool = True) -> list[DescribedPackage]:
     """Build the packages of a course, and describe them and, if asked, those that ship with the grader.
 
@@ -204,6 +243,7 @@ def provide(
     brought = [BroughtPackage(offer.package.name, offer.origin, _digest([offer.package])) for offer in given]
     builds = [_copied(built(used, ros).prefix, session.folder)] if used else []
     others = [*used, *(package for package in ready if package not in used)]
+    given_builds = len(builds)
     own = _of_submission(session, submission, others, budget_s)
     try:
         builds += [_copied(folder, root.parent) for folder in own.builds]
@@ -216,7 +256,8 @@ def provide(
     offered = offered_digest(course, exercises)
     lent_at = (copied(lent.names, session.folder),) if lent.names else ()
     notes = tuple(_notes(packages, lent))
-    return Provided(packages, tuple(builds), offered, notes, own.problems, lent_at, own.spent_s)
+    own_builds = len(builds) - given_builds
+    return Provided(packages, tuple(builds), offered, notes, own.problems, lent_at, own.spent_s, own_builds)
 
 
 def definitions(traces: Iterable[Trace], provided: Provided) -> dict[str, Definition]:

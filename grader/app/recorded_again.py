@@ -23,6 +23,7 @@ from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError
 from grader.execution.codec import beside_trace, from_json, trace_to_json
 from grader.execution.recording_session import AUTO, RecordingSession, open_session
+from grader.execution.test_runs import record_tests
 
 #: As the command line does: imports make many objects and no garbage.
 COLLECT_AFTER = 200_000
@@ -97,6 +98,8 @@ def _recorded(session: RecordingSession, recordings: Recordings, number: int) ->
             keys = [key for key in ready.jobs if not wanted.scenarios or key in wanted.scenarios]
             jobs = {key: ready.jobs[key] for key in (reversed(keys) if recordings.reverses else keys)}
             traces = session.record(jobs, AUTO, lambda _: None, on_wall=False)
+            tests = {key: job for key, job in ready.tests.items() if not wanted.scenarios or key in wanted.scenarios}
+            traces |= record_tests(session.recorder, tests, lambda _: None)
             lines = [
                 {
                     "number": number,

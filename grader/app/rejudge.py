@@ -91,7 +91,19 @@ def again(evidence: Evidence, how: Judgement) -> tuple[list[Exercise], Run]:
     if how.chosen:
         request = replace(request, exercises=how.chosen)
     same = replace(run.reproduce, command=command_words(request, kept.seed))
-    return exercises, replace(run, reproduce=same)
+    return exercises, replace(run, reproduce=same, notes=(*run.notes, *_not_judged_again(exercises)))
+
+
+def _not_judged_again(exercises: Sequence[Exercise]) -> Iterator[str]:
+    """Yield what readers must know of criteria whose outcome is that of the recording."""
+    tests = [scenario.test for exercise in exercises for scenario in exercise.scenarios if scenario.test is not None]
+    for file in dict.fromkeys(test.file for test in tests):
+        count = sum(test.file == file for test in tests)
+        what = "1 criterion is a test" if count == 1 else f"{count} criteria are tests"
+        yield (
+            f"{what} in {file}, which cannot be judged again from a recording: the outcome is that of the recorded "
+            "run; to run the tests again, use grade"
+        )
 
 
 def judged_again(evidence: Evidence, exercises: Sequence[Exercise], request: GradeRequest, played: str) -> Report:

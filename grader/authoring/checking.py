@@ -12,12 +12,14 @@ from typing import Any
 
 from grader.app.bags import recordings_of
 from grader.app.interface_packages import known_interfaces
+from grader.app.test_files import collect_tests
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError, RecordingError, RubricError
 from grader.core.exercise import Criterion, Exercise, named, roles_of
 from grader.core.quantities import duration
 from grader.core.scenario import Scenario, is_launch_file, shortest
 from grader.judging.checks import CHECKS
+from grader.judging.tested import TESTED
 from grader.rubrics.check_parameters import manual_of
 from grader.rubrics.draws import First
 from grader.rubrics.loader import RubricMistakes, read_rubric
@@ -41,7 +43,8 @@ def oddities(exercise: Exercise, tree: YamlTree) -> list[Mistake]:
     """Return warnings about a rubric, in the order of the file."""
     found = list(_of_exercise(exercise, tree))
     for index, criterion in enumerate(exercise.criteria):
-        found += _of_criterion(criterion, exercise, ("criteria", index), tree)
+        path: TreePath = ("pytest",) if criterion.check_name == TESTED else ("criteria", index)
+        found += _of_criterion(criterion, exercise, path, tree)
     return sorted(set(found))
 
 
@@ -49,7 +52,7 @@ def _of_exercise(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
     total = sum((criterion.points for criterion in exercise.criteria), Fraction(0))
     if total % ROUND:
         text = f"the points add up to {float(total):g}, which is not a multiple of {ROUND}"
-        yield tree.at_key(("criteria",)).mistake(text)
+        yield tree.at_key(("criteria",) if ("criteria",) in tree.keys else ("pytest",)).mistake(text)
     judged = {criterion.scenario for criterion in exercise.criteria}
     for index, scenario in enumerate(exercise.scenarios):
         if scenario.id not in judged:
@@ -57,19 +60,23 @@ def _of_exercise(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
             yield tree.at(("scenarios", index, "id")).mistake(text)
     yield from _misspelt(exercise, tree)
     run = {process for scenario in exercise.scenarios for process in scenario.handed_in}
+    if any(scenario.test is not None for scenario in exercise.scenarios):
+        run |= {*exercise.files}  # only a run shows what a test starts
     for index, name in enumerate(exercise.files):
         if name not in run:
             yield tree.at(("files", index)).mistake(f"{name} is in `files`, but no scenario runs it")
 
 
 def _of_criterion(criterion: Criterion, exercise: Exercise, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
-    where = tree.at((*path, "id"))
+    where = tree.at(path if criterion.check_name == TESTED else (*path, "id"))
     kind = type(criterion.check)
     if not criterion.hint:
         yield where.mistake(f"{criterion.id} has no hint: a student who does not meet it may get no advice")
     if kind not in CHECKS.values() and not manual_of(kind).summary:
         yield where.mistake(f"{criterion.id} is judged by {kind.__name__}, which has no docstring to explain it")
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
+    if criterion.check_name == TESTED:
+        return
     yield from _of_stretches(criterion, scenario, path, tree)
     yield from _of_inputs(criterion, exercise, path, tree)
 
@@ -166,9 +173,13 @@ class Checked:
 
 
 def check_rubric(path: Path, course: tuple[Path, ...] = ()) -> Checked:
-    """Check a rubric, which may use the interface packages of a course; raises RubricError with every mistake."""
+    """Check a rubric, which may use the interface packages of a course; raises RubricError with every mistake.
+
+    Of a rubric with tests, pytest has to collect the ones that were read; raises EnvironmentFault where it is missing.
+    """
     exercise = read_rubric(path, draw=First(), interfaces=known_interfaces(course))
     _read_recordings(path, exercise)
+    collect_tests(path, exercise, course)
     where = shown(str(path), 500)
     odd = oddities(exercise, read_yaml(path.read_text(encoding="utf-8-sig")))
     return Checked(f"{where}: {_summary(exercise)}", tuple(f"{where}:{m.line}:{m.column}: {m.text}" for m in odd))

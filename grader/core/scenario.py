@@ -249,6 +249,15 @@ class RunOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class RubricTest:
+    """A test of the rubric's author, which runs programs itself and judges what they do."""
+
+    file: str  # its file, relative to the rubric
+    content: str  # the text of the file
+    name: str  # what pytest calls it within the file, such as `test_stops[0.5]` or `TestStop::test_wall`
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """One situation that is recorded once."""
 
@@ -264,10 +273,16 @@ class Scenario:
     shutdown_ns: int = 0  # how long the processes may take to end after the stop signal; 0 if this is not checked
     run: tuple[tuple[str, RunOptions], ...] = ()  # `(process, options)` of processes that are started with some
     provided: tuple[tuple[str, str], ...] = ()  # name and text of the rubric's own files that this scenario uses
+    test: RubricTest | None = None  # the test that runs the programs it needs; None if all are run as planned
 
     @property
     def handed_in(self) -> tuple[str, ...]:
-        """The files that a student has to hand in for this scenario: programs, then parameter files."""
+        """The files that a student has to hand in for this scenario: programs, then parameter files.
+
+        None for a test: only its run shows which programs it needs.
+        """
+        if self.test is not None:
+            return ()
         used = (*self.processes, *(options.parameters_file for _, options in self.run if options.parameters_file))
         own = dict(self.provided)
         return tuple(dict.fromkeys(name for name in used if name not in own))

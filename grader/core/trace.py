@@ -358,6 +358,17 @@ class WrittenFile:
 
 
 @dataclass(frozen=True, slots=True)
+class Tested:
+    """What a test of the rubric's author has found in its own run."""
+
+    passed: bool
+    reason: str = ""  # why it has not passed: the message of the assertion; may hold text of the student's
+    hint: str = ""  # one thing to do, if the run itself shows it
+    fault: Fault | None = None  # the failure of a program that ended the test
+    missing: tuple[str, ...] = ()  # files that it runs and the submission lacks
+
+
+@dataclass(frozen=True, slots=True)
 class Trace:
     """The recording of one scenario."""
 
@@ -389,6 +400,8 @@ class Trace:
     author_mistake: AuthorMistake | None = None
     # In virtual time, whether the work of a node before its pauses may slow it down: a reason to record again
     may_drift: bool = False
+    # What the test has found whose run this is; None for a scenario that checks judge
+    tested: Tested | None = None
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

@@ -29,6 +29,7 @@ from grader.core.trace import (
     Request,
     Response,
     Start,
+    Tested,
     Trace,
 )
 from grader.stimuli import PLANNED
@@ -75,6 +76,7 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
         **({"written": [plain(file) for file in trace.written]} if trace.written else {}),
         **({"newer": [plain(one) for one in trace.newer]} if trace.newer else {}),
         **({"author_mistake": asdict(trace.author_mistake)} if trace.author_mistake is not None else {}),
+        **({"tested": _tested_to_json(trace.tested)} if trace.tested is not None else {}),
         "observations": [observation_to_json(o) for o in trace.observations],
     }
 
@@ -82,6 +84,12 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
 def beside_trace(trace: Trace) -> dict[str, Any]:
     """Convert what the format of evidence does not include, and a supervisor has to know."""
     return {"reached": list(trace.reached), "incomplete": trace.incomplete, "may_drift": trace.may_drift}
+
+
+def _tested_to_json(tested: Tested) -> dict[str, Any]:
+    fault = None if tested.fault is None else observation_to_json(tested.fault)
+    found = {"reason": tested.reason, "hint": tested.hint, "missing": list(tested.missing)}
+    return {"passed": tested.passed, **found, **({"fault": fault} if fault else {})}
 
 
 def _start_to_json(start: Start) -> list[Any]:

@@ -261,12 +261,13 @@ def _start(process: str, scenario: Scenario, submission: Submission) -> PlannedS
         ),
         launch_arguments=options.launch_arguments,
         provided=scenario.provided if is_launch_file(process) else (),
-        known=tuple(_known(submission)) if is_launch_file(process) else (),
+        known=tuple(known_programs(submission)) if is_launch_file(process) else (),
     )
     return start if start != PlannedStart(process) else None
 
 
-def _known(submission: Submission) -> Iterator[tuple[str, str]]:
+def known_programs(submission: Submission) -> Iterator[tuple[str, str]]:
+    """Yield the name of each handed-in file by its path in the submission, and by its path and executable."""
     for name, file in submission.files.items():
         if file.found is not None:
             yield (f"{file.found} {file.executable}" if file.executable else file.found), name

@@ -1,6 +1,7 @@
 """Converts between ordinary ROS messages and what passes to and from a worker: types by name, and serialized bytes.
 
-It runs in the process that steps a run, and needs no rclpy context, no node and no ROS domain.
+It runs in the process that steps a run, and for the messages of a rubric's test in the worker. It needs no rclpy
+context, no node and no ROS domain.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import Any
 from grader.core.errors import HarnessError
 from grader.core.trace import Delivery, Message
 from grader.execution.interfaces import interface_class, message_class, plain_fields
+from grader.execution.padding import without_padding
 from grader.student_host.quick_imports import import_without_needless
 
 import_without_needless("rosidl_generator_py")  # which takes as long as the rest, and warns of a deprecated module
@@ -45,7 +47,7 @@ def serialized(message: Any, where: str) -> tuple[str, bytes]:
         interface = type_name(type(message))
     except TypeError as error:
         raise TypeError(f"{where}: expected a ROS message, found {type(message).__name__}") from error
-    return interface, bytes(serialize_message(message))
+    return interface, without_padding(bytes(serialize_message(message)), type(message))
 
 
 def read(carried: Message | Delivery) -> Any:

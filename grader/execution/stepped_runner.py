@@ -13,7 +13,7 @@ from typing import Any
 from grader.core.dataclass import dataclass
 from grader.core.quantities import NS_PER_S
 from grader.core.scenario import Event
-from grader.core.trace import Fault, Mark, Observation
+from grader.core.trace import Fault, FaultKind, Mark, Observation
 from grader.execution.observer import Observer
 from grader.execution.plan import Plan, derive
 from grader.execution.service_peers import check_fields
@@ -171,6 +171,12 @@ class SteppedRunner(VirtualRunner):
         """Return the notes of the run."""
         others = [*self._observer.notes(), *(note for s in self._students for note in s.notes)]
         return list(self._recorder.notes(others))
+
+    @property
+    def is_odd(self) -> bool:
+        """Whether something unusual has happened, after which a worker should be replaced; see `is_worn`."""
+        ended = (FaultKind.KILLED, FaultKind.HUNG)
+        return bool(self.notes()) or any(isinstance(o, Fault) and o.kind in ended for o in self._faults)
 
     def look(self) -> None:
         """Record the graph as it is."""

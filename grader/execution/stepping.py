@@ -10,7 +10,7 @@ from grader.core.trace import Observation
 from grader.execution.codec import to_json
 from grader.execution.evidence.packed import observations_from_json
 from grader.execution.plan import Plan
-from grader.execution.steps import Command, Finish
+from grader.execution.steps import Command, Finish, LaunchFailedError
 from grader.execution.supervisor import TRIES, Recorder, Worker, WorkerLostError
 
 #: Answers a question of the worker, while virtual time stands still.
@@ -99,7 +99,7 @@ class SteppedRun:
         observations, self._observations = [*self._observations, *observations], []
         if told.get("problem"):
             self._observations = observations
-            raise HarnessError(told["problem"])
+            raise (LaunchFailedError if told.get("launch_failed") else HarnessError)(told["problem"])
         return told, observations
 
     def close(self) -> list[Observation]:

@@ -6,8 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from grader.core.dataclass import dataclass
+from grader.core.errors import HarnessError
 from grader.execution.plan import Plan
 from grader.stimuli.goals import PlannedGoal
+
+
+class LaunchFailedError(HarnessError):
+    """A launch file raised an exception."""
 
 
 @dataclass(frozen=True, slots=True)

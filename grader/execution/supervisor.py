@@ -220,6 +220,8 @@ class Worker(ABC):
                 if not found:
                     raise EOFError
                 self._received += found
+                if len(self._received) > ANSWER_BYTES:
+                    raise OSError("its answer did not end")
             line, _, self._received = self._received.partition(b"\n")
             answer: dict[str, Any] = json.loads(line)
         except (OSError, EOFError) as error:
@@ -528,21 +530,34 @@ class Recorder:
             self._close(worker)
         self._fill(self._count)
 
-    def lend(self) -> Worker:
-        """Return a worker for one user, who gives it back; one more is started if all are in use."""
+    def lend(self, plan: Plan | None = None) -> Worker:
+        """Return a worker for one user, who gives it back; one more is started if all are in use.
+
+        Args:
+            plan: What it has to suit; None for a plan without interface packages.
+        """
+        others: list[Worker | None] = []
+        found: Worker | None = None
         with contextlib.suppress(queue.Empty):
-            while True:
+            while found is None:
                 worker = self._idle.get_nowait()
-                if worker is not None and not worker.gone:
-                    return worker
-        return self._pool.submit(self._start).result()
+                is_fit = worker is not None and not worker.gone and (plan is None or worker.suits(plan))
+                if is_fit:
+                    found = worker
+                else:
+                    others.append(worker if worker is not None and not worker.gone else None)
+        if found is None and others:  # its place is that of the new one
+            empty = next((n for n, worker in enumerate(others) if worker is None), 0)
+            self._discard(others.pop(empty))
+        for worker in reversed(others):
+            self._idle.put(worker)
+        return found or self._pool.submit(self._start).result()
 
     def take_back(self, worker: Worker, *, usable: bool) -> None:
-        """Keep a worker for the next user, or end it."""
-        if usable:
-            self._idle.put(worker)
-        else:
+        """Keep a worker for the next user, or end it and leave its place empty."""
+        if not usable:
             self._discard(worker)
+        self._idle.put(worker if usable else None)
 
     def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
         """Record every job and return the traces in the same order."""

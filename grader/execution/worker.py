@@ -44,7 +44,7 @@ from grader.execution.sandbox.start import die_with
 from grader.execution.sandbox.starter import HASH_SEED, Starter
 from grader.execution.sandbox.starter_process import StarterProcess
 from grader.execution.sandbox.tiers import IN_PLACE, isolation_from_name
-from grader.execution.steps import COMMANDS, Finish
+from grader.execution.steps import COMMANDS, Finish, LaunchFailedError
 from grader.execution.student_process import LOG_FORMAT, NodeProcess
 from grader.execution.usage import usage, worker_processor_s
 from grader.simulation.loading import SimulationError
@@ -150,6 +150,8 @@ class Worker:
                 _await_ready(student)
                 yield student, dict(added.starts_ns).get(name, 0)
 
+        sys.path += [folder for folder in plan.interfaces if folder not in sys.path]
+
         def ask(question: Mapping[str, Any]) -> Any:
             tell(question)
             return next(commands)["answer"]
@@ -172,8 +174,8 @@ class Worker:
                 try:
                     answer = runner.perform(command)
                 except HarnessError as error:
-                    answer = {"problem": error.message}
-                news = [_compact(o) for o in runner.news()]
+                    answer = {"problem": error.message, "launch_failed": isinstance(error, LaunchFailedError)}
+                news = [_compact(o) if plan.working else _whole(o) for o in runner.news()]
                 common = {"now_ns": runner.now_ns, "ended": runner.programs(), "full": runner.full(), "news": news}
                 is_last = isinstance(command, Finish)
                 last = {"notes": runner.notes(), "unsuitable": runner.unsuitable()} if is_last else {}
@@ -181,7 +183,8 @@ class Worker:
                 if is_last:
                     failed = bool(runner.full())
                     break
-        return failed or usage([os.getpid()]).memory_bytes > WORN_BYTES
+        odd = not plan.working and (runner.is_odd or self._remembers_connections())
+        return failed or odd or usage([os.getpid()]).memory_bytes > WORN_BYTES
 
     def _with_launched(self, plan: Plan, domain: int, used: Collection[str], left_out: list[str]) -> Plan:
         """Return a plan with the nodes of its launch file, by names that no process has; the plan itself without one.
@@ -198,7 +201,8 @@ class Worker:
             fault = made.fault
             place = name if fault is None or not fault.file else f"{fault.file}:{fault.line}"
             why = made.harness_problem or (fault.text if fault is not None else "; ".join(left_out))
-            raise HarnessError(f"{place}: {why}")
+            failed = LaunchFailedError if fault is not None and not made.harness_problem else HarnessError
+            raise failed(f"{place}: {why}")
         names: dict[str, str] = {}
         for process, _ in made.processes:
             label = process.removeprefix(f"{name} ")
@@ -523,9 +527,18 @@ def stop_now(student: NodeProcess) -> None:
 
 
 def _compact(observation: Observation) -> list[Any]:
-    """Convert an observation for the other side of a stepped run, which reads messages from their bytes."""
+    """Convert an observation for the other side of a run of own programs, which reads messages from their bytes."""
     if isinstance(observation, (Message, Delivery)) and observation.cdr:
         return observation_to_json(replace(observation, value={}))
+    return observation_to_json(observation)
+
+
+def _whole(observation: Observation) -> list[Any]:
+    """Convert an observation for a rubric's test, with the fields of what the test has published as bytes."""
+    if isinstance(observation, Delivery) and not observation.value:
+        from grader.execution.serialization import fields_of  # noqa: PLC0415 - imports rclpy, which takes long
+
+        observation = replace(observation, value=fields_of(observation))
     return observation_to_json(observation)
 
 

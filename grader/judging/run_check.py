@@ -73,12 +73,15 @@ def run_check(
 ) -> Answer:
     """Run the criterion's check on the trace of its scenario, or on the source of its files."""
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
-    missing = tuple(p for p in scenario.handed_in if p in submission.files and submission.files[p].found is None)
+    trace = traces.get(scenario.id)
+    wanted = scenario.handed_in if trace is None or trace.tested is None else trace.tested.missing
+    missing = tuple(p for p in wanted if p in submission.files and submission.files[p].found is None)
     if missing:
         return Answer(missing=missing)
-    trace = traces.get(scenario.id)
     if trace is None or trace.author_mistake is not None or trace.harness_problem:
         return _unrecorded(scenario, trace)
+    if scenario.test is not None:  # every program of its run counts, under whatever name it was started
+        scenario = replace(scenario, processes=tuple(dict.fromkeys(fault.process for fault in trace.faults())))
     answer = _judged(criterion, scenario, trace, sources)
     if answer.finding is not None and answer.finding.credit < 1:
         faster = (
@@ -218,6 +221,8 @@ def _judged(criterion: Criterion, scenario: Scenario, trace: Trace, sources: Map
     if authored and (wrong := breach(finding)):
         method = "judge_sources" if sources is not None and reads_sources(criterion.check) else "judge"
         return _author_mistake(mistake_in(criterion.check, method, f"the check {name} {wrong}"))
+    if scenario.test is not None:  # the test has decided what ends it
+        return Answer(finding=finding)
     return Answer(finding=_start_failure_first(finding, scenario, trace))
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from libcst import ParserSyntaxError
 
 from grader.app.bags import Recordings, read_recordings
-from grader.app.grade import Progress, plan_jobs, read_exercises
+from grader.app.grade import Progress, plan_jobs, plan_tests, read_exercises
 from grader.app.interface_packages import provide
 from grader.app.request import GradeRequest
 from grader.app.seeds import PRACTICE
@@ -27,6 +27,7 @@ from grader.core.submission import Submission
 from grader.core.trace import Trace
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.supervisor import Job
+from grader.execution.test_runs import record_tests
 from grader.judging.judge_run import judge_exercise
 from grader.mutation.explained import Explained, Explanation, read_explained
 from grader.mutation.operators import mutants_of
@@ -62,6 +63,8 @@ class TrialRunner:
         """Grade a complete submission; the traces are those of its scenarios."""
         jobs = plan_jobs(self.request, [self.exercise], submission, self.bags, self.seed, self.interfaces)
         recorded = self.session.record(jobs, self.request.clock, self.progress)
+        tests = plan_tests([self.exercise], submission, self.seed, interfaces=self.interfaces, trusted=self.interfaces)
+        recorded |= record_tests(self.session.recorder, tests, self.progress)
         self.recordings += len(recorded)
         traces = {scenario: trace for (_, scenario), trace in recorded.items()}
         return result_of(judge_exercise(self.exercise, traces, submission, read_sources(submission))), traces
@@ -79,6 +82,14 @@ class TrialRunner:
                 for key, job in self._jobs(c, submissions[c.id]).items()
             }
             recorded = self.session.record(jobs, self.request.clock, self.progress)
+            tests = {
+                (c.id, key[1]): job
+                for c in chunk
+                for key, job in plan_tests(
+                    [self.exercise], submissions[c.id], self.seed, interfaces=self.interfaces, trusted=self.interfaces
+                ).items()
+            }
+            recorded |= record_tests(self.session.recorder, tests, self.progress)
             self.recordings += len(recorded)
             for candidate in chunk:
                 own = {scenario: trace for (id_, scenario), trace in recorded.items() if id_ == candidate.id}

@@ -20,6 +20,7 @@ from grader.core.limits import MAX_RUBRIC_BYTES, Limits
 from grader.core.quantities import duration
 from grader.core.rubric_files import rubric_file
 from grader.core.scenario import (
+    RubricTest,
     RunOptions,
     Scenario,
     Span,
@@ -32,6 +33,7 @@ from grader.core.scenario import (
     shortest,
 )
 from grader.judging.checks import CHECKS
+from grader.judging.tested import TESTED, TestPasses
 from grader.rubrics.author_modules import OwnHints
 from grader.rubrics.draws import Draw, First
 from grader.rubrics.exercise_checks import hints_of, known_checks
@@ -53,6 +55,7 @@ from grader.rubrics.own_checks import (
 )
 from grader.rubrics.run_options import RunShape
 from grader.rubrics.simulations import simulation_mistakes
+from grader.rubrics.tests import AuthoredTest, tests_in
 from grader.rubrics.types import BESIDE, CHECK_FILE, PROVIDED_FILE, PROVIDED_WORDS, build
 from grader.rubrics.variants import (
     VariantOptions,
@@ -229,7 +232,7 @@ class RubricMistakes(RubricError):  # noqa: N818  named after what it holds
 class _Brought:
     """What a rubric may use, by name: checks, the grader's among them, its own simulations, texts of provided files.
 
-    Its hint rules are in the order of their files.
+    Its hint rules are in the order of their files, and its tests in that of their file.
     """
 
     checks: Mapping[str, type]
@@ -237,6 +240,8 @@ class _Brought:
     simulations: Mapping[str, OwnSimulation]
     provided: Mapping[str, str]
     hints: OwnHints
+    test_file: OwnFile | None = None
+    tests: tuple[AuthoredTest, ...] = ()
 
 
 def read_rubric(
@@ -266,13 +271,24 @@ def read_rubric(
     hints = own_files(path, _own_names(path, tree, "hints"), submissions, key="hints")
     simulated = own_files(path, _own_names(path, tree, "simulations"), submissions, key="simulations")
     others = own_files(path, _own_names(path, tree, "provided"), submissions, key="provided")
+    tests = own_files(path, _own_names(path, tree, "pytest"), submissions, key="pytest")
     own = load(files, CHECKS if checks is None else checks)
     usable = {**(known_checks() if checks is None else checks), **own}
     provided = {one.name: _provided(one) for one in others}
-    brought = _Brought(usable, frozenset(own), load_simulations(simulated), provided, load_hints(hints, usable))
+    brought = _Brought(
+        usable,
+        frozenset(own),
+        load_simulations(simulated),
+        provided,
+        load_hints(hints, usable),
+        next(iter(tests), None),
+        tuple(test for file in tests for test in tests_in(file)),
+    )
     definitions = definition_files(path, folders := _own_names(path, tree, "interfaces"), submissions)
     bags = bag_files(path, named_bags(tree.data), submissions)
-    digest = digest_of(content, tuple(dict.fromkeys((*files, *hints, *others, *simulated, *definitions, *bags))))
+    digest = digest_of(
+        content, tuple(dict.fromkeys((*files, *hints, *others, *simulated, *tests, *definitions, *bags)))
+    )
     if interfaces is not None and folders:
         interfaces = interfaces.including([path.parent / folder for folder in folders])
     if not has_variants(tree):
@@ -336,10 +352,12 @@ def _has_parameters(value: object) -> bool:
 def _exercise(
     path: Path, tree: YamlTree, brought: _Brought, digest: str, interfaces: Interfaces | None = None
 ) -> Exercise:
-    model = rubric_model(tuple(brought.checks.items()), tuple(brought.simulations.items()))
+    tested = brought.test_file is not None
+    model = rubric_model(tuple(brought.checks.items()), tuple(brought.simulations.items()), tested=tested)
     rubric = _validated(path, tree, model)
     mistakes = [*tree.mistakes, *broken_links(rubric, tree), *simulation_mistakes(rubric, tree)]
-    criteria = tuple(_criteria(rubric, tree, mistakes))
+    mistakes += _of_tests(rubric, brought, tree)
+    criteria = (*_criteria(rubric, tree, mistakes), *(_of_test(rubric, test) for test in brought.tests))
     if interfaces is not None:
         mistakes += interface_mistakes(rubric, tree, interfaces)
     if mistakes:
@@ -352,7 +370,10 @@ def _exercise(
         title=rubric.exercise.title,
         required=rubric.exercise.required,
         files=rubric.files,
-        scenarios=tuple(_scenario(path, shape, limits, brought.provided) for shape in rubric.scenarios),
+        scenarios=(
+            *(_scenario(path, shape, limits, brought.provided) for shape in rubric.scenarios),
+            *_runs_of_tests(rubric, brought, limits),
+        ),
         criteria=criteria,
         digest=digest,
         by_request=rubric.exercise.by_request,
@@ -362,11 +383,56 @@ def _exercise(
     )
 
 
+def _of_tests(rubric: RubricShape, brought: _Brought, tree: YamlTree) -> Iterator[Mistake]:
+    """Yield what of a rubric's tests does not fit the rest of it, at the key that names their file."""
+    where = tree.at(("pytest",))
+    taken = {scenario.id for scenario in rubric.scenarios} | {criterion.id for criterion in rubric.criteria}
+    earlier = [criterion.id for criterion in rubric.criteria]
+    file = "" if brought.test_file is None else brought.test_file.name
+    for test in brought.tests:
+        place = f"{shown(file)}:{test.line}: `{shown(test.name)}`"
+        if test.id in taken:
+            yield where.mistake(f"{place}: expected a new id, found `{test.id}`, which is taken")
+        for need in test.needs:
+            if need not in earlier:
+                text = f"{place}: expected `needs` to name an earlier criterion, found `{shown(need)}`"
+                yield where.mistake(text, nearest(need, earlier))
+        earlier.append(test.id)
+
+
+def _of_test(rubric: RubricShape, test: AuthoredTest) -> Criterion:
+    return Criterion(
+        id=test.id,
+        title=test.title,
+        points=test.points,
+        scenario=test.id,
+        check=TestPasses(test.name),
+        needs=test.needs,
+        hint=test.hint,
+        feedback=feedback_of(rubric.feedback),
+        check_name=TESTED,
+    )
+
+
+def _runs_of_tests(rubric: RubricShape, brought: _Brought, limits: Limits) -> Iterator[Scenario]:
+    """Yield a scenario for each test, which may run every program that is handed in."""
+    if brought.test_file is None:
+        return
+    programs = tuple(name for name in rubric.files if not _is_yaml(name))
+    text = brought.test_file.content.decode(errors="replace")  # it was parsed
+    for test in brought.tests:
+        run = RubricTest(brought.test_file.name, text, test.name)
+        # how long it takes is up to the test
+        provided = tuple(sorted(brought.provided.items()))
+        yield Scenario(test.id, programs, Span(0), limits=limits, provided=provided, test=run)
+
+
 def side_files(path: Path) -> tuple[OwnFile, ...]:
     """Return every file that a rubric names beside it, without running any; raises RubricError like `read_rubric`."""
     path = rubric_file(path)
     tree = _tree(path, _content(path))
-    files = (name for key in ("checks", "hints", "simulations", "provided") for name in _own_names(path, tree, key))
+    keys = ("checks", "hints", "simulations", "provided", "pytest")
+    files = (name for key in keys for name in _own_names(path, tree, key))
     definitions = definition_files(path, _own_names(path, tree, "interfaces"))
     return (*own_files(path, tuple(files)), *definitions, *bag_files(path, named_bags(tree.data)))
 
@@ -392,6 +458,7 @@ _OWN = {
     "checks": _PYTHON,
     "hints": _PYTHON,
     "simulations": _PYTHON,
+    "pytest": _PYTHON,
     "provided": (PROVIDED_FILE, PROVIDED_WORDS),
     "interfaces": (BESIDE, "a folder beside the rubric such as interfaces"),
 }
@@ -403,7 +470,10 @@ def _own_names(path: Path, tree: YamlTree, key: str) -> tuple[str, ...]:
     wrong = [(n, name) for n, name in enumerate(names) if re.fullmatch(pattern, name) is None]
     if wrong:
         text = f"expected {expected}, found"
-        _refuse(path, [tree.at((key, n)).mistake(f"{text} `{shown(name)}`") for n, name in wrong])
+        places = [tree.at((key, n) if (key, n) in tree.values else (key,)) for n, _ in wrong]
+        _refuse(
+            path, [place.mistake(f"{text} `{shown(name)}`") for place, (_, name) in zip(places, wrong, strict=True)]
+        )
     return names
 
 

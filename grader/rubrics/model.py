@@ -217,6 +217,9 @@ class RubricShape(Shape):
     interfaces: tuple[InterfaceFolder, ...] = Field(
         default=(), description="folders beside the rubric with interface packages: msg, srv and action definitions"
     )
+    pytest: CheckFile | None = Field(
+        default=None, description="a file with tests for pytest, beside the rubric; each test is a criterion"
+    )
     limits: LimitsShape = Field(default_factory=LimitsShape)
     feedback: FeedbackField | None = None
     variants: VariantsField = Field(default_factory=dict)
@@ -226,15 +229,23 @@ class RubricShape(Shape):
 
 @lru_cache(maxsize=8)
 def rubric_model(
-    checks: tuple[tuple[str, type], ...], simulations: tuple[tuple[str, OwnSimulation], ...] = ()
+    checks: tuple[tuple[str, type], ...],
+    simulations: tuple[tuple[str, OwnSimulation], ...] = (),
+    *,
+    tested: bool = False,
 ) -> type[RubricShape]:
-    """Return the model of a rubric file with these checks and simulations, in the order in which messages list them."""
+    """Return the model of a rubric file with these checks and simulations, in the order in which messages list them.
+
+    One that names tests (`tested`) needs no other criteria.
+    """
     check = choice_model("Check", "The question asked of the trace, by the check's name.", dict(checks))
     criterion = create_model("Criterion", __base__=CriterionShape, __doc__="One row of a rubric.", check=(check, ...))
-    parts: dict[str, Any] = {"criteria": (list_of(criterion), Field(min_length=1))}
+    parts: dict[str, Any] = {"criteria": (list_of(criterion), () if tested else Field(min_length=1))}
+    if tested:
+        parts["scenarios"] = (tuple[ScenarioShape, ...], ())
     if simulations:
         own = {n: simulation_shape(n, one.kind, one.file.name, one.file.content) for n, one in simulations}
         stimuli = (list_of(_stimulus_model(own)), ())
         scenario = create_model("ScenarioShape", __base__=ScenarioShape, __doc__=ScenarioShape.__doc__, stimuli=stimuli)
-        parts["scenarios"] = (list_of(scenario), Field(min_length=1))
+        parts["scenarios"] = (list_of(scenario), () if tested else Field(min_length=1))
     return create_model("Rubric", __base__=RubricShape, __doc__="A rubric of rclpy-grader.", **parts)

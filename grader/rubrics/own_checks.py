@@ -134,6 +134,7 @@ def _mappings(value: object) -> list[Mapping[str, Any]]:
 def named_files(data: object, key: str) -> tuple[str, ...]:
     """Return the files or folders named under a key of a rubric's data; the rubric's shape reports anything else."""
     names = data.get(key) if isinstance(data, Mapping) else None
+    names = [names] if isinstance(names, str) and key == "pytest" else names
     return tuple(name for name in names if isinstance(name, str)) if isinstance(names, list) else ()
 
 

@@ -20,6 +20,8 @@ from grader.rubrics.variants import REFERENCE
 ID = "urn:rclpy-grader:rubric:v1"
 #: The name of the file that rubrics refer to in their first line, for editors.
 FILE = "rubric.schema.json"
+#: What only a rubric can lack that names tests.
+_OF_CHECKS = ("scenarios", "criteria")
 _SCALARS = frozenset({"string", "number", "integer", "boolean"})
 _VARIANT = "VariantReference"
 _REFERS = {"$ref": f"#/$defs/{_VARIANT}"}
@@ -40,6 +42,8 @@ def rubric_schema(checks: Mapping[str, type] | None = None) -> JsonSchemaValue:
     usable = known_checks() if checks is None else checks
     schema = rubric_model(tuple(usable.items())).model_json_schema(by_alias=True)
     tidy = _tidy(schema)
+    tidy["required"] = [key for key in tidy["required"] if key not in _OF_CHECKS]
+    tidy["anyOf"] = [{"required": [*_OF_CHECKS]}, {"required": ["pytest"]}]
     tidy["$defs"] = {name: _varying(name, node) for name, node in tidy["$defs"].items()} | {_VARIANT: _REFERENCE}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": ID, **tidy}
 

@@ -128,7 +128,8 @@ class Quantity(GroupedMetadata):
 _POINTS = re.compile(r"[0-9]{1,9}(?:\.[0-9]{1,9})?|[0-9]{1,9}/[1-9][0-9]{0,8}")
 
 
-def _points(value: object) -> Fraction:
+def read_points(value: object) -> Fraction:
+    """Return points as a fraction; raises PydanticCustomError for anything else."""
     is_number = isinstance(value, (int, float, str)) and not isinstance(value, bool)
     text = str(value).replace(" ", "") if is_number else ""
     if text.startswith("-") or (_POINTS.fullmatch(text) and Fraction(text) == 0):
@@ -142,7 +143,7 @@ _FRACTION = {"type": "string", "pattern": r"^[0-9]+( */ *[1-9][0-9]*|\.[0-9]+)?$
 #: A whole, decimal or common fraction above 0, kept exactly.
 Points = Annotated[
     Fraction,
-    PlainValidator(_points),
+    PlainValidator(read_points),
     WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, _FRACTION]}),
 ]
 

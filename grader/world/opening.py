@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from grader.core.dataclass import dataclass
+from grader.core.errors import EnvironmentFault
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.sandbox.choose import OWN_PROGRAMS
+from grader.execution.test_runs import VARIABLE
 from grader.world.world import World
 
 
@@ -69,6 +72,8 @@ def open_worlds(folder: Path) -> Iterator[Worlds]:
     Raises:
         EnvironmentFault: This machine lacks ROS.
     """
+    if os.environ.get(VARIABLE):
+        raise EnvironmentFault("a test of a rubric runs programs in no world of its own", "use the fixture `ros`")
     with open_session(OWN_PROGRAMS, workers=1) as session:
         yield Worlds(session, folder)
 

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, overload
 
 from grader.app.programs import package_of, workspace_of
 from grader.core.dataclass import dataclass
@@ -19,6 +19,9 @@ from grader.core.trace import Fault, LogRecord, OutputLine
 from grader.execution.executables import Executable, executables, find_executables
 from grader.judging.wording import listed, nearest
 from grader.submissions.projects import read_projects
+from grader.world.errors import NoMessage
+
+Value = TypeVar("Value")
 
 #: What `ros.run` starts: a path, `PACKAGE/EXECUTABLE`, or the function to call, such as a module's `main`.
 Runnable = str | os.PathLike[str] | Callable[..., Any]
@@ -84,7 +87,7 @@ def _of_function(function: Callable[..., Any]) -> Found:
 
 def _of_package(package: str, name: str, near: Sequence[Path]) -> Found:
     known: list[str] = []
-    for root, projects in dict.fromkeys(map(_surroundings, near)):
+    for root, projects in dict.fromkeys((*map(_surroundings, near), *map(_below, near))):
         for one in find_executables(root, projects, package, name):
             if one.file is not None:
                 return Found(one.words, root, one.file, one.name if one.target else "", projects)
@@ -104,6 +107,14 @@ def _surroundings(folder: Path) -> tuple[Path, tuple[Project, ...]]:
         return folder, ()
     root = workspace_of(package)
     return root, _projects(root)
+
+
+def _below(folder: Path) -> tuple[Path, tuple[Project, ...]]:
+    """Return a folder that is in no package, such as that of a workspace, with the packages below it."""
+    levels = ("*", "*/*", "src/*/*")
+    in_package = (package_of(folder) / "package.xml").is_file()
+    is_workspace = not in_package and any(any(folder.glob(f"{level}/package.xml")) for level in levels)
+    return folder, _projects(folder) if is_workspace else ()
 
 
 @cache
@@ -147,6 +158,26 @@ def _float(value: float) -> str:
     return f"{mantissa if '.' in mantissa else f'{mantissa}.0'}{e}{exponent}"
 
 
+class Messages(list[Value]):
+    """What has arrived so far, such as messages of a topic; asking for what has not arrived says why there is none."""
+
+    def __init__(self, found: Sequence[Value], why: Callable[[], NoMessage]) -> None:
+        super().__init__(found)
+        self._why = why
+
+    @overload  # type: ignore[override]
+    def __getitem__(self, index: int) -> Value: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Value]: ...
+    def __getitem__(self, index: int | slice) -> Value | list[Value]:
+        """Return a message or some of them; raises NoMessage for one that has not arrived."""
+        __tracebackhide__ = True
+        try:
+            return super().__getitem__(index)
+        except IndexError:
+            raise (NoMessage(f"only {len(self)} so far") if self else self._why()) from None
+
+
 class Program:
     """A program that was started, in its own process.
 
@@ -178,7 +209,7 @@ class Program:
         """What it has logged through rclpy: `t_ns`, `severity`, `logger`, `text`, `file` and `line`."""
         __tracebackhide__ = True
         self._await_start()
-        return [*self._logs]
+        return Messages(self._logs, lambda: NoMessage(f"{self.name} has logged nothing"))
 
     @property
     def output(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import linecache
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from grader.core.exercise import Finding
@@ -21,8 +21,9 @@ from grader.core.trace import (
     Trace,
     unmet_policy,
 )
-from grader.judging.findings import explain_no_message, explain_no_server, explain_no_subscription
+from grader.judging.findings import explain_no_message, explain_no_server, explain_no_subscription, not_met
 from grader.judging.wording import listed, moment, quote, span
+from grader.world.errors import NoMessage, StepTimeout
 from grader.world.programs import Program
 
 #: How many lines of logs and output a message shows, and how many characters of a line.
@@ -59,9 +60,10 @@ def _source(path: Path, line: int) -> list[str]:
     return [f"    {text}"] if text else []
 
 
-def silence(trace: Trace, topic: str, type_: str | None = None) -> str:
-    """Return why no message came on a topic, with what to do about it if that is known."""
-    return _worded(explain_no_message(trace, topic, type_))
+def silence(trace: Trace, topic: str) -> NoMessage:
+    """Return an error that says why no message came on a topic, with what to do about it if that is known."""
+    found = explain_no_message(trace, topic, None)
+    return NoMessage(found.reason, found.hint)
 
 
 def no_server(trace: Trace, service: str, type_: str) -> str:
@@ -80,17 +82,27 @@ def unheard(trace: Trace, offers: Iterable[Endpoint]) -> Iterator[str]:
         trace: The run so far.
         offers: The publishers of the test.
     """
+    yield from map(_worded, _unheard(trace, offers))
+
+
+def advice(trace: Trace, offers: Iterable[Endpoint]) -> str:
+    """Return one thing to do about messages of the test that do not arrive; empty if all do, or nothing is known."""
+    return next((found.hint for found in _unheard(trace, offers) if found.hint), "")
+
+
+def _unheard(trace: Trace, offers: Iterable[Endpoint]) -> Iterator[Finding]:
     graph = (trace.graphs() or (GraphSnapshot(0, (), ()),))[-1]
     for offer in offers:
         same = [e for e in graph.endpoints if (e.kind, e.topic) == ("subscription", offer.topic)]
         fitting = [e for e in same if e.type == offer.type]
         if not fitting:
-            yield _worded(explain_no_subscription(trace, offer.topic, offer.type))
+            yield explain_no_subscription(trace, offer.topic, offer.type)
             continue
         for end in fitting:
             if (unmet := unmet_policy(offer, end)) is not None:
                 offered, wanted = unmet
-                yield f"{offer.topic}: {end.node} asks for {wanted}, the test offers {offered}: no message arrives"
+                what = f"{end.node} asks for {wanted}, the test offers {offered}: no message arrives"
+                yield not_met(f"{offer.topic}: {what}", hint=f"subscribe to {offer.topic} with {offered}")
 
 
 def apart(graph: GraphSnapshot) -> Iterator[str]:
@@ -151,13 +163,23 @@ def meanwhile(observations: Iterable[Observation], programs: Iterable[Program], 
         yield "nothing"
 
 
-def timeout(what: str, since_ns: int, now_ns: int, sections: Mapping[str, Iterable[str]]) -> str:
-    """Return the message of a timeout: what was waited for, and what is known about it."""
-    lines = [f"{what} within {span(now_ns - since_ns)} ({moment(since_ns)} to {moment(now_ns)})"]
-    for title, found in sections.items():
-        if texts := [*found]:
+def timeout(what: str, since_ns: int, now_ns: int, sections: Mapping[str, Sequence[str]], hint: str) -> StepTimeout:
+    """Return the error of a timeout: what was waited for, and what is known about it.
+
+    Args:
+        what: What did not happen.
+        since_ns: From when on it was waited for.
+        now_ns: Until when.
+        sections: Lines of text below titles; the first section is about the cause.
+        hint: One thing to do; may be empty.
+    """
+    first = f"{what} within {span(now_ns - since_ns)} ({moment(since_ns)} to {moment(now_ns)})"
+    lines = [first]
+    for title, texts in sections.items():
+        if texts:
             lines += [f"{title}:", *(f"  {text}" for text in texts)]
-    return "\n".join(lines)
+    cause = next((text.partition("\n")[0] for text in next(iter(sections.values()), ())), "")
+    return StepTimeout("\n".join(lines), f"{first}: {cause}" if cause else first, hint)
 
 
 def service_ends(graph: GraphSnapshot, kind: str) -> list[ServiceEnd]:

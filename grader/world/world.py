@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import html
-import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar, overload
+from random import Random
+from typing import Any, ParamSpec, TypeVar
 
+from grader.app.programs import package_of
 from grader.core.dataclass import dataclass
 from grader.core.errors import GraderError
 from grader.core.limits import Limits
@@ -49,8 +50,9 @@ from grader.simulation.loading import made
 from grader.simulation.participant import Moment, Simulation
 from grader.stimuli.goals import PlannedGoal
 from grader.world import telling
-from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout
-from grader.world.programs import Found, Program, Runnable, find_launch_file, find_program, parameter_values
+from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
+from grader.world.interfaces import let_import, modules_for
+from grader.world.programs import Found, Messages, Program, Runnable, find_launch_file, find_program, parameter_values
 
 Value = TypeVar("Value")
 Given = ParamSpec("Given")
@@ -98,26 +100,6 @@ class Received:
 
     t: float  # when, in seconds since the test began
     message: Any  # the message, an object of its class
-
-
-class Messages(list[Value]):
-    """The messages of a topic so far; asking for one that has not arrived says why there is none."""
-
-    def __init__(self, found: Sequence[Value], why: Callable[[], str]) -> None:
-        super().__init__(found)
-        self._why = why
-
-    @overload  # type: ignore[override]
-    def __getitem__(self, index: int) -> Value: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Value]: ...
-    def __getitem__(self, index: int | slice) -> Value | list[Value]:
-        """Return a message or some of them; raises NoMessage for one that has not arrived."""
-        __tracebackhide__ = True
-        try:
-            return super().__getitem__(index)
-        except IndexError:
-            raise NoMessage(self._why() if not self else f"only {len(self)} messages so far") from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,6 +151,7 @@ class World:
         drawn_order: Whether the seed decides which of several ready programs runs first.
         delay: For topics that the test publishes on, the least and the most seconds that a message is on its way.
         lose: For such topics, the share of messages that are lost.
+        plan: Limits, clock and folder of the programs; None for programs of one's own, which run where they lie.
 
     Attributes:
         session: What the programs run in.
@@ -184,13 +167,14 @@ class World:
         drawn_order: bool = False,
         delay: Mapping[str, tuple[float, float]] | None = None,
         lose: Mapping[str, float] | None = None,
+        plan: Plan | None = None,
     ) -> None:
         self.session = session
         self._near = tuple(near)
         self._seed = seed
         self._delay = {_absolute(topic): between for topic, between in (delay or {}).items()}
         self._lose = {_absolute(topic): share for topic, share in (lose or {}).items()}
-        self._plan = Plan(
+        self._plan = plan or Plan(
             scenario=name,
             processes=(),
             root="/",
@@ -202,6 +186,7 @@ class World:
             limits=OWN_LIMITS,
             drawn_order=drawn_order,
             working=str(Path.cwd()),
+            interfaces=_modules_for(self._near[:1]),
         )
         self._observations: list[Observation] = []
         self._messages: dict[str, list[Message]] = {}
@@ -214,6 +199,7 @@ class World:
         self._failing: list[tuple[Program, Fault]] = []
         self._simulations: list[Simulation] = []
         self._goals = 0
+        self._random: Random | None = None
         self._starting = False
         self._notes: list[str] = []
         self._unsuitable = ""
@@ -253,7 +239,7 @@ class World:
             ProgramFailed: It has failed at once.
         """
         __tracebackhide__ = True
-        found = find_program(program, self._near)
+        found = self._found(program)
         label = self._unused(found.name)
         start = PlannedStart(
             label,
@@ -280,13 +266,23 @@ class World:
             HarnessError: It raises an exception, or describes nothing that can be started.
         """
         __tracebackhide__ = True
-        found, known = find_launch_file(file, self._near)
+        found, known = self._found_launch_file(file)
         given = tuple((name, str(value)) for name, value in (arguments or {}).items())
-        start = PlannedStart(found.name, launch_arguments=given, known=known)
+        start = PlannedStart(found.name, launch_arguments=given, known=known, provided=self._provided)
         told = self._perform(Start(self._plan_of(found, start, {}), settle=not self._plan.drawn_order))
         return Launched([self._programs[name] for name in told["started"]], told["left_out"])
 
+    #: Name and text of files that a launch file may need, beside those that lie around it.
+    _provided: tuple[tuple[str, str], ...] = ()
+
+    def _found(self, program: Runnable) -> Found:
+        return find_program(program, self._near)
+
+    def _found_launch_file(self, file: str | Path) -> tuple[Found, tuple[tuple[str, str], ...]]:
+        return find_launch_file(file, self._near)
+
     def _plan_of(self, found: Found, start: PlannedStart, env: Mapping[str, str]) -> Plan:
+        package = package_of(found.root / Path(found.file).parent) if found.projects else found.root
         installed = self.session.folder / f"installed_{derive(0, str(found.root))[:16]}"
         prefixes, _ = install_shares(found.root, found.projects, installed, self.session.ros)
         return replace(
@@ -297,6 +293,7 @@ class World:
             starts=(start,),
             projects=found.projects,
             prefixes=prefixes,
+            interfaces=tuple(dict.fromkeys((*self._plan.interfaces, *_modules_for((package,))))),
             environment=tuple((name, str(value)) for name, value in env.items()),
         )
 
@@ -346,20 +343,21 @@ class World:
         """
         __tracebackhide__ = True
         since_ns = self._run.now_ns
-        lacking: list[str] = []
+        lacking: list[NoMessage] = []
 
         def holds() -> Value | None:
             lacking.clear()
             try:
                 return condition()
             except NoMessage as error:
-                lacking.append(str(error))
+                lacking.append(error)
                 return None
 
         found = self._until(holds, since_ns + round(timeout * NS_PER_S))
         if found:
             return found
-        raise StepTimeout(self._timeout("the condition did not hold", since_ns, {"it asks for": lacking}))
+        asked = {"it asks for": [str(error) for error in lacking]}
+        raise self._timeout("the condition did not hold", since_ns, asked, *(error.hint for error in lacking))
 
     def _until(self, look: Callable[[], Value | None], deadline_ns: int) -> Value | None:
         """Let time pass until a function returns something true, and return that; what it returns last otherwise."""
@@ -369,7 +367,7 @@ class World:
             self._perform(Advance(deadline_ns, until_news=True))
         return found
 
-    def _timeout(self, what: str, since_ns: int, first: Mapping[str, Sequence[str]]) -> str:
+    def _timeout(self, what: str, since_ns: int, first: Mapping[str, Sequence[str]], hint: str = "") -> StepTimeout:
         trace, programs = self.trace(), [*self._programs.values()]
         apart = [*telling.unheard(trace, self._offers.values()), *telling.apart(self._graph)]
         sections = {
@@ -378,7 +376,12 @@ class World:
             "does not fit": apart,
             "waiting": [*telling.waiting(self._graph, self._offers, self._functions)],
         }
-        return telling.timeout(what, since_ns, self._run.now_ns, sections)
+        return telling.timeout(what, since_ns, self._run.now_ns, sections, hint or self.advice)
+
+    @property
+    def advice(self) -> str:
+        """One thing to do about messages of the test that do not arrive; empty if all do, or nothing is known."""
+        return telling.advice(self.trace(), self._offers.values())
 
     # --------------------------------------------------------------- acting
 
@@ -469,7 +472,7 @@ class World:
             if offered
             else telling.no_server(self.trace(), name, interface)
         )
-        raise StepTimeout(self._timeout(f"{name} did not answer", since_ns, {"the service": [why]}))
+        raise self._timeout(f"{name} did not answer", since_ns, {"the service": [why]})
 
     def send_goal(
         self, name: str, goal: Any, *, cancel_after: float | None = None, timeout: float = 60.0
@@ -518,7 +521,7 @@ class World:
         why = "it has accepted the goal" if accepted is not None else "it has not answered the goal"
         offered = any(f"{name}/_action/send_goal" == offer.name for offer in self.trace().of(Offer))
         first = {"the action": [why if offered else f"nobody offers the action {name}"]}
-        raise StepTimeout(self._timeout(f"{name} gave no result", since_ns, first))
+        raise self._timeout(f"{name} gave no result", since_ns, first)
 
     def _response(self, seen: int, service: str, client: int) -> Response | None:
         """Return the response of a program to a client of the test, among the observations from a number on."""
@@ -561,27 +564,53 @@ class World:
             simulation = made(simulation, "", b"", parameters)
         number = len(self._simulations)
         self._simulations.append(simulation)
-        simulation.begin(random.Random(derive(self._seed, "simulation", str(number))))  # noqa: S311 - it has to repeat
+        simulation.begin(Random(derive(self._seed, "simulation", str(number))))  # noqa: S311 - it has to repeat
         offers = simulation.publishes(), simulation.hears(), simulation.serves()
         self._perform(Simulate(number, simulation.period, *map(dict, offers)))
         return simulation
 
     # --------------------------------------------------------------- looking
 
-    def received(self, topic: str) -> list[Received]:
-        """Return the messages that programs have published on a topic so far, with their times."""
+    def received(self, topic: str, type: Any = None) -> list[Received]:  # noqa: A002 - as in rclpy
+        """Return the messages that programs have published on a topic so far, with their times.
+
+        Args:
+            topic: Its name.
+            type: The class that they have to be of; None for any.
+
+        Raises:
+            WrongType: A message is of another type.
+        """
         __tracebackhide__ = True
         self._await_start()
         topic = _absolute(topic)
         known = self._read.setdefault(topic, [])
-        for one in self._messages.get(topic, ())[len(known) :]:
-            known.append(Received(seconds(one.t_ns), read(one)))
+        found = self._messages.get(topic, ())
+        if type is not None:
+            expected = type_name(type)
+            other = next((one.type for one in found if one.type != expected), "")
+            if other:
+                raise WrongType(f"{topic}: expected messages of type {expected}, found {other}")
+        for one in found[len(known) :]:
+            known.append(Received(seconds(one.t_ns), self._as_object(one)))
         return Messages(known, lambda: telling.silence(self.trace(), topic))
 
-    def messages(self, topic: str) -> list[Any]:
-        """Return the messages that programs have published on a topic so far."""
-        found = self.received(topic)
+    def messages(self, topic: str, type: Any = None) -> list[Any]:  # noqa: A002 - as in rclpy
+        """Return the messages that programs have published on a topic so far.
+
+        Args:
+            topic: Its name.
+            type: The class that they have to be of; None for any.
+
+        Raises:
+            WrongType: A message is of another type.
+        """
+        __tracebackhide__ = True
+        found = self.received(topic, type)
         return Messages([one.message for one in found], lambda: telling.silence(self.trace(), _absolute(topic)))
+
+    def _as_object(self, message: Message) -> Any:
+        return read(message)
 
     def rate(self, topic: str, *, last: float | None = None) -> float:
         """Return how many messages a second programs publish on a topic, from the first to the last one.
@@ -695,6 +724,13 @@ class World:
         return self._seed
 
     @property
+    def random(self) -> Random:
+        """A source of numbers for the test itself, which follow from the seed: what is drawn once can be repeated."""
+        if self._random is None:
+            self._random = Random(derive(self._seed, "test"))  # noqa: S311 - it has to repeat
+        return self._random
+
+    @property
     def is_drawn(self) -> bool:
         """Whether anything in this run was drawn from its seed."""
         return self._plan.drawn_order or bool(self._delay or self._lose)
@@ -757,7 +793,7 @@ class World:
         failing, self._failing = self._failing, []
         for program, fault in failing:
             if not self._expected:
-                raise ProgramFailed(telling.failure(program, fault))
+                raise ProgramFailed(telling.failure(program, fault), fault)
             innermost = self._expected[-1]
             if innermost.program is None:
                 innermost.program, innermost.fault = program, fault
@@ -775,6 +811,13 @@ class World:
             found = type(response).__name__
             raise TypeError(f"{name}: expected a {kind.__name__}.Response from its function, found {found}")
         return plain_fields(response)
+
+
+def _modules_for(folders: Sequence[Path]) -> tuple[str, ...]:
+    """Return where packages are that programs of folders need and nobody has installed; a test may import them too."""
+    found = tuple(str(path) for folder in folders for path in modules_for(folder))
+    let_import(found)
+    return found
 
 
 def _absolute(name: str) -> str:

@@ -287,7 +287,7 @@ def test_a_message_that_has_not_come_says_why(ros: World) -> None:
     ros.advance(1.0)
     with pytest.raises(NoMessage, match=re.escape("/cmd_vel has 20 messages of type geometry_msgs/msg/Twist")):
         ros.messages("/cmd_vell")[-1]
-    with pytest.raises(NoMessage, match="only 20 messages so far"):
+    with pytest.raises(NoMessage, match="only 20 so far"):
         ros.received("/cmd_vel")[20]
     assert len(ros.messages("/cmd_vel")[3:5]) == 2
     with pytest.raises(StepTimeout) as timeout:
@@ -463,3 +463,10 @@ def test_a_type_that_is_not_installed_leaves_the_world_usable(ros: World) -> Non
     ros.publish("/in", String(data="on"))
     ros.advance(0.1)
     assert [m.data for m in ros.messages("/out")] == ["on"]
+
+
+def test_a_log_may_be_waited_for_that_nobody_has_written(ros: World) -> None:
+    """The last log of a silent program is awaited like the last message of a silent topic."""
+    echo = ros.run("nodes/echo.py")
+    with pytest.raises(StepTimeout, match=r"echo\.py has logged nothing"):
+        ros.wait_until(lambda: echo.logs[-1].text == "done", timeout=0.1)

@@ -31,6 +31,7 @@ from grader.core.trace import (
     Response,
     ServiceEnd,
     Start,
+    Tested,
     Trace,
     WrittenFile,
 )
@@ -169,6 +170,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("written", tuple[_WRITTEN, ...], ()),  # type: ignore[valid-type]
         ("newer", tuple[_NEWER, ...], ()),  # type: ignore[valid-type]
         ("author_mistake", AuthorMistake | None, None),
+        ("tested", _TESTED | None, None),
     ]
     return msgspec.defstruct("Trace", written)
 
@@ -193,6 +195,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         written=tuple(_same(WrittenFile, file) for file in row.written),
         newer=tuple(_same(NewerPython, one) for one in row.newer),
         author_mistake=row.author_mistake,
+        tested=None if row.tested is None else _tested(row.tested),
     )
 
 
@@ -281,6 +284,24 @@ _EXACT_MAKERS: Mapping[type, Callable[[Any], Observation]] = {
     _EXACT_ROWS[GraphSnapshot]: _graph,
     _EXACT_ROWS[Fault]: _fault,
 }
+#: What a test has found; the fault is a row as among the observations.
+_TESTED = msgspec.defstruct(
+    "Tested",
+    [
+        ("passed", bool),
+        ("reason", str),
+        ("hint", str),
+        ("missing", tuple[str, ...]),
+        ("fault", _EXACT_ROWS[Fault] | None, None),
+    ],
+)
+
+
+def _tested(row: Any) -> Tested:
+    fault = None if row.fault is None else _fault(row.fault)
+    return Tested(row.passed, row.reason, row.hint, fault, row.missing)
+
+
 _TRACE = _trace_row(_EXACT_ROWS.values())
 _OBSERVATIONS = list[Union[tuple(_EXACT_ROWS.values())]]  # type: ignore[misc, valid-type]  # noqa: UP007
 #: The fast variant keeps the fields of messages as JSON text.

@@ -1,0 +1,332 @@
+"""The program that runs the tests of a rubric on a submission; `grader.execution.test_runs` starts it.
+
+Usage: python -m grader.world.graded FD FILE. It says which tests pytest collects, is told which to run on what, and
+then says for each test when it begins and how it has ended. In between it passes on the commands of the test.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import socket
+import sys
+from collections.abc import Generator, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from grader.core.author_files import line_of, words_of
+from grader.core.errors import GraderError, HarnessError, SubmissionError
+from grader.core.scenario import is_launch_file
+from grader.core.trace import Message
+from grader.execution.codec import from_json, observation_to_json, to_json
+from grader.execution.interfaces import built, message_class
+from grader.execution.plan import Plan, PlannedStart, derive
+from grader.execution.steps import LaunchFailedError
+from grader.execution.supervisor import WorkerLostError
+from grader.execution.test_runs import TestJob
+from grader.judging.wording import listed, nearest
+from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
+from grader.world.programs import Found, Runnable
+from grader.world.world import World
+
+#: What `@pytest.mark.ros` takes in a rubric.
+OPTIONS = ("seed", "delay", "lose")
+#: Modules that rosidl generates: what fails there is a value that no field takes, which the test has written.
+_GENERATED = re.compile(r"\w+\.(msg|srv|action)\._\w+")
+_WORLD: pytest.StashKey[GradedWorld] = pytest.StashKey()
+_FOUND: pytest.StashKey[dict[str, Any]] = pytest.StashKey()
+
+
+class NotHandedIn(SubmissionError):  # noqa: N818 - reads as what happened
+    """A program of the rubric that the submission lacks.
+
+    Args:
+        name: Its name.
+    """
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"{name}: not in the submission")
+        self.name = name
+
+
+class LaunchFailed(AssertionError):  # noqa: N818 - the same
+    """A launch file of the submission raised an exception."""
+
+
+class Line:
+    """The connection to the supervisor, which stands in for its recorder and for the worker that it lends."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._stream = connection.makefile("rw", encoding="utf-8")
+
+    def say(self, what: Mapping[str, Any]) -> None:
+        """Say something that nobody answers."""
+        self._stream.write(json.dumps(what) + "\n")
+        self._stream.flush()
+
+    def ask(self, what: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the answer of the supervisor; raises WorkerLostError if it has lost the worker."""
+        self.say(what)
+        answer: dict[str, Any] = self.listen()
+        if "lost" in answer:
+            raise WorkerLostError(str(answer["lost"]))
+        return answer
+
+    def listen(self) -> dict[str, Any]:
+        """Return what the supervisor says next."""
+        line = self._stream.readline()
+        if not line:
+            raise SystemExit(0)
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+    def lend(self) -> Line:
+        """Return the worker, which is reached in the same way."""
+        return self
+
+    def step(self, plan: Plan) -> None:
+        """Begin a run."""
+        self.ask({"lend": to_json(plan)})
+
+    def exchange(self, told: Mapping[str, Any] | None) -> dict[str, Any]:
+        """Tell the worker something, and return what it says."""
+        answer: dict[str, Any] = self.ask({"tell": told})["told"]
+        return answer
+
+    def take_back(self, _: Line, *, usable: bool) -> None:
+        """Give the worker back."""
+        self.ask({"back": usable})
+
+
+class GradedWorld(World):
+    """The world of a test of a rubric: it runs the programs of a submission in the sandbox.
+
+    Args:
+        line: To the supervisor.
+        job: The test, and what was handed in.
+        options: Of the marker `ros`.
+    """
+
+    def __init__(self, line: Line, job: TestJob, options: Mapping[str, Any]) -> None:
+        seed = options.get("seed")
+        session: Any = SimpleNamespace(recorder=line)
+        plan = replace(job.plan, processes=(), starts=(), duration_ns=0, drawn_order=seed is not None)
+        self._job = job
+        self._provided = job.provided
+        super().__init__(
+            session,
+            (),
+            seed=job.seed if seed is None else seed,
+            name=plan.scenario,
+            delay=options.get("delay"),
+            lose=options.get("lose"),
+            plan=plan,
+        )
+
+    @property
+    def full(self) -> str:
+        """The limit that ended the recording, as a sentence; empty if none did."""
+        return self._run.full
+
+    def _found(self, program: Runnable) -> Found:
+        if callable(program):
+            text = f"{getattr(program, '__name__', program)}: expected the name of a program that is handed in"
+            raise SubmissionError(text, "a test of a rubric imports nothing of a submission")
+        wanted = str(program)
+        if wanted in self._job.missing:
+            raise NotHandedIn(wanted)
+        for name, file, executable in self._job.files:
+            if name == wanted:
+                return Found(name, Path(self._job.plan.root), file, executable, self._job.plan.projects)
+        known = [*(name for name, _, _ in self._job.files), *self._job.missing]
+        close = nearest(wanted, known)
+        hint = f"did you mean {close}?" if close else f"name it under `files`, which has {listed(known)}"
+        raise SubmissionError(f"{wanted}: expected a program of the rubric, found none", hint)
+
+    def _found_launch_file(self, file: str | Path) -> tuple[Found, tuple[tuple[str, str], ...]]:
+        name = str(file)
+        own = dict(self._provided)
+        found = Found(name, Path(self._job.plan.root), name) if name in own else self._found(name)
+        if not is_launch_file(name):
+            raise SubmissionError(f"{name}: expected a launch file", "its name ends with launch.py")
+        return found, self._job.known
+
+    def launch(self, file: str | Path, *, arguments: Mapping[str, Any] | None = None) -> Any:
+        """Start the nodes that a launch file describes; see `World.launch`."""
+        __tracebackhide__ = True
+        try:
+            return super().launch(file, arguments=arguments)
+        except LaunchFailedError as error:
+            if str(file) in dict(self._provided):
+                raise
+            raise LaunchFailed(error.message) from None
+
+    def _plan_of(self, found: Found, start: PlannedStart, env: Mapping[str, str]) -> Plan:
+        return replace(
+            self._plan,
+            processes=((start.process, found.file),),
+            host_seed=derive(int(self._job.plan.host_seed, 16), "program", start.process),
+            starts=(start,),
+            environment=tuple((name, str(value)) for name, value in env.items()),
+        )
+
+    def _as_object(self, message: Message) -> Any:
+        """Return a message from the fields that the worker has read: its bytes are the student's."""
+        kind = message_class(message.type)
+        if kind is None:
+            raise NoMessage(f"{message.topic} has messages of type {message.type}, which is not installed here")
+        if not message.value and kind.get_fields_and_field_types():
+            raise NoMessage(f"{message.topic} has a message that is too large to be read")
+        return built(kind, message.value, message.topic)
+
+
+class Plugin:
+    """What pytest calls."""
+
+    def __init__(self, line: Line) -> None:
+        self._line = line
+        self._jobs: dict[str, TestJob] = {}
+        self._mistake: dict[str, Any] = {}
+
+    def pytest_configure(self, config: pytest.Config) -> None:
+        """Describe the markers."""
+        config.addinivalue_line("markers", "points(N, hint=TEXT, needs=ID): what the test is worth")
+        config.addinivalue_line("markers", "ros(seed=N, delay={topic: (least, most)}, lose={topic: share}): of `ros`")
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_make_collect_report(
+        self, collector: pytest.Collector
+    ) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+        """Note why the file cannot be collected."""
+        report = yield
+        if report.failed and not self._mistake:
+            excinfo = getattr(getattr(report, "call", None), "excinfo", None)
+            error = getattr(excinfo, "value", None)
+            cause = getattr(error, "__cause__", None) or getattr(error, "__context__", None) or error
+            self._mistake = _mistake(cause or RuntimeError("pytest cannot collect the file"), str(collector.path))
+        return report
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Say what was collected, and keep what is to be run."""
+        told: dict[str, Any] = {"mistake": self._mistake} if self._mistake else {"collected": [*map(_name, items)]}
+        self._line.say(told)
+        asked = self._line.listen()["tests"]
+        self._jobs = {name: from_json(TestJob, job) for name, job in asked.items()}
+        items[:] = [item for item in items if _name(item) in self._jobs]
+
+    @pytest.fixture
+    def ros(self, request: pytest.FixtureRequest) -> Iterator[GradedWorld]:
+        """The world in which a test runs the programs of a submission."""
+        node: Any = request.node
+        options: dict[str, Any] = {}
+        for marker in reversed(list(node.iter_markers("ros"))):
+            unknown = [name for name in marker.kwargs if name not in OPTIONS]
+            if unknown or marker.args:
+                found = unknown[0] if unknown else repr(marker.args[0])
+                raise ValueError(f"@pytest.mark.ros in a rubric: expected {listed(OPTIONS)} by name, found {found}")
+            options |= marker.kwargs
+        world = GradedWorld(self._line, self._jobs[_name(node)], options)
+        node.stash[_WORLD] = world
+        yield world
+        world.close()
+
+    @pytest.fixture
+    def ros_session(self) -> Any:
+        """Not for a rubric: each of its tests has a recording of its own."""
+        raise ValueError("ros_session: each test of a rubric has a recording of its own: use the fixture `ros`")
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
+        """Say when a test begins, and how it has ended."""
+        name = _name(item)
+        self._line.say({"begin": name})
+        item.stash[_FOUND] = {}
+        result = yield
+        found = item.stash[_FOUND] or {"tested": {"passed": True}}
+        self._line.say({"end": name, **found})
+        return result
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(
+        self, item: pytest.Item, call: pytest.CallInfo[None]
+    ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+        """Note what the first part of a test has found that has not passed."""
+        report = yield
+        if call.excinfo is not None and not item.stash[_FOUND]:
+            item.stash[_FOUND] = _found_by(item, call.when, call.excinfo)
+        return report
+
+
+def _name(item: Any) -> str:
+    """Return what pytest calls a test within its file."""
+    name: str = item.nodeid.partition("::")[2]
+    return name
+
+
+def _found_by(item: pytest.Item, when: str, failure: pytest.ExceptionInfo[BaseException]) -> dict[str, Any]:
+    """Return what a failure means: a verdict on the submission, a mistake of the test, or a problem of the grader."""
+    error = failure.value
+    world = item.stash.get(_WORLD, None)
+    if isinstance(error, HarnessError):
+        return {"problem": error.message}
+    if (found := _of_programs(error, world)) is not None:
+        return {"tested": {"passed": False, **found}}
+    judged = isinstance(error, (AssertionError, pytest.fail.Exception)) and not _is_generated(failure)
+    if when != "call" or not judged:
+        return {"mistake": _mistake(error, str(item.path), when)}
+    advice = world.advice if world is not None else ""
+    return {"tested": {"passed": False, "reason": _said(error, failure), "hint": advice}}
+
+
+def _of_programs(error: BaseException, world: GradedWorld | None) -> dict[str, Any] | None:
+    """Return what programs did that ended a test, in whichever part of it; None if it was no program."""
+    if world is not None and world.full:
+        return {"reason": world.full}
+    if isinstance(error, NotHandedIn):
+        return {"missing": [error.name]}
+    if isinstance(error, ProgramFailed):
+        fault = None if error.fault is None else observation_to_json(error.fault)
+        return {"reason": str(error).rpartition("\n")[2], "fault": fault}
+    if isinstance(error, (StepTimeout, NoMessage)):
+        return {"reason": error.reason, "hint": error.hint}
+    return {"reason": str(error)} if isinstance(error, (ParameterRejected, WrongType, LaunchFailed)) else None
+
+
+def _is_generated(failure: pytest.ExceptionInfo[BaseException]) -> bool:
+    """Return whether a message did not take a value: a class of messages asserts that, and the test has written it."""
+    return _GENERATED.fullmatch(str(failure.traceback[-1].frame.f_globals.get("__name__", ""))) is not None
+
+
+def _said(error: BaseException, failure: pytest.ExceptionInfo[BaseException]) -> str:
+    """Return the message of an assertion; without one, what pytest says of it in one line, or the assertion itself."""
+    text = str(getattr(error, "msg", None) or error)
+    if not text.strip():
+        return str(failure.traceback[-1].statement).strip()
+    message, _, _ = text.partition("\nassert ")
+    return message.partition("\n")[0] if message.startswith("assert ") else message
+
+
+def _mistake(error: BaseException, path: str, when: str | None = None) -> dict[str, Any]:
+    """Return the place and the words of a mistake in the file of tests."""
+    if isinstance(error, pytest.skip.Exception):
+        return {"line": line_of(error, path, 0), "text": "the test was skipped, so that nothing is judged"}
+    where = "" if when in (None, "call") else f"in a fixture ({when}): "
+    hint = f"; {error.hint}" if isinstance(error, GraderError) and error.hint else ""
+    if isinstance(error, AttributeError) and hasattr(getattr(error, "obj", None), "get_fields_and_field_types"):
+        hint = "; name the type that the messages have to be of, as in ros.messages(topic, Twist)"
+    return {"line": line_of(error, path, 0), "text": f"{where}{type(error).__name__}: {words_of(error)}{hint}"[:500]}
+
+
+def main() -> None:
+    """Run the tests of a file."""
+    line = Line(socket.socket(fileno=int(sys.argv[1])))
+    arguments = ["-p", "no:cacheprovider", "-p", "no:faulthandler", "--import-mode=importlib", "-c", "pytest.ini"]
+    pytest.main([*arguments, "--rootdir=.", sys.argv[2]], plugins=[Plugin(line)])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+"""Makes packages importable that are not installed, for a test and for its programs.
+
+They are the message packages that lie in a workspace as sources, and what the grader brings of ROS itself.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from functools import cache
+from importlib import invalidate_caches
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
+from pathlib import Path
+from types import ModuleType
+
+from grader.app.interface_packages import is_installed, modules_named
+from grader.app.programs import package_of, workspace_of
+from grader.app.ros_packages import LENDABLE
+from grader.core.errors import GraderError
+from grader.execution.ros_installation import find_ros
+from grader.interfaces.definitions import InterfacePackage, find_packages, shipped_packages
+
+#: The largest file that is searched for the names of packages.
+MOST_BYTES = 1 << 20
+
+
+def workspace_around(folder: Path) -> Path | None:
+    """Return the folder with the packages beside the one that a folder is in; None if it is in none and has none."""
+    package = package_of(folder)
+    if (package / "package.xml").is_file():
+        return workspace_of(package)
+    source = folder / "src"
+    return source if any(source.glob("*/package.xml")) or any(source.glob("*/*/package.xml")) else None
+
+
+@cache
+def _unbuilt(workspace: Path) -> tuple[InterfacePackage, ...]:
+    ros = find_ros(workspaces=True)
+    return tuple(package for package in find_packages(workspace) if not is_installed(package.name, ros))
+
+
+@cache
+def modules_for(folder: Path) -> tuple[Path, ...]:
+    """Return where the modules of packages are that the programs of a folder need and nobody has installed.
+
+    What has to be built is built once, and kept for other runs.
+
+    Args:
+        folder: A package, or the folder of programs in none.
+
+    Raises:
+        GraderError: A definition cannot be used; the message has its file and line.
+    """
+    workspace = workspace_around(folder)
+    paths = folder.glob("*.py") if workspace is None else workspace.rglob("*.py")
+    sources = [path.read_bytes() for path in sorted(paths) if path.is_file() and path.stat().st_size <= MOST_BYTES]
+    own = () if workspace is None else _unbuilt(workspace)
+    return modules_named(sources, own, find_ros(workspaces=True))
+
+
+class PackageFinder(MetaPathFinder):
+    """Finds packages that are not installed, where nothing else finds them.
+
+    Args:
+        folder: Lies in the workspace.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._is_looking = False
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return the place of a package; None for anything else. Raises ImportError if it cannot be built."""
+        if path is not None or self._is_looking:  # a build looks whether other modules have these names
+            return None
+        self._is_looking = True
+        try:
+            found = [str(folder) for folder in self._modules(fullname)]
+        except GraderError as error:
+            hint = f"; {error.hint}" if error.hint else ""
+            raise ImportError(f"{fullname}: {error.message}{hint}", name=fullname) from None
+        finally:
+            self._is_looking = False
+        let_import(found)
+        return PathFinder.find_spec(fullname, found, target) if found else None
+
+    def _modules(self, name: str) -> tuple[Path, ...]:
+        workspace = workspace_around(self._folder)
+        if workspace is not None and name in {package.name for package in _unbuilt(workspace)}:
+            return modules_for(self._folder)
+        if name in LENDABLE or name in {package.name for package in shipped_packages()}:
+            return modules_named([name.encode()], (), find_ros(workspaces=True))
+        return ()
+
+
+def let_import(folders: Sequence[str]) -> None:
+    """Let this process import from folders what is not installed."""
+    added = [folder for folder in folders if folder not in sys.path]
+    sys.path += added
+    if added:
+        invalidate_caches()
