@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from grader.world.world import World
 
 #: What `@pytest.mark.ros` takes.
-_OPTIONS = ("seed", "seeds", "delay", "lose")
+_OPTIONS = ("clock", "seed", "seeds", "delay", "lose")
+#: The clocks that a test may run on.
+_CLOCKS = ("virtual", "wall")
 _WORLD: pytest.StashKey[World] = pytest.StashKey()
 _SHARED: pytest.StashKey[str] = pytest.StashKey()
 _OF_WORKER = "ros_shared"
@@ -26,6 +28,13 @@ _OF_WORKER = "ros_shared"
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of the command line."""
     group = parser.getgroup("ros", "nodes in virtual time")
+    group.addoption(
+        "--ros-clock",
+        choices=_CLOCKS,
+        default="virtual",
+        help="the clock of tests whose marker does not name one: virtual time, or the wall clock, on which they take "
+        "as long as they say and no order is drawn",
+    )
     group.addoption(
         "--ros-seed",
         type=int,
@@ -38,9 +47,9 @@ def pytest_configure(config: pytest.Config) -> None:
     """Describe the marker."""
     config.addinivalue_line(
         "markers",
-        "ros(seed=N, seeds=COUNT, delay={topic: (least, most)}, lose={topic: share}): "
-        "options of the fixture `ros`: the seed of everything drawn, the number of seeds to run the test with, "
-        "seconds that messages of the test are on their way, and the share of them that is lost",
+        "ros(clock='virtual' or 'wall', seed=N, seeds=COUNT, delay={topic: (least, most)}, lose={topic: share}): "
+        "options of the fixture `ros`: the clock, the seed of everything drawn, the number of seeds to run the test "
+        "with, seconds that messages of the test are on their way, and the share of them that is lost",
     )
 
 
@@ -48,9 +57,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Run a test that is marked with `seeds` once for each of them."""
     if "_ros_seed" not in metafunc.fixturenames:
         return
-    seeds = _options(metafunc.definition).get("seeds")
+    options = _options(metafunc.definition)
+    seeds = options.get("seeds")
     chosen = metafunc.config.getoption("--ros-seed")
-    if seeds is not None and chosen is None:
+    # on the wall clock one run stands for all: there is no order that a seed could draw
+    if seeds is not None and chosen is None and _clock(metafunc.config, options) == "virtual":
         metafunc.parametrize("_ros_seed", range(seeds), ids=[f"seed{number}" for number in range(seeds)])
 
 
@@ -94,6 +105,7 @@ def ros(
     options = _options(request.node)
     opened = ros_session.open(
         request.path.parent,
+        clock=_clock(request.config, options),
         seed=_ros_seed,
         name=request.node.name,
         delay=options.get("delay"),
@@ -115,7 +127,8 @@ def pytest_runtest_makereport(
     world = item.stash.get(_WORLD, None)
     if world is not None and call.when == "call" and report.failed and call.excinfo is not None:
         del item.stash[_WORLD]  # the fixture has nothing to add
-        drawn = [f"seed {world.seed}: repeat it with --ros-seed {world.seed}"] if world.is_drawn else []
+        repeating = "repeat it with" if world.repeats else "the same delays and losses are drawn with"
+        drawn = [f"seed {world.seed}: {repeating} --ros-seed {world.seed}"] if world.is_drawn else []
         lines = [*drawn, *_kept(item, world, call.excinfo)]
         report.sections.append(("ros", "\n".join(lines)))
         item.user_properties += [("ros", line) for line in lines]  # which files for JUnit hold
@@ -154,4 +167,15 @@ def _options(item: Any) -> dict[str, Any]:
         if unknown or marker.args:
             found = unknown[0] if unknown else repr(marker.args[0])
             raise pytest.UsageError(f"@pytest.mark.ros: expected {', '.join(_OPTIONS)} by name, found {found}")
+    if (clock := options.get("clock", "virtual")) not in _CLOCKS:
+        raise pytest.UsageError(f"@pytest.mark.ros: clock: expected {' or '.join(_CLOCKS)}, found {clock!r}")
+    if clock == "wall" and "seeds" in options:
+        text = "seeds draws the order of programs, which the wall clock leaves to chance"
+        raise pytest.UsageError(f"@pytest.mark.ros: {text}: write seed=N to draw delays and losses, or clock='virtual'")
     return options
+
+
+def _clock(config: pytest.Config, options: dict[str, Any]) -> str:
+    """Return the clock of a test: that of its marker, or else that of the command line."""
+    clock: str = options.get("clock") or config.getoption("--ros-clock")
+    return clock

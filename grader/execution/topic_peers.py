@@ -188,6 +188,11 @@ class WallTopicPeers(TopicPeers):
             self._observer.withdraw(event.topic)
         super().do(event, now_ns)
 
+    def _offer(self, stream: PlannedMessages) -> None:
+        self._streams[stream.topic] = stream.type
+        self._fixed.add(stream.topic)
+        super()._offer(stream)
+
     def _asked(self, topic: str) -> list[tuple[str, bool]]:
         asked = [e for e in self._recorder.graph.endpoints if e.kind == "subscription" and e.topic == topic]
         return [(e.type, e.durability == "transient_local") for e in asked]

@@ -163,6 +163,7 @@ class WallRunner(Runner):
             elif report.get("kind") == "exited":
                 self._recorder.add(*student.output(now_ns, final=True))
                 stopped, places = student.stop_signalled, student.places
+                student.exit_code = code if type(code := report.get("code")) is int else None
                 self._recorder.add(ending(student.name, now_ns, report, self._plan, places, stopped=stopped))
                 student.ended = True
         self._recorder.add(*student.output(now_ns))

@@ -72,6 +72,8 @@ OWN_LIMITS = Limits(
     traffic_bytes=1 * GIB,
     participants=200,
 )
+#: How long `settle` waits on the wall clock: a reaction takes some milliseconds, tens of them on a busy machine.
+REAL_SETTLE_S = 0.1
 #: What fails a test. A program that ends by itself does not: the test can look at its exit code.
 FAILING = (FaultKind.SYNTAX_ERROR, FaultKind.EXCEPTION, FaultKind.HUNG, FaultKind.KILLED)
 
@@ -159,14 +161,16 @@ class Failure:
 class World:
     """Runs programs in virtual time, and lets a test act on them and look at what they do.
 
-    Virtual time stands still between two calls. Use `grader.api.open_world` or the fixture `ros`, not the constructor.
+    Virtual time stands still between two calls. On the wall clock, the same calls take as long as they say, and the
+    programs run on between them. Use `grader.api.open_world` or the fixture `ros`, not the constructor.
 
     Args:
         session: What the programs run in.
         near: Folders in which programs are looked for.
+        clock: `virtual`, or `wall` for real time.
         seed: What everything drawn follows from.
         name: The name of the test in its recording.
-        drawn_order: Whether the seed decides which of several ready programs runs first.
+        drawn_order: Whether the seed decides what runs first of all that is ready; on the wall clock, nothing does.
         delay: For topics that the test publishes on, the least and the most seconds that a message is on its way.
         lose: For such topics, the share of messages that are lost.
 
@@ -179,6 +183,7 @@ class World:
         session: RecordingSession,
         near: Sequence[Path],
         *,
+        clock: str = ClockKind.VIRTUAL.value,
         seed: int = 0,
         name: str = "test",
         drawn_order: bool = False,
@@ -186,6 +191,8 @@ class World:
         lose: Mapping[str, float] | None = None,
     ) -> None:
         self.session = session
+        self._clock = clock_named(clock)
+        self._is_real = self._clock is ClockKind.WALL
         self._near = tuple(near)
         self._seed = seed
         self._delay = {_absolute(topic): between for topic, between in (delay or {}).items()}
@@ -200,9 +207,9 @@ class World:
             wait_at_most_ns=0,
             numbers=(),
             recordings=(),
-            clock=ClockKind.VIRTUAL.value,
+            clock=self._clock.value,
             limits=OWN_LIMITS,
-            drawn_order=drawn_order,
+            drawn_order=drawn_order and not self._is_real,
             working=str(Path.cwd()),
         )
         self._observations: list[Observation] = []
@@ -216,7 +223,7 @@ class World:
         self._failing: list[tuple[Program, Fault]] = []
         self._simulations: list[Simulation] = []
         self._goals = 0
-        self._starting = False
+        self._starting = self._judging = False
         self._notes: list[str] = []
         self._unsuitable = ""
         self._run = SteppedRun(session.recorder, self._plan, self._answered)
@@ -265,7 +272,7 @@ class World:
                 name, namespace, (remappings or {}).items(), parameter_values(parameters or {})
             ),
         )
-        self._programs[label] = started = Program(label, found.root, self._signal, self._await_start)
+        self._programs[label] = started = Program(label, found.root, self._signal, self._catch_up)
         self._perform(Start(self._plan_of(found, start, env or {}), settle=not self._plan.drawn_order))
         return started
 
@@ -314,11 +321,14 @@ class World:
 
     @property
     def now(self) -> float:
-        """Seconds of virtual time since the test began."""
+        """Seconds since the test began: of virtual time, or of real time on the wall clock."""
+        __tracebackhide__ = True
+        if self._is_real:
+            self._catch_up()
         return seconds(self._run.now_ns)
 
     def advance(self, seconds: float) -> None:
-        """Let so much virtual time pass, with everything that happens at its end; 0 is as good as `settle`.
+        """Let so many seconds pass, with everything that happens at their end; 0 is as good as `settle`.
 
         Raises:
             ProgramFailed: A program has failed meanwhile.
@@ -326,12 +336,22 @@ class World:
         __tracebackhide__ = True
         if seconds < 0:
             raise ValueError(f"expected seconds to advance, found {seconds:g}: time does not go back")
-        self._perform(Advance(self._run.now_ns + round(seconds * NS_PER_S)))
+        self._perform(Advance(self._begin_ns() + round(seconds * NS_PER_S)))
 
     def settle(self) -> None:
-        """Let everything happen that happens now, such as the reaction to a message; no time passes."""
+        """Let everything happen that happens now, such as the reaction to a message; no virtual time passes.
+
+        On the wall clock nobody knows when a reaction is complete: it waits for a tenth of a second.
+        """
         __tracebackhide__ = True
-        self._perform(Advance(self._run.now_ns))
+        self.advance(REAL_SETTLE_S if self._is_real else 0.0)
+
+    def _begin_ns(self) -> int:
+        """Return the time at which a wait begins."""
+        __tracebackhide__ = True
+        if self._is_real:
+            self._catch_up()
+        return self._run.now_ns
 
     def wait_until(self, condition: Callable[[], Value], timeout: float) -> Value:
         """Let time pass until a condition holds, and return its value.
@@ -340,14 +360,14 @@ class World:
 
         Args:
             condition: Called without arguments.
-            timeout: Seconds of virtual time to wait at most.
+            timeout: Seconds to wait at most.
 
         Raises:
             StepTimeout: It does not hold in time; the message says what happened meanwhile.
             ProgramFailed: A program has failed meanwhile.
         """
         __tracebackhide__ = True
-        since_ns = self._run.now_ns
+        since_ns = self._begin_ns()
         lacking: list[str] = []
 
         def holds() -> Value | None:
@@ -367,9 +387,18 @@ class World:
         """Let time pass until a function returns something true, and return that; what it returns last otherwise."""
         __tracebackhide__ = True
         self._perform(Advance(self._run.now_ns))
-        while not (found := look()) and self._run.now_ns < deadline_ns:
+        while not (found := self._looked(look)) and self._run.now_ns < deadline_ns:
             self._perform(Advance(deadline_ns, until_news=True))
         return found
+
+    def _looked(self, look: Callable[[], Value]) -> Value:
+        """Return what a function returns, all of whose looks show the same moment."""
+        __tracebackhide__ = True
+        self._judging = True
+        try:
+            return look()
+        finally:
+            self._judging = False
 
     def _timeout(self, what: str, since_ns: int, first: Mapping[str, Sequence[str]]) -> str:
         trace, programs = self.trace(), [*self._programs.values()]
@@ -450,7 +479,7 @@ class World:
         Args:
             name: Its name.
             request: The request, such as `Trigger.Request()`.
-            timeout: Seconds of virtual time to wait at most, for the server and the response together.
+            timeout: Seconds to wait at most, for the server and the response together.
 
         Raises:
             StepTimeout: There was no response in time; the message says whether there is a server.
@@ -459,7 +488,7 @@ class World:
         name = _absolute(name)
         interface = type_name(type(request))
         kind = service_type(interface)
-        since_ns, seen = self._run.now_ns, len(self._observations)
+        since_ns, seen = self._begin_ns(), len(self._observations)
         told = self._perform(Call(name, interface, plain_fields(request)))
 
         found = self._until(lambda: self._response(seen, name, told["client"]), since_ns + round(timeout * NS_PER_S))
@@ -482,7 +511,7 @@ class World:
             name: Name of the action.
             goal: The goal, such as `Fibonacci.Goal(order=5)`.
             cancel_after: Seconds after its acceptance at which the goal is cancelled; None to let it go on.
-            timeout: Seconds of virtual time to wait at most.
+            timeout: Seconds to wait at most.
 
         Raises:
             StepTimeout: There was no result in time.
@@ -494,7 +523,7 @@ class World:
         self._goals += 1
         uuid = tuple(bytes.fromhex(derive(self._seed, "goal", str(self._goals))[:32]))
         after_ns = 0 if cancel_after is None else max(1, round(cancel_after * NS_PER_S))
-        since_ns, seen = self._run.now_ns, len(self._observations)
+        since_ns, seen = self._begin_ns(), len(self._observations)
         told = self._perform(SendGoal(PlannedGoal(name, interface, since_ns, after_ns, plain_fields(goal), uuid)))
         sent, asked = told["clients"][:2]
 
@@ -534,7 +563,7 @@ class World:
             node: Full name of the node.
             name: Name of the parameter.
             value: Its value.
-            timeout: Seconds of virtual time to wait at most.
+            timeout: Seconds to wait at most.
 
         Raises:
             ParameterRejected: The node does not accept the value, or has not declared the parameter.
@@ -573,7 +602,7 @@ class World:
     def received(self, topic: str) -> list[Received]:
         """Return the messages that programs have published on a topic so far, with their times."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         topic = _absolute(topic)
         known = self._read.setdefault(topic, [])
         for one in self._messages.get(topic, ())[len(known) :]:
@@ -596,7 +625,7 @@ class World:
             The rate, 0 for fewer than two messages.
         """
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         since_ns = 0 if last is None else self._run.now_ns - round(last * NS_PER_S)
         times = [one.t_ns for one in self._messages.get(_absolute(topic), ()) if one.t_ns >= since_ns]
         # n - 1 gaps, not n: counting messages overstates a short time
@@ -605,25 +634,25 @@ class World:
     def nodes(self) -> list[str]:
         """Return the full names of the programs' nodes, sorted."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return sorted(self._graph.nodes)
 
     def topics(self) -> dict[str, str]:
         """Return the topics that programs publish on or subscribe to, with their types."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return {e.topic: e.type for e in sorted(self._graph.endpoints, key=lambda e: e.topic)}
 
     def services(self) -> dict[str, str]:
         """Return the services that programs offer, with their types; without those that every node has."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return {e.service: e.type for e in telling.service_ends(self._graph, "service")}
 
     def graph(self) -> GraphSnapshot:
         """Return nodes, publishers, subscriptions, servers and clients of the programs as they are now."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return self._graph
 
     @property
@@ -660,7 +689,7 @@ class World:
         now_ns = self._run.now_ns + 1
         return Trace(
             self._plan.scenario,
-            ClockKind.VIRTUAL,
+            self._clock,
             stop_ns=now_ns,
             observations=tuple(self._observations),
             clock_reason=self._unsuitable,
@@ -697,6 +726,11 @@ class World:
         return self._seed
 
     @property
+    def repeats(self) -> bool:
+        """Whether the same seed gives the same run; on the wall clock it gives the same delays and losses only."""
+        return not self._is_real
+
+    @property
     def is_drawn(self) -> bool:
         """Whether anything in this run was drawn from its seed."""
         return self._plan.drawn_order or bool(self._delay or self._lose)
@@ -704,7 +738,8 @@ class World:
     @property
     def problem(self) -> str:
         """Why what happened may be untrue, once the world is closed; empty if it is not."""
-        return f"virtual time does not suit these programs: {self._unsuitable}" if self._unsuitable else ""
+        clock = "the wall clock" if self._is_real else "virtual time"
+        return f"{clock} does not suit these programs: {self._unsuitable}" if self._unsuitable else ""
 
     def close(self) -> None:
         """End all programs, and the run; what was observed can still be looked at."""
@@ -719,23 +754,28 @@ class World:
         __tracebackhide__ = True
         if self._run.is_busy:
             raise RuntimeError("a function that answers for the test cannot let time pass or act on the programs")
-        if not isinstance(command, (Start, Advance)):
-            self._await_start()
+        if self._starting and not isinstance(command, (Start, Advance)):
+            self._catch_up()
         self._starting = isinstance(command, Start) and not command.settle
         told, observations = self._run.perform(command)
         if isinstance(command, Start):
             for name in told["started"]:
-                self._programs.setdefault(name, Program(name, Path(command.plan.root), self._signal, self._await_start))
+                self._programs.setdefault(name, Program(name, Path(command.plan.root), self._signal, self._catch_up))
         self._adopt(observations)
         if self._run.full:
             raise GraderError(f"the test was ended: {self._run.full}")
         self._raise_failure()
         return told
 
-    def _await_start(self) -> None:
-        """Let the programs come up that were started last: where a seed draws their order, they start together."""
+    def _catch_up(self) -> None:
+        """Learn what has happened since the last command, before the test looks or time passes.
+
+        On the virtual clock, that is the start of the programs that were started last: where a seed draws their order,
+        they start together. While a condition is looked at, nothing changes.
+        """
         __tracebackhide__ = True
-        if self._starting and not (self._run.is_busy or self._run.is_closed):
+        stands_still = self._run.is_busy or self._run.is_closed or self._judging
+        if (self._starting or self._is_real) and not stands_still:
             self._perform(Advance(self._run.now_ns))
 
     def _adopt(self, observations: Sequence[Observation]) -> None:
@@ -777,6 +817,13 @@ class World:
             found = type(response).__name__
             raise TypeError(f"{name}: expected a {kind.__name__}.Response from its function, found {found}")
         return plain_fields(response)
+
+
+def clock_named(name: str) -> ClockKind:
+    """Return the clock of a name; raises ValueError if there is none."""
+    if name not in [kind.value for kind in ClockKind]:
+        raise ValueError(f"clock: expected virtual or wall, found {name!r}")
+    return ClockKind(name)
 
 
 def _absolute(name: str) -> str:

@@ -303,4 +303,62 @@ def test_a_wrong_option_of_the_marker_is_told(suite: pytest.Pytester) -> None:
     text = "import pytest\n@pytest.mark.ros(sede=1)\ndef test_it(ros): pass\n"
     result = run(suite, text)
     assert result.ret != 0
-    result.stdout.fnmatch_lines(["*@pytest.mark.ros: expected seed, seeds, delay, lose by name, found sede"])
+    result.stdout.fnmatch_lines(["*@pytest.mark.ros: expected clock, seed, seeds, delay, lose by name, found sede"])
+
+
+CLOCKS = """
+import pytest
+from std_msgs.msg import String
+
+def answers(ros):
+    ros.run("echo.py")
+    ros.publish("/in", String(data="a"), rate=20)
+    ros.wait_until(lambda: ros.messages("/out")[2], timeout=60)
+    return ros.trace().clock.value
+
+def test_by_default(ros):
+    assert answers(ros) == CLOCK
+
+@pytest.mark.ros(clock="virtual")
+def test_virtual(ros):
+    assert answers(ros) == "virtual"
+
+@pytest.mark.ros(clock="wall")
+def test_wall(ros):
+    assert answers(ros) == "wall"
+
+@pytest.mark.ros(seeds=3)
+def test_seeds(ros):
+    assert answers(ros) == CLOCK
+
+@pytest.mark.ros(lose={"/in": 1.0})
+def test_it_fails(ros):
+    ros.run("echo.py")
+    ros.publish("/in", String(data="a"), rate=20)
+    ros.wait_until(lambda: ros.messages("/out"), timeout=0.3)
+"""
+
+
+@pytest.mark.parametrize(("arguments", "clock", "seeds"), [((), "virtual", 3), (("--ros-clock", "wall"), "wall", 1)])
+def test_the_clock_is_an_option_and_a_marker(
+    suite: pytest.Pytester, arguments: tuple[str, ...], clock: str, seeds: int
+) -> None:
+    """The marker wins; on the wall clock a test with several seeds runs once."""
+    result = run(suite, CLOCKS.replace("CLOCK", repr(clock)), "-rf", *arguments)
+    result.assert_outcomes(passed=3 + seeds, failed=1)
+    repeating = "repeat it with" if clock == "virtual" else "the same delays and losses are drawn with"
+    result.stdout.fnmatch_lines(["*StepTimeout: the condition did not hold*", f"seed 0: {repeating} --ros-seed 0"])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("clock='real'", "*clock: expected virtual or wall, found 'real'"),
+        ("clock='wall', seeds=3", "*seeds draws the order of programs, which the wall clock leaves to chance: *"),
+    ],
+)
+def test_a_wrong_clock_is_told(suite: pytest.Pytester, options: str, words: str) -> None:
+    """So is what it cannot do."""
+    result = run(suite, f"import pytest\n@pytest.mark.ros({options})\ndef test_it(ros): pass\n")
+    assert result.ret != 0
+    result.stdout.fnmatch_lines([words])
