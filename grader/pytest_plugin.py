@@ -39,7 +39,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--ros-seed",
         type=int,
         metavar="N",
-        help="draw the order of programs that are ready at the same time, delays and losses from this seed",
+        help="draw from this seed the order of programs and callbacks that are ready at one instant, delays and losses",
     )
 
 
@@ -170,7 +170,7 @@ def _options(item: Any) -> dict[str, Any]:
     if (clock := options.get("clock", "virtual")) not in _CLOCKS:
         raise pytest.UsageError(f"@pytest.mark.ros: clock: expected {' or '.join(_CLOCKS)}, found {clock!r}")
     if clock == "wall" and "seeds" in options:
-        text = "seeds draws the order of programs, which the wall clock leaves to chance"
+        text = "seeds draws the order of what is ready, which the wall clock leaves to chance"
         raise pytest.UsageError(f"@pytest.mark.ros: {text}: write seed=N to draw delays and losses, or clock='virtual'")
     return options
 

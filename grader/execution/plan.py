@@ -166,8 +166,8 @@ class Plan:
         prefixes: The AMENT_PREFIX_PATH of the nodes, first the folder of what the submission's packages share; empty if
             it has none.
         projects: The ROS packages of the submission, outermost first.
-        drawn_order: Whether the order in which processes run that are ready at one instant follows from the seed;
-            otherwise it is that of the plan.
+        drawn_order: Whether the order in which processes run that are ready at one instant follows from the seed, and
+            that of their callbacks; otherwise it is that of the plan, and of rclpy.
         working: The absolute folder in which the processes start, which then run their files where these lie; empty to
             give each copies and a folder of its own.
         environment: Further variables of the processes.

@@ -331,6 +331,7 @@ class Worker:
             "seed": plan.seed_of(name),
             "clock": plan.clock,
             "charged": plan.charged,
+            "drawn_order": plan.drawn_order,
             "in_place": bool(plan.working),
             "steady_ns": plan.epoch_ns - plan.uptime_ns,
             "log_format": LOG_FORMAT,

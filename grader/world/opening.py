@@ -45,8 +45,8 @@ class Worlds:
         Args:
             near: Where programs are looked for first; then in the folder of these worlds, and in the working directory.
             clock: `virtual`, or `wall` for real time, in which no order is drawn.
-            seed: What the order of ready programs, delays and losses are drawn from; None for the order in which they
-                were started.
+            seed: What delays, losses, and the order of programs and callbacks that are ready at one instant are drawn
+                from; None for the order in which programs were started, and that of rclpy.
             name: Name of its recording.
             delay: For topics that are published on from outside, the least and the most seconds that a message is on
                 its way.
@@ -91,8 +91,8 @@ def open_world(
     Args:
         near: Where programs are looked for first.
         clock: `virtual`, or `wall` for real time, in which no order is drawn.
-        seed: What the order of ready programs, delays and losses are drawn from; None for the order in which they were
-            started.
+        seed: What delays, losses, and the order of programs and callbacks that are ready at one instant are drawn from;
+            None for the order in which programs were started, and that of rclpy.
         delay: As for the marker `ros` of pytest.
         lose: As for the marker `ros` of pytest.
 

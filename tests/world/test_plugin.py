@@ -84,97 +84,6 @@ def test_a_mistake_in_a_test_is_shown_at_its_line_with_a_hint(suite: pytest.Pyte
     assert "grader/world" not in text
 
 
-RACE = """
-import pytest
-from std_msgs.msg import String
-
-@pytest.mark.ros(seeds=8)
-def test_the_last_word(ros):
-    ros.run("echo.py", name="one", remappings={"/out": "/said"}, env={"WORD": "one"})
-    ros.run("echo.py", name="two", remappings={"/out": "/said"}, env={"WORD": "two"})
-    listener = ros.run("last.py")
-    ros.publish("/in", String(data="x"))
-    ros.advance(1.0)
-    assert listener.logs[-1].text == "two"
-"""
-LAST = """
-import rclpy
-from rclpy.node import Node
-from std_msgs.msg import String
-
-class Last(Node):
-    def __init__(self):
-        super().__init__("last")
-        self.create_subscription(String, "/said", lambda m: self.get_logger().info(m.data), 10)
-
-rclpy.init()
-rclpy.spin(Last())
-"""
-
-
-def test_a_race_is_found_under_several_seeds_and_repeated_by_its_own(suite: pytest.Pytester) -> None:
-    """Two programs that are ready at the same moment: which speaks last follows from the seed."""
-    echo = suite.path / "echo.py"
-    text = echo.read_text(encoding="utf-8").replace("import rclpy\n", "import os\n\nimport rclpy\n", 1)
-    echo.write_text(text.replace("publish(message)", "publish(String(data=os.environ['WORD']))"), encoding="utf-8")
-    suite.makepyfile(last=LAST)
-    result = run(suite, RACE, "-q", "-rf")
-    outcomes = result.parseoutcomes()
-    assert outcomes["passed"] + outcomes["failed"] == 8
-    assert min(outcomes["passed"], outcomes["failed"]) > 0
-    failed = re.findall(r"^FAILED test_it.py::test_the_last_word\[seed(\d)\]", result.stdout.str(), re.MULTILINE)
-    result.stdout.fnmatch_lines([f"seed {failed[0]}: repeat it with --ros-seed {failed[0]}"])
-    for _ in range(2):
-        run(suite, RACE, "--ros-seed", failed[0]).assert_outcomes(failed=1)
-    passed = next(str(seed) for seed in range(8) if str(seed) not in failed)
-    run(suite, RACE, "--ros-seed", passed).assert_outcomes(passed=1)
-
-
-HASTY = """
-import rclpy
-from std_srvs.srv import Trigger
-
-rclpy.init()
-node = rclpy.create_node("hasty")
-client = node.create_client(Trigger, "/ready")
-node.get_logger().info("asked" if client.service_is_ready() else "nobody there")
-rclpy.spin(node)
-"""
-SERVER = """
-import rclpy
-from std_srvs.srv import Trigger
-
-rclpy.init()
-node = rclpy.create_node("server")
-node.create_service(Trigger, "/ready", lambda request, response: response)
-rclpy.spin(node)
-"""
-TOGETHER = """
-import pytest
-
-@pytest.mark.ros(seeds=8)
-def test_the_service_is_there(ros):
-    ros.run("server.py")
-    hasty = ros.run("hasty.py")
-    assert ros.nodes() == ["/hasty", "/server"]
-    assert [log.text for log in hasty.logs] == ["asked"]
-
-def test_without_a_seed(ros):
-    ros.run("server.py")
-    assert [log.text for log in ros.run("hasty.py").logs] == ["asked"]
-"""
-
-
-def test_programs_start_together_where_their_order_is_drawn(suite: pytest.Pytester) -> None:
-    """A client that asks before the server is up is found under some seeds, and repeated by each of them."""
-    suite.makepyfile(hasty=HASTY, server=SERVER)
-    result = run(suite, TOGETHER, "-q", "-rf")
-    failed = re.findall(r"^FAILED test_it.py::test_the_service_is_there\[seed(\d)\]", result.stdout.str(), re.MULTILINE)
-    result.assert_outcomes(passed=9 - len(failed), failed=len(failed))
-    assert 0 < len(failed) < 8
-    run(suite, TOGETHER, "--ros-seed", failed[0], "-k", "is_there").assert_outcomes(failed=1, deselected=1)
-
-
 DISTURBED = """
 import pytest
 from std_msgs.msg import String
@@ -354,7 +263,7 @@ def test_the_clock_is_an_option_and_a_marker(
     ("options", "words"),
     [
         ("clock='real'", "*clock: expected virtual or wall, found 'real'"),
-        ("clock='wall', seeds=3", "*seeds draws the order of programs, which the wall clock leaves to chance: *"),
+        ("clock='wall', seeds=3", "*seeds draws the order of what is ready, which the wall clock leaves to chance: *"),
     ],
 )
 def test_a_wrong_clock_is_told(suite: pytest.Pytester, options: str, words: str) -> None:
