@@ -1,3 +1,3 @@
 """Grades ROS 2 exercises: a run writes a trace, a trace is judged, a report is shown."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -15,7 +15,7 @@ import signal
 import sys
 import weakref
 from collections.abc import Callable, Iterator
-from types import CodeType, SimpleNamespace
+from types import CodeType, FrameType, SimpleNamespace
 from typing import Any
 
 import rclpy.client
@@ -1004,6 +1004,18 @@ def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None
 
     looking(rclpy.context.Context, "ok", lambda: None)
     looking(rclpy.task.Future, "done", lambda: None)
+    looked_at = rclpy.task.Future.done
+
+    def done(self: Any) -> bool:
+        caller: FrameType | None = sys._getframe(1)
+        while caller is not None and caller.f_globals["__name__"].startswith(f"{__package__}."):
+            caller = caller.f_back
+        # An executor asks each of its tasks whenever it looks for work.
+        by_executor = caller is not None and caller.f_globals is vars(rclpy.executors)
+        return bool(_DONE(self) if by_executor else looked_at(self))
+
+    rclpy.task.Task.done = functools.wraps(_DONE)(done)
+    _note_ended_tasks(clock)
     looking(rclpy.client.Client, "service_is_ready", at_the_graph)
     _note_found(ledger, rclpy.client.Client, "service_is_ready")
     _install_counts(clock, at_the_graph)
@@ -1012,6 +1024,27 @@ def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None
     for owner, names in ((rclpy.node.Node, GRAPH_LOOKS), (_rclpy.Node, ACTION_LOOKS)):
         for name in names:
             looking(owner, name, lambda: at_the_graph(whole=True))
+
+
+def _note_ended_tasks(clock: VirtualClock) -> None:
+    """Count the tasks that end, but not those of callbacks: a timer without a period never stops calling its own."""
+    create, complete = rclpy.executors.Executor.create_task, rclpy.task.Task._complete_task
+    created: weakref.WeakSet[Any] = weakref.WeakSet()
+
+    @functools.wraps(create)
+    def noted(self: Any, *args: Any, **kwargs: Any) -> Any:
+        task = create(self, *args, **kwargs)
+        created.add(task)
+        return task
+
+    @functools.wraps(complete)
+    def completed(self: Any) -> None:
+        if self in created:
+            clock.end_task()
+        complete(self)
+
+    rclpy.executors.Executor.create_task = noted
+    rclpy.task.Task._complete_task = completed
 
 
 def _install_counts(clock: VirtualClock, before: Callable[[], None]) -> None:

@@ -245,6 +245,8 @@ POLLING = {
     "own_executor": "executor.add_node(node)\nwhile rclpy.ok():\n    executor.spin_once(timeout_sec=0)",
     "coroutine": "executor.create_task(wait)\nexecutor.add_node(node)\nwhile rclpy.ok():\n    executor.spin_once()",
     "added_each_time": "executor.create_task(wait)\nwhile rclpy.ok():\n    rclpy.spin_once(node, executor=executor)",
+    "tasks": "def again():\n    executor.create_task(again)\n"
+    "executor.create_task(again)\nexecutor.add_node(node)\nexecutor.spin()",
     "until": "future = rclpy.task.Future()\nwhile rclpy.ok():\n"
     "    rclpy.spin_until_future_complete(node, future, timeout_sec=0)",
 }

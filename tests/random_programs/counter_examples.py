@@ -15,6 +15,7 @@ from program_description import (
     Fixed,
     Group,
     Heard,
+    Keep,
     Loop,
     Nap,
     Node,
@@ -30,10 +31,16 @@ from program_description import (
     Statement,
     Subscription,
     Timer,
+    Write,
 )
 
 #: Says what it hears.
 SAYS: tuple[Statement, ...] = (Say(Heard()),)
+
+#: Does nothing that anybody notices.
+KEEPS: tuple[Statement, ...] = (Keep(0, Runs(), adds=False),)
+#: Publishes, pauses and ends its program, or in a pool only its callback.
+EXITS: tuple[Statement, ...] = (Publish("a", Runs()), Nap(50), End(Ending.EXIT))
 
 
 def alone(node: Node, spinning: Spinning = Spinning.SPIN) -> Program:
@@ -191,5 +198,43 @@ COUNTER_EXAMPLES: dict[str, Program] = {
             ),
         ),
         2000,
+    ),
+    # rclpy leaves a task for each callback that ran while a call was pending. These tasks, and rclpy's looks at them,
+    # counted as polls of a busy loop, which made the next response late.
+    "many_callbacks_before_a_response": Program(
+        (
+            Process(
+                (
+                    Node(
+                        "n0", 1, (Timer("t00", 10, (Keep(0, Runs(), adds=False),)),), (), clients=(Client("c00", "p"),)
+                    ),
+                ),
+                Spinning.UNTIL,
+                turns=3,
+            ),
+            Process(
+                (Node("n1", 1, (), (), servers=(Server("v10", "p", (Every(2, (Nap(2500),)),), Fixed(3)),)),),
+                Spinning.EXECUTOR,
+            ),
+        ),
+        6000,
+    ),
+    # The same looks, at callbacks of a pool that ended by sys.exit and stay among its tasks.
+    "callbacks_that_exit_in_a_pool": Program(
+        (
+            Process(
+                (
+                    Node(
+                        "n0",
+                        1,
+                        (Timer("t00", 50, (Write(Fixed(0)), Every(2, EXITS))),),
+                        (Subscription("s01", "a", 10, (Write(Runs()),)),),
+                    ),
+                ),
+                Spinning.MULTI,
+                threads=4,
+            ),
+        ),
+        2500,
     ),
 }

@@ -79,7 +79,7 @@ from program_description import (
 #: Who goes on first at an instant: in the process that runs, a thread that has let others go on after it has written
 #: something, but after those that another thread has started or woken, which have SimPy's usual priority; then an
 #: executor that looks for work, and a thread whose pause has ended. Then it is the next turn of the first process.
-LAST, LOOKING, DUE, TURNS = 2, 3, 4, 10
+USUAL, LAST, LOOKING, DUE, TURNS = 1, 2, 3, 4, 10
 #: How late a pause ends in a program that has looked at a clock. Every node has.
 LATE_NS = 1_000
 #: How much later each further look at a clock is within an instant, and how often rclpy looks while it makes a node: it
@@ -112,6 +112,8 @@ class World:
 
     def __init__(self, program: Program) -> None:
         self.environment = simpy.Environment(initial_time=0)
+        #: The priorities of the events that have one of their own.
+        self.priorities: dict[simpy.Event, int] = {}
         self.expected = Expected()
         self.subscribed: dict[str, list[Queue]] = {}
         self.served: dict[str, list[Queue]] = {}
@@ -140,6 +142,7 @@ class World:
     def succeed(self, event: simpy.Event, priority: int, delay_ns: int = 0) -> None:
         """Let an event happen with a priority, which SimPy's own method does not take."""
         event._ok, event._value = True, None
+        self.priorities[event] = priority
         self.environment.schedule(event, priority=priority, delay=delay_ns)  # type: ignore[arg-type]
 
 
@@ -187,13 +190,17 @@ class ProcessModel:
         """Run a thread, but not while another one waits until the other processes have taken its messages."""
         self.runnable -= 1
         self.current = thread
-        started.succeed()
+        if thread.is_new:
+            self.wake_thread(started)  # `Thread.start` waits for that
         for event in steps:
             if event is not self.lets_others_go_on and event is not self.settling:
                 thread.is_new = False
             yield event
             while self.settling is not None and self.settling is not event:
                 yield self.settling
+                again = simpy.Event(self.world.environment)
+                self.world.succeed(again, self.world.priorities.get(event, USUAL))
+                yield again
             if event in self.woken:
                 self.runnable -= 1
                 thread.is_new = self.woken.pop(event)

@@ -31,7 +31,7 @@ PYTHON = {
     "rclpy.executors": ("Timer", "await_or_execute"),
     "rclpy.executors:Executor": (
         *("_take_subscription", "_take_client", "_take_service"),
-        "_wait_for_ready_callbacks",
+        *("_wait_for_ready_callbacks", "create_task"),
     ),
     "rclpy.guard_condition:GuardCondition": ("handle", "trigger"),
     "rclpy.impl.rcutils_logger": ("inspect", "_find_caller", "_internal_callers"),
@@ -43,6 +43,7 @@ PYTHON = {
     "rclpy.subscription:Subscription.CallbackType": ("MessageOnly",),
     "rclpy.client:Client": ("handle", "destroy"),
     "rclpy.service:Service": ("handle", "destroy", "send_response"),
+    "rclpy.task:Task": ("_complete_task",),
 }
 #: Attributes that exist only in instances -> the class whose source assigns them.
 ASSIGNED = {
