@@ -17,6 +17,7 @@ from grader.core.report import CheckExplanation, CriterionExplanation, Parameter
 from grader.core.scenario import (
     ActionGoal,
     AnyOrder,
+    Connection,
     Count,
     CountBetween,
     MessageStream,
@@ -167,7 +168,13 @@ def _situation(scenario: Scenario) -> str:
     if span.after_first_message_on:
         text += f" from the first message on {span.after_first_message_on} on"
         text += f", which is waited for at most {duration(span.wait_at_most_ns)}"
-    return "; ".join([text, *map(_stimulus, scenario.stimuli)])
+    return "; ".join([text, *map(_stimulus, scenario.stimuli), *map(_connection, scenario.connections)])
+
+
+def _connection(connection: Connection) -> str:
+    late = f"arrive {_time(connection.delay_ns)} late" if connection.delay_ns else ""
+    lost = f"{connection.lose:.0%} of them do not arrive" if connection.lose else ""
+    return f"messages on {connection.topic}: {', '.join(filter(None, (late, lost)))}"
 
 
 def _stimulus(stimulus: Stimulus) -> str:  # noqa: PLR0911  one for each kind

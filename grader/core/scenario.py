@@ -307,6 +307,16 @@ class RunOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class Connection:
+    """What happens to the messages of stimuli on a topic, on their way to the student's nodes."""
+
+    topic: Topic  # topic name, absolute
+    # How long a message is on its way. If this is drawn, each message gets its own time; none overtakes another
+    delay_ns: Time = 0
+    lose: Annotated[float, Kind("share")] = 0.0  # the share of messages that do not arrive, drawn for each
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """One situation that is recorded once."""
 
@@ -322,6 +332,7 @@ class Scenario:
     shutdown_ns: int = 0  # how long the processes may take to end after the stop signal; 0 if this is not checked
     run: tuple[tuple[str, RunOptions], ...] = ()  # `(process, options)` of processes that are started with some
     provided: tuple[tuple[str, str], ...] = ()  # name and text of the rubric's own files that this scenario uses
+    connections: tuple[Connection, ...] = ()  # topics on which messages of stimuli are late or lost, each once
 
     @property
     def handed_in(self) -> tuple[str, ...]:

@@ -30,6 +30,7 @@ from grader.core.scenario import (
     Simulated,
     TimeBetween,
     is_launch_file,
+    longest,
     shortest,
 )
 from grader.core.trace import Endpoint
@@ -83,6 +84,23 @@ class PlannedRecording:
     start_ns: int
     stop_ns: int
     messages: tuple[tuple[int, bytes, Mapping[str, Any]], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedConnection:
+    """What happens to the messages of stimuli on a topic, on their way to the processes.
+
+    Attributes:
+        topic: Its absolute name.
+        delay_ns: Least and most time on the way; each message draws its own.
+        lose: The share of messages that are lost.
+        seed: Hex; what is drawn in the run follows from it.
+    """
+
+    topic: str
+    delay_ns: tuple[int, int]
+    lose: float
+    seed: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +189,7 @@ class Plan:
         working: The absolute folder in which the processes start, which then run their files where these lie; empty to
             give each copies and a folder of its own.
         environment: Further variables of the processes.
+        connections: The topics on which messages are late or lost.
     """
 
     scenario: str
@@ -207,6 +226,7 @@ class Plan:
     drawn_order: bool = False
     working: str = ""
     environment: tuple[tuple[str, str], ...] = ()
+    connections: tuple[PlannedConnection, ...] = ()
 
     def start_of(self, process: str) -> PlannedStart:
         """Return what a process is started with."""
@@ -299,6 +319,15 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         shutdown_ns=scenario.shutdown_ns,
         starts=tuple(start for name in scenario.processes if (start := _start(name, scenario, submission)) is not None),
         projects=submission.projects,
+        connections=tuple(
+            PlannedConnection(
+                one.topic,
+                (shortest(one.delay_ns), longest(one.delay_ns)),
+                one.lose,
+                derive(seed, *purposes, "connection", one.topic),
+            )
+            for one in scenario.connections
+        ),
     )
 
 

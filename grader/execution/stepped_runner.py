@@ -6,7 +6,6 @@ answers, is asked in the middle of a command, and nothing else happens here unti
 
 from __future__ import annotations
 
-import random
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -16,7 +15,7 @@ from grader.core.quantities import NS_PER_S
 from grader.core.trace import Mark, Observation
 from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedMessages, PlannedServer, goal_call
 from grader.execution.observer import Observer
-from grader.execution.plan import Plan, derive
+from grader.execution.plan import Plan
 from grader.execution.runner import Runner
 from grader.execution.service_peers import check_calls, check_goal
 from grader.execution.steps import (
@@ -65,14 +64,11 @@ class Stream:
     Args:
         command: What to publish.
         begin_ns: When the first message is sent.
-        draw: Draws what is lost and how long the rest is on its way.
     """
 
-    def __init__(self, command: Publish, begin_ns: int, draw: random.Random) -> None:
+    def __init__(self, command: Publish, begin_ns: int) -> None:
         self.command = command
         self._begin_ns = begin_ns
-        self._draw = draw
-        self._arrived_ns = begin_ns
 
     def event(self, number: int) -> PublishNext | None:
         """Return the event that sends a message; None if there is none of this number."""
@@ -80,15 +76,6 @@ class Stream:
         if not self.command.messages or (number and not period_ns):
             return None
         return PublishNext(self._begin_ns + number * period_ns, self.command.topic, self, number)
-
-    def arrives_ns(self, sent_ns: int) -> int | None:
-        """Draw when a message arrives, never before the one sent before it; None if it is lost."""
-        command = self.command
-        if command.loss and self._draw.random() < command.loss:
-            return None
-        delay_ns = self._draw.randint(*command.delay_ns) if command.delay_ns != (0, 0) else 0
-        self._arrived_ns = max(self._arrived_ns, sent_ns + delay_ns)
-        return self._arrived_ns
 
     def message(self, number: int) -> bytes:
         """Return the message of a number; the last one is repeated."""
@@ -115,7 +102,6 @@ class SteppedRunner(Runner):
         self._on_topics: dict[str, Stream] = {}
         self._offered: dict[str, PlannedMessages] = {}
         self._served: set[str] = set()
-        self._draws: dict[str, random.Random] = {}
 
     @property
     def now_ns(self) -> int:
@@ -257,16 +243,10 @@ class SteppedRunner(Runner):
             self._do(Advertise(self._time_ns(), topic, offer), self._time_ns())
             self._offered[topic] = offer
         self._await_readers(offer)
-        stream = self._on_topics[topic] = Stream(command, self._time_ns(), self._draw("topic", topic))
+        stream = self._on_topics[topic] = Stream(command, self._time_ns())
         first = stream.event(0)
         assert first is not None
         self._later(first)
-
-    def _draw(self, *purpose: str) -> random.Random:
-        key = "/".join(purpose)
-        if key not in self._draws:
-            self._draws[key] = random.Random(derive(int(self._plan.host_seed, 16), *purpose))  # noqa: S311 - it has to repeat
-        return self._draws[key]
 
     def _do(self, event: Event, now_ns: int) -> None:
         if not isinstance(event, PublishNext):
@@ -277,14 +257,7 @@ class SteppedRunner(Runner):
             return
         if (following := stream.event(event.number + 1)) is not None:
             self._later(following)
-        arrives_ns = stream.arrives_ns(event.t_ns)
-        if arrives_ns is None:
-            return
-        sent = PublishRecorded(arrives_ns, event.topic, stream.message(event.number), {})
-        if arrives_ns > now_ns:
-            self._later(sent)
-        else:
-            super()._do(sent, now_ns)
+        self._send(PublishRecorded(event.t_ns, event.topic, stream.message(event.number), {}), now_ns)
 
     def _serve(self, service: str, interface: str) -> None:
         server = PlannedServer(service, interface, 0, 0, 0, cycle=False, answers=0, responses=())

@@ -6,6 +6,7 @@ import ast
 import re
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -14,16 +15,18 @@ from typing import NoReturn, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from grader.core.dataclass import dataclass
-from grader.core.errors import RubricError
+from grader.core.errors import HarnessError, RubricError
 from grader.core.exercise import Check, Criterion, Exercise, Variant
 from grader.core.limits import Limits
 from grader.core.quantities import duration
 from grader.core.rubric_files import rubric_file
 from grader.core.scenario import (
+    Connection,
     NumberStream,
     RecordedStream,
     RunOptions,
     Scenario,
+    Simulated,
     Span,
     Stimulus,
     Time,
@@ -55,7 +58,7 @@ from grader.rubrics.own_checks import (
     own_files,
 )
 from grader.rubrics.run_options import RunShape
-from grader.rubrics.simulations import simulation_mistakes
+from grader.rubrics.simulations import offered, simulation_mistakes
 from grader.rubrics.types import BESIDE, CHECK_FILE, PROVIDED_FILE, PROVIDED_WORDS, build
 from grader.rubrics.variants import (
     VariantOptions,
@@ -125,10 +128,35 @@ def _in_scenario(scenario: ScenarioShape, index: int, rubric: RubricShape, tree:
     for process, start in scenario.start.items():
         yield from _unknown(process, known, what, tree.at_key((*path, "start", process)))
         yield from _too_late(build(start), observed, (*path, "start", process), tree)
+    connections: tuple[Connection, ...] = build(scenario.connections)
     for number, shape in enumerate(scenario.stimuli):
         stimulus = build(shape)
         yield from _in_stimulus(stimulus, observed, (*path, "stimuli", number, shape.chosen[0]), tree)
-        yield from _cut_off(stimulus, observed, (*path, "observe", "duration"), tree)
+        late_ns = max((longest(one.delay_ns) for one in connections if one.topic in _published(stimulus)), default=0)
+        yield from _cut_off(stimulus, observed, late_ns, (*path, "observe", "duration"), tree)
+    yield from _in_connections(connections, scenario, observed, path, tree)
+
+
+def _in_connections(
+    connections: Sequence[Connection], scenario: ScenarioShape, observed: Span, path: TreePath, tree: YamlTree
+) -> Iterator[Mistake]:
+    yield from _repeated([one.topic for one in connections], (*path, "connections"), tree, "topic")
+    published = [topic for shape in scenario.stimuli for topic in _published(build(shape))]
+    for number, one in enumerate(connections):
+        here = (*path, "connections", number)
+        yield from _unknown(one.topic, published, "a topic that a stimulus publishes on", tree.at((*here, "topic")))
+        yield from _too_late(one.delay_ns, observed, (*here, "delay"), tree, "a delay shorter than")
+        if not longest(one.delay_ns) and not one.lose:
+            yield tree.at(here).mistake("expected a `delay`, or a share of messages to `lose`, found neither")
+
+
+def _published(stimulus: Stimulus) -> Iterable[str]:
+    """Return the topics that a stimulus publishes on; none for a simulation that fails, which another rule tells."""
+    if isinstance(stimulus, Simulated):
+        with suppress(HarnessError):
+            return offered(stimulus).publishes
+    topic = getattr(stimulus, "topic", "")
+    return [topic] if topic else []
 
 
 def _is_yaml(name: str) -> bool:
@@ -152,9 +180,11 @@ def _in_run(process: str, options: RunShape, rubric: RubricShape, path: TreePath
             yield tree.at_key((*path, key)).mistake(text, "name launch files like robot.launch.py")
 
 
-def _too_late(start: Time, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+def _too_late(
+    start: Time, observed: Span, path: TreePath, tree: YamlTree, what: str = "a start before the end of"
+) -> Iterator[Mistake]:
     if longest(start) >= shortest(observed.duration_ns) and observed.after_first_message_on is None:
-        yield tree.at(path).mistake("expected a start before the end of `observe`")
+        yield tree.at(path).mistake(f"expected {what} `observe`")
 
 
 def _in_stimulus(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
@@ -166,9 +196,9 @@ def _in_stimulus(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlT
         yield tree.at((*path, "stop")).mistake("expected a stop after the start")
 
 
-def _cut_off(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
-    """Yield a mistake if, for some draw, a case is lost because the observation ends before it."""
-    time, needed_ns = observed.duration_ns, longest_course_ns(stimulus)
+def _cut_off(stimulus: Stimulus, observed: Span, late_ns: int, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    """Yield a mistake if, for some draw, the observation ends before a case comes; `late_ns` is its time on the way."""
+    time, needed_ns = observed.duration_ns, longest_course_ns(stimulus) + late_ns
     if (isinstance(time, TimeBetween) or is_open(stimulus)) and needed_ns > shortest(time):
         text = f"expected at least {duration(needed_ns)}, so that every case is played whatever is drawn, found "
         text += f"{'as little as ' if isinstance(time, TimeBetween) else ''}{duration(shortest(time))}"
@@ -493,6 +523,7 @@ def _scenario(path: Path, shape: ScenarioShape, limits: Limits, provided: Mappin
         processes=shape.processes,
         span=build(shape.observe),
         stimuli=tuple(_with_bag(path, build(stimulus)) for stimulus in shape.stimuli),
+        connections=build(shape.connections),
         limits=limits,
         starts_ns=tuple((name, build(shape.start[name])) for name in shape.processes if name in shape.start),
         may_exit=shape.may_exit,

@@ -14,6 +14,7 @@ from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S
 from grader.core.scenario import (
     ActionGoal,
+    Connection,
     MessageStream,
     NumberStream,
     RecordedStream,
@@ -83,9 +84,11 @@ def _stimulus_model(simulations: Mapping[str, type[Shape]]) -> type[Choice]:
 
 if TYPE_CHECKING:  # created at run time; pydantic reads those below
     LimitsShape = Shape
+    ConnectionShape = Shape
     ObserveShape = Shape
     StimulusShape = Choice
 else:
+    ConnectionShape = part_model(Connection, "ConnectionShape")
     LimitsShape = part_model(Limits, "LimitsShape", _LIMITS)
     ObserveShape = part_model(Span, "ObserveShape")
     StimulusShape = _stimulus_model({})
@@ -179,6 +182,9 @@ class ScenarioShape(Shape):
     processes: tuple[ProgramName, ...] = Field(min_length=1)
     observe: ObserveShape
     stimuli: tuple[StimulusShape, ...] = ()
+    connections: tuple[ConnectionShape, ...] = Field(
+        default=(), description="topics on which messages of stimuli are late or lost"
+    )
     start: dict[ProgramName, SomeLongTime] = Field(default={}, description="processes that start late")
     run: dict[ProgramName, RunShape] = Field(default={}, description="what processes are given when they are started")
     may_exit: Annotated[tuple[ProgramName, ...], Field(description="processes that are free to end by themselves")] = ()

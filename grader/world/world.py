@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import wraps
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, overload
 
@@ -31,7 +32,7 @@ from grader.core.trace import (
 )
 from grader.execution.exchanges import PlannedGoal
 from grader.execution.interfaces import built, plain_fields
-from grader.execution.plan import Plan, PlannedStart, derive, ros_arguments
+from grader.execution.plan import Plan, PlannedConnection, PlannedStart, derive, ros_arguments
 from grader.execution.recording_session import RecordingSession
 from grader.execution.serialization import (
     QoSProfile,
@@ -195,8 +196,6 @@ class World:
         self._is_real = self._clock is ClockKind.WALL
         self._near = tuple(near)
         self._seed = seed
-        self._delay = {_absolute(topic): between for topic, between in (delay or {}).items()}
-        self._lose = {_absolute(topic): share for topic, share in (lose or {}).items()}
         self._plan = Plan(
             scenario=name,
             processes=(),
@@ -211,6 +210,7 @@ class World:
             limits=OWN_LIMITS,
             drawn_order=drawn_order and not self._is_real,
             working=str(Path.cwd()),
+            connections=tuple(_connections(seed, delay or {}, lose or {})),
         )
         self._observations: list[Observation] = []
         self._messages: dict[str, list[Message]] = {}
@@ -435,7 +435,6 @@ class World:
         types = {interface for interface, _ in packed}
         if len(types) > 1:
             raise TypeError(f"{topic}: expected messages of one type, found {', '.join(sorted(types))}")
-        low, high = self._delay.get(topic, (0.0, 0.0))
         reliability, durability = qos_words(qos)
         command = Publish(
             topic,
@@ -444,8 +443,6 @@ class World:
             period_ns=0 if rate is None else round(NS_PER_S / rate),
             best_effort=reliability == "best_effort",
             latched=durability == "transient_local",
-            delay_ns=(round(low * NS_PER_S), round(high * NS_PER_S)),
-            loss=self._lose.get(topic, 0.0),
         )
         self._offers[topic] = Endpoint("publisher", topic, command.type, "the test", -1, reliability, durability)
         self._perform(command)
@@ -733,7 +730,7 @@ class World:
     @property
     def is_drawn(self) -> bool:
         """Whether anything in this run was drawn from its seed."""
-        return self._plan.drawn_order or bool(self._delay or self._lose)
+        return self._plan.drawn_order or bool(self._plan.connections)
 
     @property
     def problem(self) -> str:
@@ -824,6 +821,27 @@ def clock_named(name: str) -> ClockKind:
     if name not in [kind.value for kind in ClockKind]:
         raise ValueError(f"clock: expected virtual or wall, found {name!r}")
     return ClockKind(name)
+
+
+def _connections(
+    seed: int, delay: Mapping[str, tuple[float, float]], lose: Mapping[str, float]
+) -> Iterator[PlannedConnection]:
+    """Yield what happens to the messages of a test on their way; raises ValueError for what cannot be."""
+    delays = {_absolute(topic): between for topic, between in delay.items()}
+    shares = {_absolute(topic): share for topic, share in lose.items()}
+    for topic in dict.fromkeys((*delays, *shares)):
+        between, share = delays.get(topic, (0.0, 0.0)), shares.get(topic, 0.0)
+        if not (isinstance(between, (tuple, list)) and len(between) == 2 and _rising(0, *between)):
+            raise ValueError(f"delay: {topic}: expected the least and the most seconds, found {between!r}")
+        if not _rising(0, share, 1):
+            raise ValueError(f"lose: {topic}: expected a share from 0 to 1, found {share!r}")
+        delay_ns = round(between[0] * NS_PER_S), round(between[1] * NS_PER_S)
+        yield PlannedConnection(topic, delay_ns, share, derive(seed, "connection", topic))
+
+
+def _rising(*numbers: Any) -> bool:
+    """Return whether all of some values are numbers, and none is less than the one before it."""
+    return all(isinstance(one, (int, float)) for one in numbers) and all(a <= b for a, b in pairwise(numbers))
 
 
 def _absolute(name: str) -> str:

@@ -1,5 +1,6 @@
 """What a test sees is the same on both clocks, as long as it asks for neither exact times nor an order."""
 
+import re
 import time
 from collections.abc import Iterator
 from itertools import pairwise
@@ -192,6 +193,34 @@ def test_losses_and_delays(ros_session: Worlds, clock: str) -> None:
     assert heard[0] == heard[1]
     assert 0 < len(heard[0]) < 19
     assert heard[0] == sorted(set(heard[0]))
+
+
+def test_what_a_simulation_sends_is_lost_as_well(ros_session: Worlds, clock: str) -> None:
+    """It is on its way like what the test itself publishes."""
+    with ros_session.open(HERE, clock=clock, lose={"in": 1.0}) as ros:
+        ros.run("nodes/echo.py")
+        counter = ros.simulate(Counter())
+        ros.advance(0.2)
+        assert counter.steps > 0  # type: ignore[attr-defined]
+        assert ros.messages("/out") == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"lose": {"in": 1.5}}, "lose: /in: expected a share from 0 to 1, found 1.5"),
+        ({"lose": {"/in": -1}}, "lose: /in: expected a share from 0 to 1, found -1"),
+        ({"lose": {"/in": "all"}}, "lose: /in: expected a share from 0 to 1, found 'all'"),
+        ({"delay": {"/in": (0.2, 0.1)}}, "delay: /in: expected the least and the most seconds, found (0.2, 0.1)"),
+        ({"delay": {"/in": (-0.1, 0.1)}}, "delay: /in: expected the least and the most seconds, found (-0.1, 0.1)"),
+        ({"delay": {"/in": 0.1}}, "delay: /in: expected the least and the most seconds, found 0.1"),
+        ({"delay": {"/in": ("a", "b")}}, "delay: /in: expected the least and the most seconds, found ('a', 'b')"),
+    ],
+)
+def test_an_absurd_connection_is_told(ros_session: Worlds, options: dict[str, object], words: str) -> None:
+    """With the topic and what was expected."""
+    with pytest.raises(ValueError, match=re.escape(words)), ros_session.open(HERE, **options):  # type: ignore[arg-type]
+        pass
 
 
 def test_a_clock_that_is_not_there(ros_session: Worlds) -> None:
