@@ -5,9 +5,10 @@ It is loaded wherever the package is installed, and imports nothing of ROS befor
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Generator, Iterator
-from contextlib import ExitStack
 from pathlib import Path
+from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 _OPTIONS = ("clock", "seed", "seeds", "delay", "lose")
 #: The clocks that a test may run on.
 _CLOCKS = ("virtual", "wall")
+#: Where the grader's own code lies, which the traceback of a failure leaves out.
+_GRADER = Path(__file__).parent
 _WORLD: pytest.StashKey[World] = pytest.StashKey()
 _SHARED: pytest.StashKey[str] = pytest.StashKey()
 _OF_WORKER = "ros_shared"
@@ -74,7 +77,7 @@ def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
     from grader.core.errors import EnvironmentFault  # noqa: PLC0415 - no other test waits for it
     from grader.world.opening import open_worlds  # noqa: PLC0415 - the same
 
-    with ExitStack() as stack:
+    with contextlib.ExitStack() as stack:
         try:
             worlds = stack.enter_context(open_worlds(pytestconfig.rootpath))
         except EnvironmentFault as fault:
@@ -123,6 +126,9 @@ def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Keep the recording of a test that has failed, and the page that plays it, and name them in the failure."""
+    uses_worlds = "ros_session" in getattr(item, "fixturenames", ())
+    if uses_worlds and call.excinfo is not None and not item.config.getoption("fulltrace"):
+        call.excinfo = pytest.ExceptionInfo.from_exception(_of_test(call.excinfo.value, item.path))
     report = yield
     world = item.stash.get(_WORLD, None)
     if world is not None and call.when == "call" and report.failed and call.excinfo is not None:
@@ -133,6 +139,23 @@ def pytest_runtest_makereport(
         report.sections.append(("ros", "\n".join(lines)))
         item.user_properties += [("ros", line) for line in lines]  # which files for JUnit hold
     return report
+
+
+def _of_test(error: BaseException, path: Path) -> BaseException:
+    """Return an error whose traceback leaves out the grader's frames, if it has any of the test's file."""
+    entries: list[TracebackType] = []
+    entry = error.__traceback__
+    while entry is not None:
+        file = entry.tb_frame.f_code.co_filename
+        if file != contextlib.__file__ and not Path(file).is_relative_to(_GRADER):
+            entries.append(entry)
+        entry = entry.tb_next
+    if not any(entry.tb_frame.f_code.co_filename == str(path) for entry in entries):
+        return error
+    found: TracebackType | None = None
+    for entry in reversed(entries):
+        found = TracebackType(found, entry.tb_frame, entry.tb_lasti, entry.tb_lineno)
+    return error.with_traceback(found)
 
 
 def _kept(item: Any, world: World, failure: pytest.ExceptionInfo[BaseException]) -> Iterator[str]:

@@ -36,13 +36,13 @@ from grader.execution.plan import Plan, PlannedConnection, PlannedStart, derive,
 from grader.execution.recording_session import RecordingSession
 from grader.execution.serialization import (
     QoSProfile,
-    action_type,
     parameter_message,
     qos_words,
     read,
     serialized,
     service_type,
     type_name,
+    type_of_part,
 )
 from grader.execution.shares import install_shares
 from grader.execution.stepping import SteppedRun
@@ -466,7 +466,10 @@ class World:
         """
         __tracebackhide__ = True
         name = _absolute(name)
-        interface = type_name(type)
+        interface = type_name(type, "srv")
+        known = self._functions.get(name)
+        if known is not None and type_name(known[0]) != interface:
+            raise ValueError(f"{name}: expected {type_name(known[0])}, as it is served already, found {interface}")
         self._functions[name] = (service_type(interface), function)
         self._perform(Serve(name, interface))
 
@@ -483,8 +486,7 @@ class World:
         """
         __tracebackhide__ = True
         name = _absolute(name)
-        interface = type_name(type(request))
-        kind = service_type(interface)
+        interface, kind = type_of_part(request, "Request", name)
         since_ns, seen = self._begin_ns(), len(self._observations)
         told = self._perform(Call(name, interface, plain_fields(request)))
 
@@ -515,8 +517,7 @@ class World:
         """
         __tracebackhide__ = True
         name = _absolute(name)
-        interface = type_name(type(goal))
-        kind = action_type(interface)
+        interface, kind = type_of_part(goal, "Goal", name)
         self._goals += 1
         uuid = tuple(bytes.fromhex(derive(self._seed, "goal", str(self._goals))[:32]))
         after_ns = 0 if cancel_after is None else max(1, round(cancel_after * NS_PER_S))

@@ -8,6 +8,8 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+import grader
+
 NODES = Path(__file__).parent / "nodes"
 
 pytestmark = pytest.mark.ros
@@ -70,14 +72,53 @@ def test_a_failure_leaves_its_recording_and_a_page(suite: pytest.Pytester) -> No
 
 
 MISSING = """
+import pytest
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
 def test_it(ros):
     ros.run("ehco.py")
+
+def test_a_class(ros):
+    ros.publish("/in", String)
+
+def test_a_block(ros):
+    with ros.expects_failure():
+        ros.advance(1.0)
+
+def test_a_function_of_the_test(ros):
+    def answer(request):
+        return request.missing
+    ros.serve("/allowed", Trigger, answer)
+    ros.run("switch.py")
+    ros.call("/enable", __import__("std_srvs.srv").srv.SetBool.Request())
+
+@pytest.fixture
+def echo(ros_session, request):
+    with ros_session.open(request.path.parent) as ros:
+        yield ros
+
+def test_a_world_of_a_fixture(echo):
+    echo.publish("/in", String())
+    echo.advance(-1)
 """
 
 
 def test_a_mistake_in_a_test_is_shown_at_its_line_with_a_hint(suite: pytest.Pytester) -> None:
-    """A file that is not there; nothing of the grader's own code is shown."""
+    """A file that is not there, or an object of a wrong class; nothing of the grader's own code is shown."""
     text = run(suite, MISSING).stdout.str()
+    for line, error in (
+        ('ros.publish("/in", String)', "TypeError: /in: expected a message, found the class String; write String()"),
+        ("with ros.expects_failure():", "AssertionError: expected that a program fails, but none did"),
+        ("return request.missing", "AttributeError: 'Trigger_Request' object has no attribute 'missing'"),
+        ("echo.advance(-1)", "ValueError: expected seconds to advance, found -1: time does not go back"),
+    ):
+        assert f">       {line}" in text
+        assert f"E       {error}" in text
+    assert str(Path(grader.__file__).parent) not in text
+    assert "contextlib.py" not in text
+    whole = run(suite, MISSING, "--full-trace", "-k", "class").stdout.str()
+    assert str(Path(grader.__file__).parent) in whole
     assert '>       ros.run("ehco.py")' in text
     assert "SubmissionError: ehco.py: expected a file, found none" in text
     assert "hint: did you mean echo.py?" in text
