@@ -57,6 +57,7 @@ class Worlds:
         world = World(self.session, folders, clock=clock, seed=seed or 0, name=name, **drawn)  # type: ignore[arg-type]
         try:
             yield world
+            world.finish()
         finally:
             world.close()
 

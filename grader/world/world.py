@@ -545,7 +545,8 @@ class World:
             return found
         accepted = self._response(seen, f"{name}/_action/send_goal", sent)
         why = "it has accepted the goal" if accepted is not None else "it has not answered the goal"
-        offered = any(f"{name}/_action/send_goal" == offer.name for offer in self.trace().of(Offer))
+        servers = [one.service for one in telling.service_ends(self._graph, "service")]
+        offered = f"{name}/_action/send_goal" in (*servers, *(offer.name for offer in self.trace().of(Offer)))
         first = {"the action": [why if offered else f"nobody offers the action {name}"]}
         raise StepTimeout(self._timeout(f"{name} gave no result", since_ns, first))
 
@@ -673,6 +674,7 @@ class World:
         self._expected.append(failure)
         try:
             yield failure
+            self._catch_up()  # what was started last comes up in this block
         finally:
             self._expected.remove(failure)
         if failure.fault is None:
@@ -738,6 +740,15 @@ class World:
         """Why what happened may be untrue, once the world is closed; empty if it is not."""
         clock = "the wall clock" if self._is_real else "virtual time"
         return f"{clock} does not suit these programs: {self._unsuitable}" if self._unsuitable else ""
+
+    def finish(self) -> None:
+        """Let the programs come up that were started last, so that none fails unnoticed.
+
+        Raises:
+            ProgramFailed: One has failed.
+        """
+        __tracebackhide__ = True
+        self._catch_up()
 
     def close(self) -> None:
         """End all programs, and the run; what was observed can still be looked at."""

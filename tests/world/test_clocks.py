@@ -175,6 +175,11 @@ def test_an_action(ros: World, tmp_path: Path) -> None:
     outcome = ros.send_goal("/fibonacci", Fibonacci.Goal(order=4), timeout=PATIENCE)
     assert (outcome.accepted, outcome.status, list(outcome.result.sequence)) == (True, 4, [0, 1, 1, 2, 3])
     assert len(outcome.feedback) == 3
+    with pytest.raises(StepTimeout, match="nobody offers the action /fibonaci"):
+        ros.send_goal("/fibonaci", Fibonacci.Goal(order=4), timeout=0.1)
+    if ros.trace().clock is ClockKind.WALL:  # it knows the server from the graph, not from the program
+        with pytest.raises(StepTimeout, match=r"it has (not answered|accepted) the goal"):
+            ros.send_goal("/fibonacci", Fibonacci.Goal(order=600), timeout=0.1)
 
 
 def test_losses_and_delays(ros_session: Worlds, clock: str) -> None:

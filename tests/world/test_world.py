@@ -507,3 +507,14 @@ def test_a_type_that_is_not_installed_leaves_the_world_usable(ros: World) -> Non
     ros.publish("/in", String(data="on"))
     ros.advance(0.1)
     assert [m.data for m in ros.messages("/out")] == ["on"]
+
+
+@pytest.mark.parametrize("seed", [None, 3])
+def test_no_failure_at_the_start_is_missed(ros_session: Worlds, write: Write, seed: int | None) -> None:
+    """With a seed, programs come up with the next step: at the end of a block, or of the test, at the latest."""
+    bad = write("raise ValueError('at once')\n")
+    with ros_session.open(seed=seed) as ros, ros.expects_failure("ValueError: at once") as failure:
+        ros.run(bad)
+    assert failure.program is not None
+    with pytest.raises(ProgramFailed, match="ValueError: at once"), ros_session.open(seed=seed) as ros:
+        ros.run(bad)
