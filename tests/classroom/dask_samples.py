@@ -10,6 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from grader import __version__
 from grader.classroom import store as kept
 from grader.classroom.local import Task
 from grader.classroom.messages import Fitness, GradingJob, JobResult, pack, unpack
@@ -80,7 +81,7 @@ class FakeClient:
         threads: dict[str, int] | None = None,
         versions: Mapping[str, Any] | None = None,
         fitness: Mapping[str, Any] | None = None,
-        scheduler: PackageNotFoundError | str = "0.1.0",
+        scheduler: PackageNotFoundError | str = __version__,
     ) -> None:
         self.answers = answers or (lambda name, only: graded(name))
         self.threads = {ONE: 1, TWO: 1} if threads is None else threads
@@ -108,7 +109,7 @@ class FakeClient:
     ) -> dict[str, Any]:
         assert on_error == "return"
         if function.__name__ == "version":
-            return {w: self.versions.get(w, "0.1.0") for w in workers}
+            return {w: self.versions.get(w, __version__) for w in workers}
         found = {w: self.fitness.get(w, Fitness(f"worker {w} on lab")) for w in workers}
         return {w: pack(fit) if isinstance(fit, Fitness) else fit for w, fit in found.items()}
 

@@ -123,7 +123,7 @@ def test_what_the_cluster_loses_is_sent_again(tmp_path: Path, trouble: ImportErr
 
 def test_submissions_of_workers_that_are_gone_go_elsewhere(tmp_path: Path) -> None:
     """Also where they were bound to them, because others could not grade."""
-    client = FakeClient(versions={TWO: "0.2.0"}, threads={ONE: 1, TWO: 1})
+    client = FakeClient(versions={TWO: "0.0.1"}, threads={ONE: 1, TWO: 1})
 
     def answers(name: str, only: Sequence[str]) -> JobResult | str:
         if only == [ONE] and name == "bob":

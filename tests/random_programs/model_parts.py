@@ -69,11 +69,11 @@ class TimerModel:
         return not self.cancelled and self.next <= self.world.now
 
     def call(self) -> None:
-        """Move on by a period, and beyond what has been missed."""
+        """Move on by a period, and beyond what has been missed. In rcl 9.2, that includes a call that is due now."""
         self.next += self.period
         behind = self.world.now - self.next
-        if behind > 0:
-            self.next += -(-behind // self.period) * self.period
+        if behind >= 0:
+            self.next += (behind // self.period + 1) * self.period
 
     def reset(self) -> None:
         self.next, self.cancelled = self.world.now + self.period, False
