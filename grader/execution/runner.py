@@ -201,8 +201,8 @@ class Runner(ABC):
         transit = self._transits.get(event.topic) if isinstance(event, TopicEvent) else None
         if transit is None:
             return event
-        if isinstance(event, (*APPEARANCES, Disappear)):  # a publisher leaves after its last message has arrived
-            return replace(event, t_ns=max(event.t_ns, transit.arrived_ns))
+        if isinstance(event, (*APPEARANCES, Disappear)):
+            return replace(event, t_ns=max(event.t_ns, transit.over_ns))
         arrives_ns = transit.arrives_ns(event.t_ns)
         return None if arrives_ns is None else replace(event, t_ns=arrives_ns)
 

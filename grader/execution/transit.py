@@ -11,13 +11,14 @@ class Transit:
     """The way of the messages of a topic; none overtakes another.
 
     Attributes:
-        arrived_ns: When the latest message of those that were sent so far arrives; 0 if none has been sent.
+        over_ns: When all messages that were sent so far have arrived, and their publisher may leave: one that left at
+            the instant of a message would take it along.
     """
 
     def __init__(self, connection: PlannedConnection) -> None:
         self._connection = connection
         self._draw = random.Random(connection.seed)  # noqa: S311 - it has to repeat
-        self.arrived_ns = 0
+        self.over_ns = 0
 
     def arrives_ns(self, sent_ns: int) -> int | None:
         """Draw when the next message arrives; None if it is lost."""
@@ -26,5 +27,6 @@ class Transit:
         share, delay_ns = self._draw.random(), least_ns + round((most_ns - least_ns) * self._draw.random())
         if share < self._connection.lose:
             return None
-        self.arrived_ns = max(self.arrived_ns, sent_ns + delay_ns)
-        return self.arrived_ns
+        arrives_ns = max(self.over_ns - 1, sent_ns + delay_ns)
+        self.over_ns = arrives_ns + 1
+        return arrives_ns

@@ -75,11 +75,11 @@ def grade(folder: Path, program: str, name: str, rubric: str = RUBRIC, seed: int
     return report.read_bytes(), evidence
 
 
-def arrivals(evidence: Path) -> list[tuple[int, float]]:
-    """Return what the program was given on /target: milliseconds since the first one was sent, and the number."""
+def arrivals(evidence: Path, topic: str = "/target") -> list[tuple[int, float]]:
+    """Return the messages on a topic: milliseconds since the recording began, and the number."""
     (recording,) = [path for path in evidence.iterdir() if path.is_dir()]
     with AnyReader([recording]) as reader:
-        chosen = [c for c in reader.connections if c.topic == "/target"]
+        chosen = [c for c in reader.connections if c.topic == topic]
         found = [(at, reader.deserialize(raw, c.msgtype).data) for c, at, raw in reader.messages(chosen)]
         return [((at - reader.start_time) // 1_000_000, data) for at, data in found]
 
@@ -111,3 +111,23 @@ def test_without_the_condition_both_keep_it(tmp_path: Path) -> None:
     rubric = perfect + rest[rest.index("criteria:") :]
     report, _ = grade(tmp_path, ECHOES, "echoes", rubric)
     assert json.loads(report)["score"] == 1
+
+
+TWO_STREAMS = """\
+    stimuli:
+      - messages:
+          {topic: /target, type: std_msgs/msg/Float64, start: 2 s, stop: 3 s,
+           period: 200 ms, values: [{data: 1}], repeats: 4}
+      - messages:
+          {topic: /target, type: std_msgs/msg/Float64, period: 200 ms, start: 3100 ms, values: [{data: 2}], repeats: 4}
+"""
+
+
+@pytest.mark.parametrize("delay", ["", "    connections: [{topic: /target, delay: 800 ms}]\n"], ids=["at once", "late"])
+def test_a_publisher_leaves_after_its_last_message(tmp_path: Path, delay: str) -> None:
+    """Also if another one follows on the topic before: every message arrives."""
+    head, _, rest = RUBRIC.partition("    stimuli:")
+    rubric = head.replace("10 s", "5 s") + TWO_STREAMS + delay + rest[rest.index("criteria:") :]
+    _, evidence = grade(tmp_path, ECHOES, "echoes", rubric)
+    for topic in ("/target", "/command"):
+        assert [data for _, data in arrivals(evidence, topic)] == [1.0] * 4 + [2.0] * 4
