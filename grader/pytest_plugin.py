@@ -5,14 +5,14 @@ It is loaded wherever the package is installed, and imports nothing of ROS befor
 
 from __future__ import annotations
 
+import contextlib
 import re
 import sys
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import ExitStack
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -22,7 +22,11 @@ if TYPE_CHECKING:
     from grader.world.world import World
 
 #: What `@pytest.mark.ros` takes.
-_OPTIONS = ("seed", "seeds", "delay", "lose")
+_OPTIONS = ("clock", "seed", "seeds", "delay", "lose")
+#: The clocks that a test may run on.
+_CLOCKS = ("virtual", "wall")
+#: Where the grader's own code lies, which the traceback of a failure leaves out.
+_GRADER = Path(__file__).parent
 _WORLD: pytest.StashKey[World] = pytest.StashKey()
 _SHARED: pytest.StashKey[str] = pytest.StashKey()
 _OF_WORKER = "ros_shared"
@@ -34,10 +38,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of the command line."""
     group = parser.getgroup("ros", "nodes in virtual time")
     group.addoption(
+        "--ros-clock",
+        choices=_CLOCKS,
+        default="virtual",
+        help="the clock of tests whose marker does not name one: virtual time, or the wall clock, on which they take "
+        "as long as they say and no order is drawn",
+    )
+    group.addoption(
         "--ros-seed",
         type=int,
         metavar="N",
-        help="draw the order of programs that are ready at the same time, delays and losses from this seed",
+        help="draw from this seed the order of programs and callbacks that are ready at one instant, delays and losses",
     )
 
 
@@ -45,9 +56,9 @@ def pytest_configure(config: pytest.Config) -> None:
     """Describe the marker."""
     config.addinivalue_line(
         "markers",
-        "ros(seed=N, seeds=COUNT, delay={topic: (least, most)}, lose={topic: share}): "
-        "options of the fixture `ros`: the seed of everything drawn, the number of seeds to run the test with, "
-        "seconds that messages of the test are on their way, and the share of them that is lost",
+        "ros(clock='virtual' or 'wall', seed=N, seeds=COUNT, delay={topic: (least, most)}, lose={topic: share}): "
+        "options of the fixture `ros`: the clock, the seed of everything drawn, the number of seeds to run the test "
+        "with, seconds that messages of the test are on their way, and the share of them that is lost",
     )
     config.addinivalue_line(
         "markers",
@@ -117,9 +128,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Run a test that is marked with `seeds` once for each of them."""
     if "_ros_seed" not in metafunc.fixturenames:
         return
-    seeds = _options(metafunc.definition).get("seeds")
+    options = _options(metafunc.definition)
+    seeds = options.get("seeds")
     chosen = metafunc.config.getoption("--ros-seed")
-    if seeds is not None and chosen is None:
+    # on the wall clock one run stands for all: there is no order that a seed could draw
+    if seeds is not None and chosen is None and _clock(metafunc.config, options) == "virtual":
         metafunc.parametrize("_ros_seed", range(seeds), ids=[f"seed{number}" for number in range(seeds)])
 
 
@@ -132,7 +145,7 @@ def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
     from grader.core.errors import EnvironmentFault  # noqa: PLC0415 - no other test waits for it
     from grader.world.opening import open_worlds  # noqa: PLC0415 - the same
 
-    with ExitStack() as stack:
+    with contextlib.ExitStack() as stack:
         try:
             worlds = stack.enter_context(open_worlds(pytestconfig.rootpath))
         except EnvironmentFault as fault:
@@ -163,6 +176,7 @@ def ros(
     options = _options(request.node)
     opened = ros_session.open(
         request.path.parent,
+        clock=_clock(request.config, options),
         seed=_ros_seed,
         name=request.node.name,
         delay=options.get("delay"),
@@ -180,15 +194,36 @@ def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Keep the recording of a test that has failed, and the page that plays it, and name them in the failure."""
+    uses_worlds = "ros_session" in getattr(item, "fixturenames", ())
+    if uses_worlds and call.excinfo is not None and not item.config.getoption("fulltrace"):
+        call.excinfo = pytest.ExceptionInfo.from_exception(_of_test(call.excinfo.value, item.path))
     report = yield
     world = item.stash.get(_WORLD, None)
     if world is not None and call.when == "call" and report.failed and call.excinfo is not None:
         del item.stash[_WORLD]  # the fixture has nothing to add
-        drawn = [f"seed {world.seed}: repeat it with --ros-seed {world.seed}"] if world.is_drawn else []
+        repeating = "repeat it with" if world.repeats else "the same delays and losses are drawn with"
+        drawn = [f"seed {world.seed}: {repeating} --ros-seed {world.seed}"] if world.is_drawn else []
         lines = [*drawn, *_kept(item, world, call.excinfo)]
         report.sections.append(("ros", "\n".join(lines)))
         item.user_properties += [("ros", line) for line in lines]  # which files for JUnit hold
     return report
+
+
+def _of_test(error: BaseException, path: Path) -> BaseException:
+    """Return an error whose traceback leaves out the grader's frames, if it has any of the test's file."""
+    entries: list[TracebackType] = []
+    entry = error.__traceback__
+    while entry is not None:
+        file = entry.tb_frame.f_code.co_filename
+        if file != contextlib.__file__ and not Path(file).is_relative_to(_GRADER):
+            entries.append(entry)
+        entry = entry.tb_next
+    if not any(entry.tb_frame.f_code.co_filename == str(path) for entry in entries):
+        return error
+    found: TracebackType | None = None
+    for entry in reversed(entries):
+        found = TracebackType(found, entry.tb_frame, entry.tb_lasti, entry.tb_lineno)
+    return error.with_traceback(found)
 
 
 def _kept(item: Any, world: World, failure: pytest.ExceptionInfo[BaseException]) -> Iterator[str]:
@@ -223,4 +258,15 @@ def _options(item: Any) -> dict[str, Any]:
         if unknown or marker.args:
             found = unknown[0] if unknown else repr(marker.args[0])
             raise pytest.UsageError(f"@pytest.mark.ros: expected {', '.join(_OPTIONS)} by name, found {found}")
+    if (clock := options.get("clock", "virtual")) not in _CLOCKS:
+        raise pytest.UsageError(f"@pytest.mark.ros: clock: expected {' or '.join(_CLOCKS)}, found {clock!r}")
+    if clock == "wall" and "seeds" in options:
+        text = "seeds draws the order of what is ready, which the wall clock leaves to chance"
+        raise pytest.UsageError(f"@pytest.mark.ros: {text}: write seed=N to draw delays and losses, or clock='virtual'")
     return options
+
+
+def _clock(config: pytest.Config, options: dict[str, Any]) -> str:
+    """Return the clock of a test: that of its marker, or else that of the command line."""
+    clock: str = options.get("clock") or config.getoption("--ros-clock")
+    return clock

@@ -14,7 +14,7 @@ from grader.core.errors import GraderError
 from grader.core.exercise import Criterion, Exercise
 from grader.core.quantities import Unit, duration
 from grader.core.report import CheckExplanation, CriterionExplanation, Parameter
-from grader.core.scenario import Scenario
+from grader.core.scenario import Connection, Scenario
 from grader.judging.run_check import check_name
 from grader.rubrics.check_parameters import Manual, manual_of
 from grader.rubrics.draws import First
@@ -155,7 +155,14 @@ def _situation(scenario: Scenario) -> str:
     if span.after_first_message_on:
         text += f" from the first message on {span.after_first_message_on} on"
         text += f", which is waited for at most {duration(span.wait_at_most_ns)}"
-    return "; ".join([text, *(stimulus.phrase() for stimulus in scenario.stimuli)])
+    told = (stimulus.phrase() for stimulus in scenario.stimuli)
+    return "; ".join([text, *told, *map(_connection, scenario.connections)])
+
+
+def _connection(connection: Connection) -> str:
+    late = f"arrive {time_phrase(connection.delay_ns)} late" if connection.delay_ns else ""
+    lost = f"{connection.lose:.0%} of them do not arrive" if connection.lose else ""
+    return f"messages on {connection.topic}: {', '.join(filter(None, (late, lost)))}"
 
 
 def unknown(

@@ -258,6 +258,16 @@ class RubricTest:
 
 
 @dataclass(frozen=True, slots=True)
+class Connection:
+    """What happens to the messages of stimuli on a topic, on their way to the student's nodes."""
+
+    topic: Topic  # topic name, absolute
+    # How long a message is on its way. If this is drawn, each message gets its own time; none overtakes another
+    delay_ns: Time = 0
+    lose: Annotated[float, Kind("share")] = 0.0  # the share of messages that do not arrive, drawn for each
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """One situation that is recorded once."""
 
@@ -274,6 +284,7 @@ class Scenario:
     run: tuple[tuple[str, RunOptions], ...] = ()  # `(process, options)` of processes that are started with some
     provided: tuple[tuple[str, str], ...] = ()  # name and text of the rubric's own files that this scenario uses
     test: RubricTest | None = None  # the test that runs the programs it needs; None if all are run as planned
+    connections: tuple[Connection, ...] = ()  # topics on which messages of stimuli are late or lost, each once
 
     @property
     def handed_in(self) -> tuple[str, ...]:

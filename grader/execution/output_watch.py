@@ -18,11 +18,13 @@ class OutputWatch:
     Args:
         students: The processes, which have been started.
         wake: Called, in the thread, until what was noticed has been read.
+        also: Descriptors of others that the runner reads from.
     """
 
-    def __init__(self, students: Sequence[NodeProcess], wake: Callable[[], None]) -> None:
+    def __init__(self, students: Sequence[NodeProcess], wake: Callable[[], None], also: Sequence[int] = ()) -> None:
         self._students = students
         self._wake = wake
+        self._also = also
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="outputs", daemon=True)
 
@@ -37,9 +39,9 @@ class OutputWatch:
     def _watch(self) -> None:
         while not self._over.is_set():
             ready = select.poll()
-            for student in self._students:
-                for descriptor in student.descriptors():
-                    ready.register(descriptor, select.POLLIN)
+            of_students = (descriptor for student in self._students for descriptor in student.descriptors())
+            for descriptor in (*self._also, *of_students):
+                ready.register(descriptor, select.POLLIN)
             if ready.poll(WAIT_MS):
                 self._wake()
                 self._over.wait(PAUSE_S)

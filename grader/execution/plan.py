@@ -14,7 +14,7 @@ from grader.core.dataclass import dataclass
 from grader.core.limits import Limits
 from grader.core.projects import Project
 from grader.core.quantities import NS_PER_S
-from grader.core.scenario import Event, Planned, RunOptions, Scenario, is_launch_file
+from grader.core.scenario import Event, Planned, RunOptions, Scenario, is_launch_file, longest, shortest
 from grader.core.trace import Endpoint
 from grader.stimuli import KINDS
 from grader.stimuli.drawing import Draws, drawn_time
@@ -30,6 +30,23 @@ if TYPE_CHECKING:
 #: which Linux allows 128 KiB (MAX_ARG_STRLEN, execve(2)); a large parameter file of a course has 10.
 MOST_START_CHARACTERS = 64 << 10
 Kind = TypeVar("Kind", bound=Planned)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedConnection:
+    """What happens to the messages of stimuli on a topic, on their way to the processes.
+
+    Attributes:
+        topic: Its absolute name.
+        delay_ns: Least and most time on the way; each message draws its own.
+        lose: The share of messages that are lost.
+        seed: Hex; what is drawn in the run follows from it.
+    """
+
+    topic: str
+    delay_ns: tuple[int, int]
+    lose: float
+    seed: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,11 +124,12 @@ class Plan:
         prefixes: The AMENT_PREFIX_PATH of the nodes, first the folder of what the submission's packages share; empty if
             it has none.
         projects: The ROS packages of the submission, outermost first.
-        drawn_order: Whether the order in which processes run that are ready at one instant follows from the seed;
-            otherwise it is that of the plan.
+        drawn_order: Whether the order in which processes run that are ready at one instant follows from the seed, and
+            that of their callbacks; otherwise it is that of the plan, and of rclpy.
         working: The absolute folder in which the processes start, which then run their files where these lie; empty to
             give each copies and a folder of its own.
         environment: Further variables of the processes.
+        connections: The topics on which messages are late or lost.
     """
 
     scenario: str
@@ -142,6 +160,7 @@ class Plan:
     drawn_order: bool = False
     working: str = ""
     environment: tuple[tuple[str, str], ...] = ()
+    connections: tuple[PlannedConnection, ...] = ()
 
     def of(self, kind: type[Kind]) -> tuple[Kind, ...]:
         """Return the stimuli of a kind."""
@@ -238,6 +257,15 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         shutdown_ns=scenario.shutdown_ns,
         starts=tuple(start for name in scenario.processes if (start := _start(name, scenario, submission)) is not None),
         projects=submission.projects,
+        connections=tuple(
+            PlannedConnection(
+                one.topic,
+                (shortest(one.delay_ns), longest(one.delay_ns)),
+                one.lose,
+                derive(seed, *purposes, "connection", one.topic),
+            )
+            for one in scenario.connections
+        ),
     )
 
 

@@ -18,9 +18,10 @@ from grader.execution.simulations import Simulations
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import TopicPeers
 from grader.execution.trace_recorder import TraceRecorder
+from grader.execution.transit import Transit
 from grader.simulation.participant import Moment
 from grader.stimuli.calls import AddClients, Ask, PlannedCalls
-from grader.stimuli.events import TopicEvent, in_order
+from grader.stimuli.events import Disappear, TopicEvent, in_order
 from grader.stimuli.server import AddServer, RemoveServer, Respond
 from grader.stimuli.simulation import Step
 
@@ -47,8 +48,10 @@ class Runner(ABC):
         self._stop_ns = 0
         self._starts_ns = dict(plan.starts_ns)
         self._simulations = Simulations(plan)
+        self._transits = {connection.topic: Transit(connection) for connection in plan.connections}
         # Simulations last: of two events at one instant, that of the plan comes first.
-        self._due = in_order([*plan.events(), *self._simulations.events()])
+        planned = in_order([*plan.events(), *self._simulations.events()])
+        self._due = in_order(arrived for event in planned if (arrived := self._arrival(event)) is not None)
         participants = max(plan.limits.participants, len(plan.processes))  # each process needs one
         self._recorder = TraceRecorder(replace(plan.limits, participants=participants))
         self._services = ServicePeers(
@@ -167,7 +170,8 @@ class Runner(ABC):
         # Not after the end: a simulation would go on reacting to nodes that are about to leave.
         if self._simulations.exist and not (self._recorder.full or self._stop_ns):
             for event in self._simulations.hear(taken, self._moment(now_ns)):
-                self._later(event)
+                if (arrived := self._arrival(event)) is not None:
+                    self._later(arrived)
 
     def _simulated(self, now_ns: int, service: str, request: Mapping[str, Any]) -> Mapping[str, Any] | None:
         """Return the response to a request at a time; None if nothing but the plan says what it is."""
@@ -190,6 +194,24 @@ class Runner(ABC):
         # To the right of what is due at the same time: causes before effects.
         bisect.insort(self._due, event, key=lambda e: e.t_ns)
 
+    def _arrival(self, event: Event) -> Event | None:
+        """Return an event as it reaches the processes; None for a message that is lost on the way."""
+        transit = self._transits.get(event.topic) if isinstance(event, TopicEvent) else None
+        if transit is None:
+            return event
+        if event.creates or isinstance(event, Disappear):
+            return replace(event, t_ns=max(event.t_ns, transit.over_ns))
+        arrives_ns = transit.arrives_ns(event.t_ns)
+        return None if arrives_ns is None else replace(event, t_ns=arrives_ns)
+
+    def _send(self, event: Event, now_ns: int) -> None:
+        """Execute an event when it reaches the processes, which may be now."""
+        arrived = self._arrival(event)
+        if arrived is not None and arrived.t_ns > now_ns:
+            self._later(arrived)
+        elif arrived is not None:
+            self._do(arrived, now_ns)
+
     def _do(self, event: Event, now_ns: int) -> None:
         """Execute one event of a stimulus."""
         if isinstance(event, TopicEvent):
@@ -197,7 +219,7 @@ class Runner(ABC):
         elif isinstance(event, Step):
             *published, following = self._simulations.step(event, self._moment(event.t_ns))
             for message in published:
-                self._do(message, now_ns)
+                self._send(message, now_ns)
             self._later(following)
         elif isinstance(event, AddServer):
             self._services.add_server(now_ns, event.server)

@@ -6,7 +6,7 @@ context, no node and no ROS domain.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from grader.core.errors import HarnessError
@@ -21,21 +21,26 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy  # noqa: E402
 from rclpy.qos import QoSProfile as QoSProfile  # noqa: E402, PLC0414 - whoever publishes may give one
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 
+#: The kinds of interfaces.
+_KINDS = {"msg": "message", "srv": "service", "action": "action"}
 
-def type_name(kind: Any) -> str:
+
+def type_name(kind: Any, *wanted: str) -> str:
     """Return the name of a message, service or action type, such as `std_msgs/msg/String`.
 
     Args:
         kind: Its class, or that of a request, a response, a goal or a result.
+        wanted: The kinds of interfaces that it may be of, `msg`, `srv` or `action`; any without one.
 
     Raises:
-        TypeError: It is the class of no interface.
+        TypeError: It is the class of no such interface.
     """
     parts = getattr(kind, "__module__", "").split(".")
     name = getattr(kind, "__name__", "")
-    if not isinstance(kind, type) or len(parts) < 2 or parts[1] not in ("msg", "srv", "action"):
+    if not isinstance(kind, type) or len(parts) < 2 or parts[1] not in (wanted or _KINDS):
         shown = name or type(kind).__name__
-        raise TypeError(f"expected the class of a ROS message, service or action, found {shown}")
+        kinds = " or ".join(_KINDS[one] for one in wanted or _KINDS)
+        raise TypeError(f"expected the class of a ROS {kinds}, found {shown}")
     return f"{parts[0]}/{parts[1]}/{name if parts[1] == 'msg' else name.partition('_')[0]}"
 
 
@@ -44,10 +49,37 @@ def serialized(message: Any, where: str) -> tuple[str, bytes]:
     if isinstance(message, type):
         raise TypeError(f"{where}: expected a message, found the class {message.__name__}; write {message.__name__}()")
     try:
-        interface = type_name(type(message))
-    except TypeError as error:
-        raise TypeError(f"{where}: expected a ROS message, found {type(message).__name__}") from error
+        interface = type_name(type(message), "msg")
+    except TypeError:
+        raise TypeError(f"{where}: expected a ROS message, found {type(message).__name__}") from None
     return interface, without_padding(bytes(serialize_message(message)), type(message))
+
+
+def type_of_part(value: Any, part: str, where: str) -> tuple[str, Any]:
+    """Return name and class of the service type of a request, or of the action type of a goal.
+
+    Args:
+        value: The message.
+        part: `Request` or `Goal`.
+        where: The name of the service or action, for messages.
+
+    Raises:
+        TypeError: It is nothing of the kind.
+        HarnessError: Its type is not installed.
+    """
+    kind, find, example = _PARTS[part]
+    found = f"the class {value.__name__}" if isinstance(value, type) else type(value).__name__
+    wrong = TypeError(f"{where}: expected a {part.lower()} such as {example}.{part}(), found {found}")
+    try:
+        interface = type_name(type(value), kind)
+    except TypeError:
+        raise wrong from None
+    if isinstance(value, type):  # its metaclass is in the same module
+        raise wrong
+    made = find(interface)
+    if not isinstance(value, getattr(made, part)):
+        raise wrong
+    return interface, made
 
 
 def read(carried: Message | Delivery) -> Any:
@@ -104,3 +136,10 @@ def service_type(interface: str) -> Any:
     if found is None:
         raise HarnessError(f"the service type {interface} is not installed here")
     return found
+
+
+#: The part of an interface that whoever asks sends -> the kind of interface, what finds its class, and an example.
+_PARTS: Mapping[str, tuple[str, Callable[[str], Any], str]] = {
+    "Request": ("srv", service_type, "Trigger"),
+    "Goal": ("action", action_type, "Fibonacci"),
+}

@@ -1,13 +1,13 @@
-"""Runs what commands from outside ask for, on the virtual clock: the same loop as for a plan, up to a moment each time.
+"""Runs what commands from outside ask for, on either clock: the same loop as for a plan, up to a moment each time.
 
-Between two commands virtual time stands still. A question of this side, such as what a service answers, is asked in the
-middle of a command, and time stands still until it is answered.
+Between two commands virtual time stands still, and real time passes. A question of this side, such as what a service
+answers, is asked in the middle of a command, and nothing else happens here until it is answered.
 """
 
 from __future__ import annotations
 
-import random
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from grader.core.dataclass import dataclass
@@ -15,7 +15,8 @@ from grader.core.quantities import NS_PER_S
 from grader.core.scenario import Event
 from grader.core.trace import Fault, FaultKind, Mark, Observation
 from grader.execution.observer import Observer
-from grader.execution.plan import Plan, derive
+from grader.execution.plan import Plan
+from grader.execution.runner import Runner
 from grader.execution.service_peers import check_fields
 from grader.execution.steps import (
     Advance,
@@ -30,7 +31,6 @@ from grader.execution.steps import (
     Start,
 )
 from grader.execution.student_process import NodeProcess
-from grader.execution.virtual_runner import VirtualRunner, unfit
 from grader.simulation.participant import Moment, Output, Simulation
 from grader.stimuli.calls import AddClients, Ask, PlannedCall, PlannedCalls
 from grader.stimuli.events import Disappear, TopicEvent
@@ -60,14 +60,11 @@ class Stream:
     Args:
         command: What to publish.
         begin_ns: When the first message is sent.
-        draw: Draws what is lost and how long the rest is on its way.
     """
 
-    def __init__(self, command: Publish, begin_ns: int, draw: random.Random) -> None:
+    def __init__(self, command: Publish, begin_ns: int) -> None:
         self.command = command
         self._begin_ns = begin_ns
-        self._draw = draw
-        self._arrived_ns = begin_ns
 
     def event(self, number: int) -> PublishNext | None:
         """Return the event that sends a message; None if there is none of this number."""
@@ -76,22 +73,13 @@ class Stream:
             return None
         return PublishNext(self._begin_ns + number * period_ns, self.command.topic, self, number)
 
-    def arrives_ns(self, sent_ns: int) -> int | None:
-        """Draw when a message arrives, never before the one sent before it; None if it is lost."""
-        command = self.command
-        if command.loss and self._draw.random() < command.loss:
-            return None
-        delay_ns = self._draw.randint(*command.delay_ns) if command.delay_ns != (0, 0) else 0
-        self._arrived_ns = max(self._arrived_ns, sent_ns + delay_ns)
-        return self._arrived_ns
-
     def message(self, number: int) -> bytes:
         """Return the message of a number; the last one is repeated."""
         return self.command.messages[min(number, len(self.command.messages) - 1)]
 
 
-class SteppedRunner(VirtualRunner):
-    """Runs commands on the virtual clock.
+class SteppedRunner(Runner):
+    """Carries out commands; what depends on the clock is left to the runner of that clock that a subclass also is.
 
     Args:
         plan: The limits, the clock and the seed; it has no processes and no stimuli.
@@ -107,19 +95,15 @@ class SteppedRunner(VirtualRunner):
         super().__init__(plan, students, observer)
         self._start = start
         self._ask = ask
-        self._to_ns = 0
-        self._until_news = False
         self._on_topics: dict[str, Stream] = {}
         self._offered: dict[str, PlannedMessages] = {}
         self._served: set[str] = set()
-        self._faults: list[Observation] = []
-        self._draws: dict[str, random.Random] = {}
-        self._order = random.Random(derive(int(plan.host_seed, 16), "order")) if plan.drawn_order else None  # noqa: S311
+        self._faults: list[Fault] = []
 
     @property
     def now_ns(self) -> int:
         """The time of the run."""
-        return self._now_ns
+        return self._time_ns()
 
     def perform(self, command: Command) -> dict[str, Any]:
         """Carry out a command, and return what its sender has to know besides the observations.
@@ -149,10 +133,10 @@ class SteppedRunner(VirtualRunner):
         return {}
 
     def news(self) -> list[Observation]:
-        """Return what was observed since the last call, and forget it."""
+        """Return what was observed since the last call, and forget it, but for faults: they say what nodes need."""
         found = self._recorder.observations
-        self._recorder.observations = []
         self._faults += [o for o in found if isinstance(o, Fault)]
+        self._recorder.observations = []
         return found
 
     def programs(self) -> dict[str, int | None]:
@@ -164,8 +148,8 @@ class SteppedRunner(VirtualRunner):
         return self._recorder.full
 
     def unsuitable(self) -> str:
-        """Return why virtual time does not suit the nodes; empty if it does."""
-        return self._graders_fault() or unfit(self._students, self._faults, full=bool(self._recorder.full))
+        """Return why this clock does not suit the nodes; empty if it does."""
+        return self._graders_fault()
 
     def notes(self) -> list[str]:
         """Return the notes of the run."""
@@ -176,57 +160,54 @@ class SteppedRunner(VirtualRunner):
     def is_odd(self) -> bool:
         """Whether something unusual has happened, after which a worker should be replaced; see `is_worn`."""
         ended = (FaultKind.KILLED, FaultKind.HUNG)
-        return bool(self.notes()) or any(isinstance(o, Fault) and o.kind in ended for o in self._faults)
+        return bool(self.notes()) or any(o.kind in ended for o in self._faults)
 
     def look(self) -> None:
         """Record the graph as it is."""
         self._last_look()
 
-    # ------------------------------------------------------------------ time
+    def idle(self) -> None:
+        """Do what has to be done between two commands: nothing where time stands still."""
 
+    # ------------------------------------------------------------- the clock
+
+    @abstractmethod
     def _advance(self, to_ns: int, *, until_news: bool = False) -> None:
-        """Let time pass until a moment, with everything that happens at it.
+        """Let time pass until a moment, or at least until now; with `until_news`, until something was observed."""
 
-        A plan ends before what happens at its end. A step includes it: whoever waits for a second expects the timer of
-        that second. The loop therefore ends a nanosecond later, and no process is told of that nanosecond.
-        """
-        self._to_ns, self._until_news = max(self._now_ns, to_ns), until_news
-        self._end_ns = self._to_ns + 1
-        self._run_on()
-        self._until_news = False
-        if not self._recorder.full and not (until_news and self._recorder.observations):
-            self._now_ns = self._to_ns
-        self._now_ns = min(self._now_ns, self._to_ns)
+    @abstractmethod
+    def _begin_process(self, student: NodeProcess, delay_ns: int) -> None:
+        """Let a process run after a time."""
 
-    def _is_interrupted(self) -> bool:
-        return self._until_news and bool(self._recorder.observations)
+    @abstractmethod
+    def _await_start(self, started: Sequence[NodeProcess]) -> None:
+        """Let each of some new processes run until it waits for something."""
 
-    def _quiet_until(self, student: NodeProcess) -> int:
-        return max(self._now_ns, min(super()._quiet_until(student), self._to_ns))
+    @abstractmethod
+    def _await_end(self, student: NodeProcess) -> None:
+        """Let a process react to the stop signal."""
 
-    def _ready_students(self) -> Iterator[NodeProcess]:
-        """Yield the processes that have something to do; with a drawn order, in an order that follows from the seed."""
-        ready = super()._ready_students()
-        if self._order is None:
-            return ready
-        found = list(ready)
-        self._order.shuffle(found)
-        return iter(found)
+    @abstractmethod
+    def _lose(self, student: NodeProcess) -> None:
+        """Forget the endpoints of a process that was killed."""
+
+    def _await_readers(self, offer: PlannedMessages) -> None:
+        """Wait until the subscriptions that are there would hear a publisher."""
 
     # ------------------------------------------------------------- processes
 
     def _begin_processes(self, command: Start) -> dict[str, Any]:
-        names: list[str] = []
+        started: list[NodeProcess] = []
         left_out: list[str] = []
         for student, delay_ns in self._start(command.plan, left_out):
             self._students.append(student)
-            student.wake_ns = self._now_ns + delay_ns
             if delay_ns:
-                self._starts_ns[student.name] = student.wake_ns
-            names.append(student.name)
+                self._starts_ns[student.name] = self._time_ns() + delay_ns
+            self._begin_process(student, delay_ns)
+            started.append(student)
         if command.settle:
-            self._advance(self._now_ns)
-        return {"started": names, "left_out": left_out}
+            self._await_start([student for student in started if student.name not in self._starts_ns])
+        return {"started": [student.name for student in started], "left_out": left_out}
 
     def _named(self, process: str) -> NodeProcess:
         return next(student for student in self._students if student.name == process)
@@ -235,46 +216,41 @@ class SteppedRunner(VirtualRunner):
         if student.ended or student.stop_signalled:
             return
         student.stop_signalled = True
-        self._recorder.add(Mark(self._now_ns, "stop_signal", student.name))
-        self._to_ns = self._now_ns
-        self._end_ns = self._now_ns + 1
+        self._recorder.add(Mark(self._time_ns(), "stop_signal", student.name))
         self._interrupt(student)
-        self._advance(self._now_ns)
+        self._await_end(student)
 
     def _kill(self, student: NodeProcess) -> None:
         if student.ended:
             return
         student.end_now()
-        student.death(self._now_ns)
+        student.death(self._time_ns())
         student.drain()
-        self._write_output(student, final=True)
-        self._discovery.lose(student)
-        self._end(student, Mark(self._now_ns, "stopped", student.name))
+        self._recorder.add(*student.output(self._time_ns(), final=True))
+        self._lose(student)
+        self._recorder.add(Mark(self._time_ns(), "stopped", student.name))
+        student.ended = True
 
     # -------------------------------------------------------------- stimuli
 
     def _publish(self, command: Publish) -> None:
         """Begin to publish on a topic; what was published there until now ends."""
         topic = command.topic
-        stream = self._on_topics[topic] = Stream(command, self._now_ns, self._draw("topic", topic))
         if not command.messages:
+            self._on_topics.pop(topic, None)
             return
         qos = {"best_effort": command.best_effort, "latched": command.latched}
         offer = PlannedMessages(topic, command.type, 0, 0, 1, 0, values=(), **qos)
         if self._offered.get(topic) != offer:
             if topic in self._offered:
-                self._do(Disappear(self._now_ns, topic), self._now_ns)
-            self._do(Advertise(self._now_ns, topic, offer), self._now_ns)
+                self._do(Disappear(self._time_ns(), topic), self._time_ns())
+            self._do(Advertise(self._time_ns(), topic, offer), self._time_ns())
             self._offered[topic] = offer
+        self._await_readers(offer)
+        stream = self._on_topics[topic] = Stream(command, self._time_ns())
         first = stream.event(0)
         assert first is not None
         self._later(first)
-
-    def _draw(self, *purpose: str) -> random.Random:
-        key = "/".join(purpose)
-        if key not in self._draws:
-            self._draws[key] = random.Random(derive(int(self._plan.host_seed, 16), *purpose))  # noqa: S311 - it has to repeat
-        return self._draws[key]
 
     def _do(self, event: Event, now_ns: int) -> None:
         if not isinstance(event, PublishNext):
@@ -285,20 +261,13 @@ class SteppedRunner(VirtualRunner):
             return
         if (following := stream.event(event.number + 1)) is not None:
             self._later(following)
-        arrives_ns = stream.arrives_ns(event.t_ns)
-        if arrives_ns is None:
-            return
-        sent = PublishRecorded(arrives_ns, event.topic, stream.message(event.number), {})
-        if arrives_ns > now_ns:
-            self._later(sent)
-        else:
-            super()._do(sent, now_ns)
+        self._send(PublishRecorded(event.t_ns, event.topic, stream.message(event.number), {}), now_ns)
 
     def _serve(self, service: str, interface: str) -> None:
         server = PlannedServer(service, interface, 0, 0, 0, cycle=False, answers=0, responses=())
         if service not in self._served:
             self._served.add(service)
-            self._do(AddServer(self._now_ns, server), self._now_ns)
+            self._do(AddServer(self._time_ns(), server), self._time_ns())
 
     def _simulated(self, now_ns: int, service: str, request: Mapping[str, Any]) -> Mapping[str, Any] | None:
         if service not in self._served:
@@ -307,28 +276,29 @@ class SteppedRunner(VirtualRunner):
         return answer if isinstance(answer, dict) else None
 
     def _call(self, command: Call) -> dict[str, Any]:
-        calls = PlannedCalls(command.service, command.type, self._now_ns, NS_PER_S, 1, (command.request,))
+        now_ns = self._time_ns()
+        calls = PlannedCalls(command.service, command.type, now_ns, NS_PER_S, 1, (command.request,))
         check_fields(calls, command.service)
-        self._do(AddClients(self._now_ns, calls), self._now_ns)
-        self._later(Ask(self._now_ns, PlannedCall(calls, 0)))
+        self._do(AddClients(now_ns, calls), now_ns)
+        self._later(Ask(now_ns, PlannedCall(calls, 0)))
         return {"client": self._services.clients_of(command.service)}
 
     def _send_goal(self, command: SendGoal) -> dict[str, Any]:
         check_fields(command.goal, command.goal.action)
-        call = goal_call(command.goal)
+        call, now_ns = goal_call(command.goal), self._time_ns()
         clients = []
         for part in (call, *(following for _, following in call.then)):
-            self._do(AddClients(self._now_ns, part.calls), self._now_ns)
+            self._do(AddClients(now_ns, part.calls), now_ns)
             clients.append(self._services.clients_of(part.calls.service))
-        self._later(Ask(self._now_ns, call))
+        self._later(Ask(now_ns, call))
         return {"clients": clients}
 
     def _simulate(self, command: Simulate) -> None:
         simulation = _Elsewhere(command, self._ask)
-        most = self._plan.limits.messages
-        for event in self._simulations.add(f"number {command.number}", simulation, most, self._now_ns):
+        most, now_ns = self._plan.limits.messages, self._time_ns()
+        for event in self._simulations.add(f"number {command.number}", simulation, most, now_ns):
             if isinstance(event, (Advertise, AddServer)):
-                self._do(event, self._now_ns)
+                self._do(event, now_ns)
             else:
                 self._later(event)
 

@@ -52,8 +52,6 @@ class Publish:
         period_ns: Time between two messages; 0 to publish once.
         best_effort: Reliability of the publisher.
         latched: Whether it is transient-local.
-        delay_ns: Least and most time on the way; each message draws its own.
-        loss: The share of messages that are lost.
     """
 
     topic: str
@@ -62,8 +60,6 @@ class Publish:
     period_ns: int = 0
     best_effort: bool = False
     latched: bool = False
-    delay_ns: tuple[int, int] = (0, 0)
-    loss: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

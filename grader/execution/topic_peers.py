@@ -168,6 +168,8 @@ class WallTopicPeers(TopicPeers):
     def __init__(self, observer: Observer, recorder: TraceRecorder) -> None:
         super().__init__(observer, recorder)
         self._leaving: list[tuple[int, str]] = []
+        #: How the publishers of fixed types were created.
+        self._offered: dict[str, tuple[str, bool, bool]] = {}
 
     def follow_types(self) -> None:
         """Adapt the types of all publishers after the graph has changed."""
@@ -177,14 +179,26 @@ class WallTopicPeers(TopicPeers):
     def leave(self, now_ns: int) -> None:
         """Remove the publishers that have stayed long enough after their last message."""
         while self._leaving and self._leaving[0][0] <= now_ns:
-            self._observer.withdraw(self._leaving.pop(0)[1])
+            _, topic = self._leaving.pop(0)
+            self._observer.withdraw(topic)
+            self._offered.pop(topic, None)
 
     def do(self, event: TopicEvent, now_ns: int) -> None:
-        """Execute one event; a publisher that still lingers is removed before its successor is created."""
+        """Execute one event; a publisher that still lingers goes on as its successor, or is removed before."""
         if isinstance(event, (Appear, Advertise)) and any(left == event.topic for _, left in self._leaving):
             self._leaving = [(at_ns, left) for at_ns, left in self._leaving if left != event.topic]
-            self._observer.withdraw(event.topic)
+            same = isinstance(event, Advertise) and self._offered.get(event.topic) == _terms(event.stream)
+            if not same:  # the same one would have to be discovered anew, and what it has just sent could be lost
+                self._observer.withdraw(event.topic)
+                self._offered.pop(event.topic, None)
         super().do(event, now_ns)
+
+    def _offer(self, stream: PlannedMessages) -> None:
+        self._streams[stream.topic] = stream.type
+        self._fixed.add(stream.topic)
+        if self._offered.get(stream.topic) != _terms(stream):
+            self._offered[stream.topic] = _terms(stream)
+            super()._offer(stream)
 
     def _asked(self, topic: str) -> list[tuple[str, bool]]:
         asked = [e for e in self._recorder.graph.endpoints if e.kind == "subscription" and e.topic == topic]
@@ -192,3 +206,8 @@ class WallTopicPeers(TopicPeers):
 
     def _withdraw(self, topic: str, now_ns: int) -> None:
         self._leaving.append((now_ns + LINGER_NS, topic))
+
+
+def _terms(stream: PlannedMessages) -> tuple[str, bool, bool]:
+    """Return what a publisher is created with, beside its topic."""
+    return stream.type, stream.latched, stream.best_effort

@@ -8,11 +8,12 @@ the run is not judged.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
 from grader.core.quantities import NS_PER_MS
+from grader.core.scenario import Event
 from grader.core.trace import ClockKind, Mark, Message, Observation
 from grader.execution.ending import ending
 from grader.execution.observer import Observer
@@ -21,6 +22,7 @@ from grader.execution.runner import Runner
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import LINGER_NS, WallTopicPeers
 from grader.stimuli.calls import PlannedCalls
+from grader.stimuli.events import Disappear
 from grader.stimuli.messages import Advertise
 from grader.stimuli.server import RemoveServer
 
@@ -53,8 +55,7 @@ class WallRunner(Runner):
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
-        early = (replace(e, t_ns=max(0, e.t_ns - LEAD_NS)) if isinstance(e, Advertise) else e for e in self._due)
-        self._due = sorted(early, key=lambda e: e.t_ns)
+        self._due = sorted(_with_early_publishers(self._due), key=lambda e: e.t_ns)
         self._topics: WallTopicPeers = WallTopicPeers(observer, self._recorder)
         self._next_graph_ns = 0
         self._graph_every_ns = GRAPH_EVERY_NS
@@ -166,6 +167,7 @@ class WallRunner(Runner):
             elif report.get("kind") == "exited":
                 self._recorder.add(*student.output(now_ns, final=True))
                 stopped, places = student.stop_signalled, student.places
+                student.exit_code = code if type(code := report.get("code")) is int else None
                 self._recorder.add(ending(student.name, now_ns, report, self._plan, places, stopped=stopped))
                 student.ended = True
         self._recorder.add(*student.output(now_ns))
@@ -195,3 +197,15 @@ class WallRunner(Runner):
     def _is_served(self, calls: PlannedCalls) -> bool:
         service = self._services.add_clients(calls)
         return service is not None and self._observer.services.is_matched(service)
+
+
+def _with_early_publishers(events: Iterable[Event]) -> Iterator[Event]:
+    """Yield events with publishers created earlier, but not before the one that they replace has left."""
+    left_ns: dict[str, int] = {}
+    for event in events:
+        if isinstance(event, Advertise):
+            yield replace(event, t_ns=max(left_ns.get(event.topic, 0), event.t_ns - LEAD_NS))
+            continue
+        if isinstance(event, Disappear):
+            left_ns[event.topic] = event.t_ns
+        yield event

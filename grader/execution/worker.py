@@ -30,6 +30,7 @@ from grader.execution import late_numpy
 from grader.execution.bare_start import BareProcess, bare_arguments
 from grader.execution.beside import files_beside, is_loose, whole_submission
 from grader.execution.codec import beside_trace, from_json, observation_to_json, trace_to_json
+from grader.execution.conversation import Conversation
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.execution.launching import Launched, evaluated, expanded, renamed, unstarted
 from grader.execution.machine import load_per_processor
@@ -126,17 +127,16 @@ class Worker:
         cost = {"real_ns": self._real_ns, "starved_ns": self._starved_ns}
         return {"trace": trace, **cost, "worn": is_worn(trace) or self._remembers_connections()}
 
-    def step(self, plan: Plan, domain: int, commands: Iterator[Any], tell: Callable[[Mapping[str, Any]], None]) -> bool:
+    def step(self, plan: Plan, domain: int, other: Conversation) -> bool:
         """Carry out commands until one ends the run; return whether this worker should be replaced.
 
         Args:
             plan: Limits, seed and clock of the run; what runs in it, commands say.
             domain: The ROS domain to use.
-            commands: What the other side sends: commands, and answers to questions.
-            tell: Sends an answer to a command, or a question.
+            other: Who sends the commands, and answers questions.
         """
         from grader.execution.observer import Observer  # noqa: PLC0415 - imports rclpy, which takes long
-        from grader.execution.stepped_runner import SteppedRunner  # noqa: PLC0415 - the same
+        from grader.execution.stepped_clocks import STEPPED  # noqa: PLC0415 - the same
 
         students: list[NodeProcess] = []
         failed = False
@@ -146,17 +146,12 @@ class Worker:
             added = self._with_launched(added, domain, {student.name for student in students}, left_out)
             for name, file in added.processes:
                 student = self._start(added, name, file, domain)
-                began.callback(stop_now, student)
+                processes.callback(stop_now, student)
                 _await_ready(student)
                 yield student, dict(added.starts_ns).get(name, 0)
 
         sys.path += [folder for folder in plan.interfaces if folder not in sys.path]
-
-        def ask(question: Mapping[str, Any]) -> Any:
-            tell(question)
-            return next(commands)["answer"]
-
-        with ExitStack() as began:
+        with ExitStack() as processes, ExitStack() as began:
             limit_processor_time(STEPPED_CPU_S)
             observer = Observer(domain, plan.limits)
             began.callback(observer.close)
@@ -164,9 +159,13 @@ class Worker:
             began.enter_context(
                 ResourceMonitor(students, plan.limits, shares_network=shares_network, own_s=STEPPED_CPU_S)
             )
-            runner = SteppedRunner(plan, students, observer, start, ask)
-            tell({"now_ns": 0, "news": []})
-            for data in commands:
+            runner = STEPPED[plan.clock](plan, students, observer, start, other.ask)
+            is_real = plan.clock == ClockKind.WALL.value
+            if is_real:
+                late_numpy.load()
+                began.enter_context(OutputWatch(students, observer.wake, [other.descriptor]))
+            other.tell({"now_ns": 0, "news": []})
+            for data in other.commands(runner.idle if is_real else None):
                 command = from_json(COMMANDS[data["do"]], data["with"])
                 if isinstance(command, Finish):
                     runner.look()
@@ -179,7 +178,7 @@ class Worker:
                 common = {"now_ns": runner.now_ns, "ended": runner.programs(), "full": runner.full(), "news": news}
                 is_last = isinstance(command, Finish)
                 last = {"notes": runner.notes(), "unsuitable": runner.unsuitable()} if is_last else {}
-                tell({**answer, **common, **last})
+                other.tell({**answer, **common, **last})
                 if is_last:
                     failed = bool(runner.full())
                     break
@@ -338,6 +337,7 @@ class Worker:
             "seed": plan.seed_of(name),
             "clock": plan.clock,
             "charged": plan.charged,
+            "drawn_order": plan.drawn_order,
             "in_place": bool(plan.working),
             "steady_ns": plan.epoch_ns - plan.uptime_ns,
             "log_format": LOG_FORMAT,
@@ -578,7 +578,7 @@ def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
     for data in commands:
         if "stepped" in data:
             try:
-                worn = worker.step(from_json(Plan, data["stepped"]), data["domain"], commands, tell)
+                worn = worker.step(from_json(Plan, data["stepped"]), data["domain"], Conversation(line, commands, tell))
             except Exception:
                 tell({"failed": traceback.format_exc()[-4000:]})
                 return  # the other side takes another worker

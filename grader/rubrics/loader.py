@@ -20,6 +20,7 @@ from grader.core.limits import MAX_RUBRIC_BYTES, Limits
 from grader.core.quantities import duration
 from grader.core.rubric_files import rubric_file
 from grader.core.scenario import (
+    Connection,
     RubricTest,
     RunOptions,
     Scenario,
@@ -54,7 +55,7 @@ from grader.rubrics.own_checks import (
     own_files,
 )
 from grader.rubrics.run_options import RunShape
-from grader.rubrics.simulations import simulation_mistakes
+from grader.rubrics.simulations import published_by, simulation_mistakes
 from grader.rubrics.tests import AuthoredTest, tests_in
 from grader.rubrics.types import BESIDE, CHECK_FILE, PROVIDED_FILE, PROVIDED_WORDS, build
 from grader.rubrics.variants import (
@@ -125,10 +126,26 @@ def _in_scenario(scenario: ScenarioShape, index: int, rubric: RubricShape, tree:
     for process, start in scenario.start.items():
         yield from _unknown(process, known, what, tree.at_key((*path, "start", process)))
         yield from _too_late(build(start), observed, (*path, "start", process), tree)
+    connections: tuple[Connection, ...] = build(scenario.connections)
     for number, shape in enumerate(scenario.stimuli):
         stimulus = build(shape)
         yield from _in_stimulus(stimulus, observed, (*path, "stimuli", number, shape.chosen[0]), tree)
-        yield from _cut_off(stimulus, observed, (*path, "observe", "duration"), tree)
+        late_ns = max((longest(one.delay_ns) for one in connections if one.topic in published_by(stimulus)), default=0)
+        yield from _cut_off(stimulus, observed, late_ns, (*path, "observe", "duration"), tree)
+    yield from _in_connections(connections, scenario, observed, path, tree)
+
+
+def _in_connections(
+    connections: Sequence[Connection], scenario: ScenarioShape, observed: Span, path: TreePath, tree: YamlTree
+) -> Iterator[Mistake]:
+    yield from _repeated([one.topic for one in connections], (*path, "connections"), tree, "topic")
+    published = [topic for shape in scenario.stimuli for topic in published_by(build(shape))]
+    for number, one in enumerate(connections):
+        here = (*path, "connections", number)
+        yield from _unknown(one.topic, published, "a topic that a stimulus publishes on", tree.at((*here, "topic")))
+        yield from _too_late(one.delay_ns, observed, (*here, "delay"), tree, "a delay shorter than")
+        if not longest(one.delay_ns) and not one.lose:
+            yield tree.at(here).mistake("expected a `delay`, or a share of messages to `lose`, found neither")
 
 
 def _is_yaml(name: str) -> bool:
@@ -152,9 +169,11 @@ def _in_run(process: str, options: RunShape, rubric: RubricShape, path: TreePath
             yield tree.at_key((*path, key)).mistake(text, "name launch files like robot.launch.py")
 
 
-def _too_late(start: Time, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+def _too_late(
+    start: Time, observed: Span, path: TreePath, tree: YamlTree, what: str = "a start before the end of"
+) -> Iterator[Mistake]:
     if longest(start) >= shortest(observed.duration_ns) and observed.after_first_message_on is None:
-        yield tree.at(path).mistake("expected a start before the end of `observe`")
+        yield tree.at(path).mistake(f"expected {what} `observe`")
 
 
 def _in_stimulus(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
@@ -163,9 +182,9 @@ def _in_stimulus(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlT
         yield tree.at((*path, key)).mistake(expected)
 
 
-def _cut_off(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
-    """Yield a mistake if, for some draw, a case is lost because the observation ends before it."""
-    time, needed_ns = observed.duration_ns, stimulus.course_ns()
+def _cut_off(stimulus: Stimulus, observed: Span, late_ns: int, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    """Yield a mistake if, for some draw, the observation ends before a case comes; `late_ns` is its time on the way."""
+    time, needed_ns = observed.duration_ns, stimulus.course_ns() + late_ns
     if (isinstance(time, TimeBetween) or is_open(stimulus)) and needed_ns > shortest(time):
         text = f"expected at least {duration(needed_ns)}, so that every case is played whatever is drawn, found "
         text += f"{'as little as ' if isinstance(time, TimeBetween) else ''}{duration(shortest(time))}"
@@ -555,6 +574,7 @@ def _scenario(path: Path, shape: ScenarioShape, limits: Limits, provided: Mappin
         processes=shape.processes,
         span=build(shape.observe),
         stimuli=tuple(build(stimulus).beside(str(path.parent)) for stimulus in shape.stimuli),
+        connections=build(shape.connections),
         limits=limits,
         starts_ns=tuple((name, build(shape.start[name])) for name in shape.processes if name in shape.start),
         may_exit=shape.may_exit,

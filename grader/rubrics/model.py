@@ -11,7 +11,7 @@ from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, 
 
 from grader.core.exercise import DUE_DATE, OPEN, ORDER, PUBLISHED, Feedback, Shows
 from grader.core.limits import Limits
-from grader.core.scenario import Span, Stimulus
+from grader.core.scenario import Connection, Span, Stimulus
 from grader.rubrics.check_parameters import choice_model, part_model, simulation_shape
 from grader.rubrics.drawing import OdometryShape, ParameterShape, SomeLongTime, StateShape, TransitionShape, list_of
 from grader.rubrics.mistakes import nearest
@@ -80,9 +80,11 @@ def _stimulus_model(simulations: Mapping[str, type[Shape]]) -> type[Choice]:
 
 if TYPE_CHECKING:  # created at run time; pydantic reads those below
     LimitsShape = Shape
+    ConnectionShape = Shape
     ObserveShape = Shape
     StimulusShape = Choice
 else:
+    ConnectionShape = part_model(Connection, "ConnectionShape")
     LimitsShape = part_model(Limits, "LimitsShape", _LIMITS)
     ObserveShape = part_model(Span, "ObserveShape")
     StimulusShape = _stimulus_model({})
@@ -176,6 +178,9 @@ class ScenarioShape(Shape):
     processes: tuple[ProgramName, ...] = Field(min_length=1)
     observe: ObserveShape
     stimuli: tuple[StimulusShape, ...] = ()
+    connections: tuple[ConnectionShape, ...] = Field(
+        default=(), description="topics on which messages of stimuli are late or lost"
+    )
     start: dict[ProgramName, SomeLongTime] = Field(default={}, description="processes that start late")
     run: dict[ProgramName, RunShape] = Field(default={}, description="what processes are given when they are started")
     may_exit: Annotated[tuple[ProgramName, ...], Field(description="processes that are free to end by themselves")] = ()

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import partial
 from itertools import islice
 from typing import Any
 
 from grader.core.dataclass import dataclass
 from grader.core.errors import HarnessError
-from grader.core.scenario import Between, Choose, FieldSpec, Written
+from grader.core.scenario import Between, Choose, FieldSpec, Stimulus, Written
 from grader.rubrics.model import RubricShape, ScenarioShape
 from grader.rubrics.types import build
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlTree
@@ -79,6 +80,15 @@ def _first(spec: FieldSpec) -> Any:
 
 def _is_output(output: object, topics: Mapping[str, str]) -> bool:
     return isinstance(output, tuple) and len(output) == 2 and output[0] in topics and isinstance(output[1], Mapping)
+
+
+def published_by(stimulus: Stimulus) -> Iterable[str]:
+    """Return the topics that a stimulus publishes on; none for a simulation that fails, which another rule tells."""
+    if isinstance(stimulus, Simulated):
+        with suppress(HarnessError):
+            return offered(stimulus).publishes
+    topic = getattr(stimulus, "topic", "")
+    return [topic] if topic else []
 
 
 def simulation_mistakes(rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:

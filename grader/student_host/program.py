@@ -71,8 +71,9 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
 
     Args:
         request: `fd` of the socket, `root` and `file` of the submission, `clock` and the share of the work that is
-            `charged` to it, `seed` (hex), whether its files lie `in_place`, `log_format`, `limits`, `steady_ns` of
-            `VirtualTime.start`, and `interfaces`, the folders of interface packages that are not installed.
+            `charged` to it, `seed` (hex), and whether it decides what runs first of all that is ready (`drawn_order`),
+            whether its files lie `in_place`, `log_format`, `limits`, `steady_ns` of `VirtualTime.start`, and
+            `interfaces`, the folders of interface packages that are not installed.
         host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
             hide one that it has imported.
     """
@@ -109,6 +110,8 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     # The token is known to the logging library and the worker alone; the program could find this value.
     ready.clear()
     if isinstance(time, VirtualTime):
+        if request["drawn_order"]:
+            time.order.begin(request["seed"])
         time.start(start["now_ns"], request["steady_ns"], charged=request["charged"])
     else:
         time.start(start["now_ns"], request["steady_ns"])

@@ -40,6 +40,7 @@ from rclpy.time import Time
 from .actions import Counted, install_actions
 from .clock import VirtualClock
 from .ledger import BACKGROUND, ENDS_OF_TOPICS, REAL_WAIT_SET, Ledger, asks_for_best, finite_ns, service_name
+from .order import ReadyOrder
 from .scheduler import Scheduler
 
 #: After this many messages in a row, the next one waits until they have arrived, so that no queue overflows.
@@ -352,7 +353,14 @@ class WakeUps:
         return [pointer for pointer in ready if pointer not in seen]
 
 
-def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wake_ups: WakeUps) -> type:
+def wait_set_type(  # noqa: PLR0913 - all that a wait depends on
+    scheduler: Scheduler,
+    clock: VirtualClock,
+    ledger: Ledger,
+    wake_ups: WakeUps,
+    order: ReadyOrder,
+    settle: Callable[[], None],
+) -> type:
     """Create the class that replaces rclpy's wait set."""
 
     class VirtualWaitSet(REAL_WAIT_SET):  # type: ignore[misc]
@@ -373,6 +381,8 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
             self._actions: dict[Any, Any] = {}
             #: The subscriptions that had messages taken ahead of time at the last poll.
             self._kept: list[int] = []
+            #: What is ready, but not found by this look.
+            self._hidden: set[int] = set()
 
         def clear_entities(self) -> None:
             super().clear_entities()
@@ -422,7 +432,8 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
 
             It notes its places in the latest set that it was added to, of which the ledger makes some of its own.
             """
-            return self._actions.get(handle)
+            found = self._actions.get(handle)
+            return found if found is None or id(handle) not in self._hidden else tuple(False for _ in found)
 
         def _poll(self) -> None:
             """Look, without waiting, what is ready; all else is removed."""
@@ -449,7 +460,22 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
 
         def get_ready_entities(self, kind: str) -> Any:
             ready = super().get_ready_entities(kind)
-            return [*ready, *(p for p in self._kept if p not in ready)] if kind == "subscription" else ready
+            ready = [*ready, *(p for p in self._kept if p not in ready)] if kind == "subscription" else ready
+            return [p for p in ready if p not in self._hidden] if self._hidden else ready
+
+        def _awaited(self) -> list[int]:
+            """Return what an executor waits for whose order may be drawn: the addresses of handles, `id` of actions."""
+            return [*(timer.pointer for timer in self._timers if timer), *self._receivers, *map(id, self._actions)]
+
+        def _hide(self) -> None:
+            """Draw what this look finds of all that is ready."""
+            self._hidden = set()
+            kinds = ("timer", "subscription", "client", "service")
+            ready = {*(p for kind in kinds for p in self.get_ready_entities(kind))}
+            ready |= {id(handle) for handle, found in self._actions.items() if any(found)}
+            awaited = self._awaited()
+            self._hidden = order.hidden([one for one in awaited if one in ready])
+            order.wait_for(one for one in awaited if one not in ready)
 
         def _find_kept(self) -> list[int]:
             """Return the subscriptions in this set that have messages taken ahead of time."""
@@ -483,6 +509,11 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
         def wait(self, timeout_ns: int) -> None:
             clock.charge()
             deadline_ns = None if timeout_ns < 0 else clock.end_of(timeout_ns)
+            if order.is_drawn:
+                self._hidden = set()
+                if ledger.sent:
+                    settle()  # others may react before the next callback runs, and what is sent to oneself arrives
+                self._expects()
             if self._actions:
                 self._fill()  # the ledger may have looked for messages since they were added
             while True:
@@ -490,6 +521,8 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
                 guards = REAL_WAIT_SET.get_ready_entities(self, GUARD)
                 news = wake_ups.news(guards, self._guards) if guards and timeout_ns else guards
                 if self._ready(guards=news):
+                    if order.is_drawn:
+                        self._hide()
                     scheduler.progress()
                     return
                 if guards:
@@ -504,6 +537,8 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
                         scheduler.pause(min(wakes, default=None), polls=True)
                     finally:
                         ledger.awaited.subtract(self._receivers)
+                    if order.is_drawn:
+                        order.wait_for(self._awaited())
                 if not self._is_whole() or self._included != ledger.included:
                     return  # other waitables add their entities without these methods: let the executor rebuild the set
                 self._fill()
@@ -511,11 +546,13 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, wak
     return VirtualWaitSet
 
 
-def install_wait_sets(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> None:
+def install_wait_sets(
+    scheduler: Scheduler, clock: VirtualClock, ledger: Ledger, order: ReadyOrder, settle: Callable[[], None]
+) -> None:
     """Replace rclpy's wait set."""
     wake_ups = WakeUps()
     wake_ups.install()
-    _rclpy.WaitSet = wait_set_type(scheduler, clock, ledger, wake_ups)
+    _rclpy.WaitSet = wait_set_type(scheduler, clock, ledger, wake_ups, order, settle)
     for cls in ACTION_READY:
         _install_action_waits(cls)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from . import originals, threads, times
 from .clock import VirtualClock
 from .link import Link
+from .order import ReadyOrder
 from .scheduler import GreenThread, Scheduler
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ class VirtualTime:
         self.clock = VirtualClock()
         self.scheduler = Scheduler(lambda: self.clock.now_ns, self._ask_for_time)
         self.clock.let_time_pass = lambda until_ns: self.scheduler.pause(until_ns, polls=True)
+        self.order = ReadyOrder(lambda: self.clock.now_ns)
         self._ledger: Ledger | None = None
         self._clocks: RosClocks | None = None
         self._stopping = False
@@ -108,7 +110,7 @@ class VirtualTime:
         self.clock.real_ns = ros.system_ns
         ros.install_order()
         ros.install_clocks(self._clocks, self.scheduler, self.clock)
-        ros.install_wait_sets(self.scheduler, self.clock, self._ledger)
+        ros.install_wait_sets(self.scheduler, self.clock, self._ledger, self.order, self._settle)
         ros.install_traffic(
             self._ledger,
             self.clock,

@@ -33,10 +33,11 @@ class Worlds:
         return self.session.shared
 
     @contextmanager
-    def open(
+    def open(  # noqa: PLR0913 - the options of the marker
         self,
         near: Path | None = None,
         *,
+        clock: str = "virtual",
         seed: int | None = None,
         name: str = "test",
         delay: Mapping[str, tuple[float, float]] | None = None,
@@ -46,8 +47,9 @@ class Worlds:
 
         Args:
             near: Where programs are looked for first; then in the folder of these worlds, and in the working directory.
-            seed: What the order of ready programs, delays and losses are drawn from; None for the order in which they
-                were started.
+            clock: `virtual`, or `wall` for real time, in which no order is drawn.
+            seed: What delays, losses, and the order of programs and callbacks that are ready at one instant are drawn
+                from; None for the order in which programs were started, and that of rclpy.
             name: Name of its recording.
             delay: For topics that are published on from outside, the least and the most seconds that a message is on
                 its way.
@@ -55,9 +57,10 @@ class Worlds:
         """
         folders = tuple(dict.fromkeys(path.resolve() for path in (near, self.folder, Path()) if path is not None))
         drawn = {"drawn_order": seed is not None, "delay": delay, "lose": lose}
-        world = World(self.session, folders, seed=seed or 0, name=name, **drawn)  # type: ignore[arg-type]
+        world = World(self.session, folders, clock=clock, seed=seed or 0, name=name, **drawn)  # type: ignore[arg-type]
         try:
             yield world
+            world.finish()
         finally:
             world.close()
 
@@ -82,23 +85,28 @@ def open_worlds(folder: Path) -> Iterator[Worlds]:
 def open_world(
     near: Path | str = "",
     *,
+    clock: str = "virtual",
     seed: int | None = None,
     delay: Mapping[str, tuple[float, float]] | None = None,
     lose: Mapping[str, float] | None = None,
 ) -> Iterator[World]:
-    """Run programs in virtual time without pytest: in a script, or in the cells of a notebook.
+    """Run programs step by step without pytest: in a script, or in the cells of a notebook.
 
     A notebook shows the world, as the last value of a cell, as a page that plays the run so far.
 
     Args:
         near: Where programs are looked for first.
-        seed: What the order of ready programs, delays and losses are drawn from; None for the order in which they were
-            started.
+        clock: `virtual`, or `wall` for real time, in which no order is drawn.
+        seed: What delays, losses, and the order of programs and callbacks that are ready at one instant are drawn from;
+            None for the order in which programs were started, and that of rclpy.
         delay: As for the marker `ros` of pytest.
         lose: As for the marker `ros` of pytest.
 
     Raises:
         EnvironmentFault: This machine lacks ROS.
     """
-    with open_worlds(Path()) as worlds, worlds.open(Path(near), seed=seed, delay=delay, lose=lose) as world:
+    with (
+        open_worlds(Path()) as worlds,
+        worlds.open(Path(near), clock=clock, seed=seed, delay=delay, lose=lose) as world,
+    ):
         yield world

@@ -187,12 +187,12 @@ class Program:
     """
 
     def __init__(
-        self, name: str, root: Path, signal: Callable[[Program, str], None], await_start: Callable[[], None]
+        self, name: str, root: Path, signal: Callable[[Program, str], None], catch_up: Callable[[], None]
     ) -> None:
         self.name = name
         self.root = root
         self._signal = signal
-        self._await_start = await_start
+        self._catch_up = catch_up
         self._logs: list[LogRecord] = []
         self._lines: list[OutputLine] = []
         self._ended = False
@@ -208,28 +208,28 @@ class Program:
     def logs(self) -> list[LogRecord]:
         """What it has logged through rclpy: `t_ns`, `severity`, `logger`, `text`, `file` and `line`."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return Messages(self._logs, lambda: NoMessage(f"{self.name} has logged nothing"))
 
     @property
     def output(self) -> str:
         """What it has written to standard output and standard error, without log records."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return "".join(f"{line.text}\n" for line in self._lines)
 
     @property
     def running(self) -> bool:
         """Whether it has not ended."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return not self._ended
 
     @property
     def exit_code(self) -> int | None:
         """Its exit code as a shell shows it, so 128 and the number of a signal that ended it; None while it runs."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return self._exit_code
 
     def interrupt(self) -> None:

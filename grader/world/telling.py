@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import linecache
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from grader.core.exercise import Finding
@@ -17,17 +18,21 @@ from grader.core.trace import (
     Message,
     Observation,
     OutputLine,
+    Request,
+    Response,
     ServiceEnd,
     Trace,
     unmet_policy,
 )
 from grader.judging.findings import explain_no_message, explain_no_server, explain_no_subscription, not_met
-from grader.judging.wording import listed, moment, quote, span
+from grader.judging.wording import listed, moment, nearest, quote, span
 from grader.world.errors import NoMessage, StepTimeout
 from grader.world.programs import Program
 
 #: How many lines of logs and output a message shows, and how many characters of a line.
 MOST_LINES, LINE_CHARACTERS = 8, 160
+#: Services that every node has, for parameters.
+OF_EVERY_NODE = ("set_parameters", "set_parameters_atomically", "get_parameters", "list_parameters")
 _HAPPENED = {
     FaultKind.SYNTAX_ERROR: "could not be compiled",
     FaultKind.EXCEPTION: "raised an exception",
@@ -67,7 +72,12 @@ def silence(trace: Trace, topic: str) -> NoMessage:
 
 
 def no_server(trace: Trace, service: str, type_: str) -> str:
-    """Return why nobody offers a service."""
+    """Return why nobody offers a service; of one that every node has, whether there is the node."""
+    node, _, name = service.rpartition("/")
+    nodes = _graph_of(trace).nodes
+    if name in OF_EVERY_NODE and node not in nodes:
+        close = nearest(node, nodes)
+        return f"there is no node {node}" + (f"\n  hint: did you mean {close}?" if close else "")
     return _worded(explain_no_server(trace, service, type_))
 
 
@@ -91,7 +101,7 @@ def advice(trace: Trace, offers: Iterable[Endpoint]) -> str:
 
 
 def _unheard(trace: Trace, offers: Iterable[Endpoint]) -> Iterator[Finding]:
-    graph = (trace.graphs() or (GraphSnapshot(0, (), ()),))[-1]
+    graph = _graph_of(trace)
     for offer in offers:
         same = [e for e in graph.endpoints if (e.kind, e.topic) == ("subscription", offer.topic)]
         fitting = [e for e in same if e.type == offer.type]
@@ -103,6 +113,10 @@ def _unheard(trace: Trace, offers: Iterable[Endpoint]) -> Iterator[Finding]:
                 offered, wanted = unmet
                 what = f"{end.node} asks for {wanted}, the test offers {offered}: no message arrives"
                 yield not_met(f"{offer.topic}: {what}", hint=f"subscribe to {offer.topic} with {offered}")
+
+
+def _graph_of(trace: Trace) -> GraphSnapshot:
+    return (trace.graphs() or (GraphSnapshot(0, (), ()),))[-1]
 
 
 def apart(graph: GraphSnapshot) -> Iterator[str]:
@@ -143,7 +157,7 @@ def _by_name(pairs: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
 
 
 def meanwhile(observations: Iterable[Observation], programs: Iterable[Program], since_ns: int) -> Iterator[str]:
-    """Yield what happened since a time: messages by topic, the last lines of logs and output, and who has ended."""
+    """Yield what happened since a time: messages, requests and responses, the last texts, and who has ended."""
     recent = [o for o in observations if o.t_ns >= since_ns]
     counts: dict[tuple[str, str], list[Observation]] = {}
     for one in recent:
@@ -152,6 +166,10 @@ def meanwhile(observations: Iterable[Observation], programs: Iterable[Program], 
     for (topic, sender), found in sorted(counts.items()):
         some = "1 message" if len(found) == 1 else f"{len(found):,} messages, the last"
         yield f"{topic}: {some} at {moment(found[-1].t_ns)}{f', from {sender}' if sender else ''}"
+    exchanged = Counter((o.service, type(o)) for o in recent if isinstance(o, (Request, Response)))
+    for service in sorted({service for service, _ in exchanged}):
+        requests, responses = exchanged[service, Request], exchanged[service, Response]
+        yield f"{service}: {_some(requests, 'request')}, {_some(responses, 'response')}"
     texts = [o for o in recent if isinstance(o, (LogRecord, OutputLine))]
     for text in texts[-MOST_LINES:]:
         severity = f"[{text.severity}] " if isinstance(text, LogRecord) else ""
@@ -163,7 +181,11 @@ def meanwhile(observations: Iterable[Observation], programs: Iterable[Program], 
         yield "nothing"
 
 
-def timeout(what: str, since_ns: int, now_ns: int, sections: Mapping[str, Sequence[str]], hint: str) -> StepTimeout:
+def _some(count: int, what: str) -> str:
+    return f"{count or 'no'} {what}{'' if count == 1 else 's'}"
+
+
+def timeout(what: str, since_ns: int, now_ns: int, sections: Mapping[str, Iterable[str]], hint: str) -> StepTimeout:
     """Return the error of a timeout: what was waited for, and what is known about it.
 
     Args:
@@ -175,8 +197,8 @@ def timeout(what: str, since_ns: int, now_ns: int, sections: Mapping[str, Sequen
     """
     first = f"{what} within {span(now_ns - since_ns)} ({moment(since_ns)} to {moment(now_ns)})"
     lines = [first]
-    for title, texts in sections.items():
-        if texts:
+    for title, found in sections.items():
+        if texts := [*found]:
             lines += [f"{title}:", *(f"  {text}" for text in texts)]
     cause = next((text.partition("\n")[0] for text in next(iter(sections.values()), ())), "")
     return StepTimeout("\n".join(lines), f"{first}: {cause}" if cause else first, hint)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import wraps
+from itertools import pairwise
 from pathlib import Path
 from random import Random
 from typing import Any, ParamSpec, TypeVar
@@ -31,17 +32,17 @@ from grader.core.trace import (
     Trace,
 )
 from grader.execution.interfaces import built, plain_fields
-from grader.execution.plan import Plan, PlannedStart, derive, ros_arguments
+from grader.execution.plan import Plan, PlannedConnection, PlannedStart, derive, ros_arguments
 from grader.execution.recording_session import RecordingSession
 from grader.execution.serialization import (
     QoSProfile,
-    action_type,
     parameter_message,
     qos_words,
     read,
     serialized,
     service_type,
     type_name,
+    type_of_part,
 )
 from grader.execution.shares import install_shares
 from grader.execution.stepping import SteppedRun
@@ -74,6 +75,8 @@ OWN_LIMITS = Limits(
     traffic_bytes=1 * GIB,
     participants=200,
 )
+#: How long `settle` waits on the wall clock: a reaction takes some milliseconds, tens of them on a busy machine.
+REAL_SETTLE_S = 0.1
 #: What fails a test. A program that ends by itself does not: the test can look at its exit code.
 FAILING = (FaultKind.SYNTAX_ERROR, FaultKind.EXCEPTION, FaultKind.HUNG, FaultKind.KILLED)
 
@@ -141,14 +144,16 @@ class Failure:
 class World:
     """Runs programs in virtual time, and lets a test act on them and look at what they do.
 
-    Virtual time stands still between two calls. Use `grader.api.open_world` or the fixture `ros`, not the constructor.
+    Virtual time stands still between two calls. On the wall clock, the same calls take as long as they say, and the
+    programs run on between them. Use `grader.api.open_world` or the fixture `ros`, not the constructor.
 
     Args:
         session: What the programs run in.
         near: Folders in which programs are looked for.
+        clock: `virtual`, or `wall` for real time.
         seed: What everything drawn follows from.
         name: The name of the test in its recording.
-        drawn_order: Whether the seed decides which of several ready programs runs first.
+        drawn_order: Whether the seed decides what runs first of all that is ready; on the wall clock, nothing does.
         delay: For topics that the test publishes on, the least and the most seconds that a message is on its way.
         lose: For such topics, the share of messages that are lost.
         plan: Limits, clock and folder of the programs; None for programs of one's own, which run where they lie.
@@ -162,6 +167,7 @@ class World:
         session: RecordingSession,
         near: Sequence[Path],
         *,
+        clock: str = ClockKind.VIRTUAL.value,
         seed: int = 0,
         name: str = "test",
         drawn_order: bool = False,
@@ -170,10 +176,10 @@ class World:
         plan: Plan | None = None,
     ) -> None:
         self.session = session
+        self._clock = clock_named(clock)
+        self._is_real = self._clock is ClockKind.WALL
         self._near = tuple(near)
         self._seed = seed
-        self._delay = {_absolute(topic): between for topic, between in (delay or {}).items()}
-        self._lose = {_absolute(topic): share for topic, share in (lose or {}).items()}
         self._plan = plan or Plan(
             scenario=name,
             processes=(),
@@ -182,11 +188,12 @@ class World:
             duration_ns=0,
             first_message_on="",
             wait_at_most_ns=0,
-            clock=ClockKind.VIRTUAL.value,
+            clock=self._clock.value,
             limits=OWN_LIMITS,
-            drawn_order=drawn_order,
+            drawn_order=drawn_order and not self._is_real,
             working=str(Path.cwd()),
             interfaces=_modules_for(self._near[:1]),
+            connections=tuple(_connections(seed, delay or {}, lose or {})),
         )
         self._observations: list[Observation] = []
         self._messages: dict[str, list[Message]] = {}
@@ -200,7 +207,7 @@ class World:
         self._simulations: list[Simulation] = []
         self._goals = 0
         self._random: Random | None = None
-        self._starting = False
+        self._starting = self._judging = False
         self._notes: list[str] = []
         self._unsuitable = ""
         self._run = SteppedRun(session.recorder, self._plan, self._answered)
@@ -249,7 +256,7 @@ class World:
                 name, namespace, (remappings or {}).items(), parameter_values(parameters or {})
             ),
         )
-        self._programs[label] = started = Program(label, found.root, self._signal, self._await_start)
+        self._programs[label] = started = Program(label, found.root, self._signal, self._catch_up)
         self._perform(Start(self._plan_of(found, start, env or {}), settle=not self._plan.drawn_order))
         return started
 
@@ -309,11 +316,14 @@ class World:
 
     @property
     def now(self) -> float:
-        """Seconds of virtual time since the test began."""
+        """Seconds since the test began: of virtual time, or of real time on the wall clock."""
+        __tracebackhide__ = True
+        if self._is_real:
+            self._catch_up()
         return seconds(self._run.now_ns)
 
     def advance(self, seconds: float) -> None:
-        """Let so much virtual time pass, with everything that happens at its end; 0 is as good as `settle`.
+        """Let so many seconds pass, with everything that happens at their end; 0 is as good as `settle`.
 
         Raises:
             ProgramFailed: A program has failed meanwhile.
@@ -321,12 +331,22 @@ class World:
         __tracebackhide__ = True
         if seconds < 0:
             raise ValueError(f"expected seconds to advance, found {seconds:g}: time does not go back")
-        self._perform(Advance(self._run.now_ns + round(seconds * NS_PER_S)))
+        self._perform(Advance(self._begin_ns() + round(seconds * NS_PER_S)))
 
     def settle(self) -> None:
-        """Let everything happen that happens now, such as the reaction to a message; no time passes."""
+        """Let everything happen that happens now, such as the reaction to a message; no virtual time passes.
+
+        On the wall clock nobody knows when a reaction is complete: it waits for a tenth of a second.
+        """
         __tracebackhide__ = True
-        self._perform(Advance(self._run.now_ns))
+        self.advance(REAL_SETTLE_S if self._is_real else 0.0)
+
+    def _begin_ns(self) -> int:
+        """Return the time at which a wait begins."""
+        __tracebackhide__ = True
+        if self._is_real:
+            self._catch_up()
+        return self._run.now_ns
 
     def wait_until(self, condition: Callable[[], Value], timeout: float) -> Value:
         """Let time pass until a condition holds, and return its value.
@@ -335,14 +355,14 @@ class World:
 
         Args:
             condition: Called without arguments.
-            timeout: Seconds of virtual time to wait at most.
+            timeout: Seconds to wait at most.
 
         Raises:
             StepTimeout: It does not hold in time; the message says what happened meanwhile.
             ProgramFailed: A program has failed meanwhile.
         """
         __tracebackhide__ = True
-        since_ns = self._run.now_ns
+        since_ns = self._begin_ns()
         lacking: list[NoMessage] = []
 
         def holds() -> Value | None:
@@ -363,11 +383,20 @@ class World:
         """Let time pass until a function returns something true, and return that; what it returns last otherwise."""
         __tracebackhide__ = True
         self._perform(Advance(self._run.now_ns))
-        while not (found := look()) and self._run.now_ns < deadline_ns:
+        while not (found := self._looked(look)) and self._run.now_ns < deadline_ns:
             self._perform(Advance(deadline_ns, until_news=True))
         return found
 
-    def _timeout(self, what: str, since_ns: int, first: Mapping[str, Sequence[str]], hint: str = "") -> StepTimeout:
+    def _looked(self, look: Callable[[], Value]) -> Value:
+        """Return what a function returns, all of whose looks show the same moment."""
+        __tracebackhide__ = True
+        self._judging = True
+        try:
+            return look()
+        finally:
+            self._judging = False
+
+    def _timeout(self, what: str, since_ns: int, first: Mapping[str, Iterable[str]], hint: str = "") -> StepTimeout:
         trace, programs = self.trace(), [*self._programs.values()]
         apart = [*telling.unheard(trace, self._offers.values()), *telling.apart(self._graph)]
         sections = {
@@ -407,7 +436,6 @@ class World:
         types = {interface for interface, _ in packed}
         if len(types) > 1:
             raise TypeError(f"{topic}: expected messages of one type, found {', '.join(sorted(types))}")
-        low, high = self._delay.get(topic, (0.0, 0.0))
         reliability, durability = qos_words(qos)
         command = Publish(
             topic,
@@ -416,8 +444,6 @@ class World:
             period_ns=0 if rate is None else round(NS_PER_S / rate),
             best_effort=reliability == "best_effort",
             latched=durability == "transient_local",
-            delay_ns=(round(low * NS_PER_S), round(high * NS_PER_S)),
-            loss=self._lose.get(topic, 0.0),
         )
         self._offers[topic] = Endpoint("publisher", topic, command.type, "the test", -1, reliability, durability)
         self._perform(command)
@@ -441,7 +467,10 @@ class World:
         """
         __tracebackhide__ = True
         name = _absolute(name)
-        interface = type_name(type)
+        interface = type_name(type, "srv")
+        known = self._functions.get(name)
+        if known is not None and type_name(known[0]) != interface:
+            raise ValueError(f"{name}: expected {type_name(known[0])}, as it is served already, found {interface}")
         self._functions[name] = (service_type(interface), function)
         self._perform(Serve(name, interface))
 
@@ -451,16 +480,15 @@ class World:
         Args:
             name: Its name.
             request: The request, such as `Trigger.Request()`.
-            timeout: Seconds of virtual time to wait at most, for the server and the response together.
+            timeout: Seconds to wait at most, for the server and the response together.
 
         Raises:
             StepTimeout: There was no response in time; the message says whether there is a server.
         """
         __tracebackhide__ = True
         name = _absolute(name)
-        interface = type_name(type(request))
-        kind = service_type(interface)
-        since_ns, seen = self._run.now_ns, len(self._observations)
+        interface, kind = type_of_part(request, "Request", name)
+        since_ns, seen = self._begin_ns(), len(self._observations)
         told = self._perform(Call(name, interface, plain_fields(request)))
 
         found = self._until(lambda: self._response(seen, name, told["client"]), since_ns + round(timeout * NS_PER_S))
@@ -483,19 +511,18 @@ class World:
             name: Name of the action.
             goal: The goal, such as `Fibonacci.Goal(order=5)`.
             cancel_after: Seconds after its acceptance at which the goal is cancelled; None to let it go on.
-            timeout: Seconds of virtual time to wait at most.
+            timeout: Seconds to wait at most.
 
         Raises:
             StepTimeout: There was no result in time.
         """
         __tracebackhide__ = True
         name = _absolute(name)
-        interface = type_name(type(goal))
-        kind = action_type(interface)
+        interface, kind = type_of_part(goal, "Goal", name)
         self._goals += 1
         uuid = tuple(bytes.fromhex(derive(self._seed, "goal", str(self._goals))[:32]))
         after_ns = 0 if cancel_after is None else max(1, round(cancel_after * NS_PER_S))
-        since_ns, seen = self._run.now_ns, len(self._observations)
+        since_ns, seen = self._begin_ns(), len(self._observations)
         told = self._perform(SendGoal(PlannedGoal(name, interface, since_ns, after_ns, plain_fields(goal), uuid)))
         sent, asked = told["clients"][:2]
 
@@ -519,7 +546,8 @@ class World:
             return found
         accepted = self._response(seen, f"{name}/_action/send_goal", sent)
         why = "it has accepted the goal" if accepted is not None else "it has not answered the goal"
-        offered = any(f"{name}/_action/send_goal" == offer.name for offer in self.trace().of(Offer))
+        servers = [one.service for one in telling.service_ends(self._graph, "service")]
+        offered = f"{name}/_action/send_goal" in (*servers, *(offer.name for offer in self.trace().of(Offer)))
         first = {"the action": [why if offered else f"nobody offers the action {name}"]}
         raise self._timeout(f"{name} gave no result", since_ns, first)
 
@@ -535,7 +563,7 @@ class World:
             node: Full name of the node.
             name: Name of the parameter.
             value: Its value.
-            timeout: Seconds of virtual time to wait at most.
+            timeout: Seconds to wait at most.
 
         Raises:
             ParameterRejected: The node does not accept the value, or has not declared the parameter.
@@ -582,7 +610,7 @@ class World:
             WrongType: A message is of another type.
         """
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         topic = _absolute(topic)
         known = self._read.setdefault(topic, [])
         found = self._messages.get(topic, ())
@@ -623,7 +651,7 @@ class World:
             The rate, 0 for fewer than two messages.
         """
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         since_ns = 0 if last is None else self._run.now_ns - round(last * NS_PER_S)
         times = [one.t_ns for one in self._messages.get(_absolute(topic), ()) if one.t_ns >= since_ns]
         # n - 1 gaps, not n: counting messages overstates a short time
@@ -632,25 +660,25 @@ class World:
     def nodes(self) -> list[str]:
         """Return the full names of the programs' nodes, sorted."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return sorted(self._graph.nodes)
 
     def topics(self) -> dict[str, str]:
         """Return the topics that programs publish on or subscribe to, with their types."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return {e.topic: e.type for e in sorted(self._graph.endpoints, key=lambda e: e.topic)}
 
     def services(self) -> dict[str, str]:
         """Return the services that programs offer, with their types; without those that every node has."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return {e.service: e.type for e in telling.service_ends(self._graph, "service")}
 
     def graph(self) -> GraphSnapshot:
         """Return nodes, publishers, subscriptions, servers and clients of the programs as they are now."""
         __tracebackhide__ = True
-        self._await_start()
+        self._catch_up()
         return self._graph
 
     @property
@@ -673,6 +701,7 @@ class World:
         self._expected.append(failure)
         try:
             yield failure
+            self._catch_up()  # what was started last comes up in this block
         finally:
             self._expected.remove(failure)
         if failure.fault is None:
@@ -687,7 +716,7 @@ class World:
         now_ns = self._run.now_ns + 1
         return Trace(
             self._plan.scenario,
-            ClockKind.VIRTUAL,
+            self._clock,
             stop_ns=now_ns,
             observations=tuple(self._observations),
             clock_reason=self._unsuitable,
@@ -731,14 +760,29 @@ class World:
         return self._random
 
     @property
+    def repeats(self) -> bool:
+        """Whether the same seed gives the same run; on the wall clock it gives the same delays and losses only."""
+        return not self._is_real
+
+    @property
     def is_drawn(self) -> bool:
         """Whether anything in this run was drawn from its seed."""
-        return self._plan.drawn_order or bool(self._delay or self._lose)
+        return self._plan.drawn_order or bool(self._plan.connections)
 
     @property
     def problem(self) -> str:
         """Why what happened may be untrue, once the world is closed; empty if it is not."""
-        return f"virtual time does not suit these programs: {self._unsuitable}" if self._unsuitable else ""
+        clock = "the wall clock" if self._is_real else "virtual time"
+        return f"{clock} does not suit these programs: {self._unsuitable}" if self._unsuitable else ""
+
+    def finish(self) -> None:
+        """Let the programs come up that were started last, so that none fails unnoticed.
+
+        Raises:
+            ProgramFailed: One has failed.
+        """
+        __tracebackhide__ = True
+        self._catch_up()
 
     def close(self) -> None:
         """End all programs, and the run; what was observed can still be looked at."""
@@ -753,23 +797,28 @@ class World:
         __tracebackhide__ = True
         if self._run.is_busy:
             raise RuntimeError("a function that answers for the test cannot let time pass or act on the programs")
-        if not isinstance(command, (Start, Advance)):
-            self._await_start()
+        if self._starting and not isinstance(command, (Start, Advance)):
+            self._catch_up()
         self._starting = isinstance(command, Start) and not command.settle
         told, observations = self._run.perform(command)
         if isinstance(command, Start):
             for name in told["started"]:
-                self._programs.setdefault(name, Program(name, Path(command.plan.root), self._signal, self._await_start))
+                self._programs.setdefault(name, Program(name, Path(command.plan.root), self._signal, self._catch_up))
         self._adopt(observations)
         if self._run.full:
             raise GraderError(f"the test was ended: {self._run.full}")
         self._raise_failure()
         return told
 
-    def _await_start(self) -> None:
-        """Let the programs come up that were started last: where a seed draws their order, they start together."""
+    def _catch_up(self) -> None:
+        """Learn what has happened since the last command, before the test looks or time passes.
+
+        On the virtual clock, that is the start of the programs that were started last: where a seed draws their order,
+        they start together. While a condition is looked at, nothing changes.
+        """
         __tracebackhide__ = True
-        if self._starting and not (self._run.is_busy or self._run.is_closed):
+        stands_still = self._run.is_busy or self._run.is_closed or self._judging
+        if (self._starting or self._is_real) and not stands_still:
             self._perform(Advance(self._run.now_ns))
 
     def _adopt(self, observations: Sequence[Observation]) -> None:
@@ -818,6 +867,34 @@ def _modules_for(folders: Sequence[Path]) -> tuple[str, ...]:
     found = tuple(str(path) for folder in folders for path in modules_for(folder))
     let_import(found)
     return found
+
+
+def clock_named(name: str) -> ClockKind:
+    """Return the clock of a name; raises ValueError if there is none."""
+    if name not in [kind.value for kind in ClockKind]:
+        raise ValueError(f"clock: expected virtual or wall, found {name!r}")
+    return ClockKind(name)
+
+
+def _connections(
+    seed: int, delay: Mapping[str, tuple[float, float]], lose: Mapping[str, float]
+) -> Iterator[PlannedConnection]:
+    """Yield what happens to the messages of a test on their way; raises ValueError for what cannot be."""
+    delays = {_absolute(topic): between for topic, between in delay.items()}
+    shares = {_absolute(topic): share for topic, share in lose.items()}
+    for topic in dict.fromkeys((*delays, *shares)):
+        between, share = delays.get(topic, (0.0, 0.0)), shares.get(topic, 0.0)
+        if not (isinstance(between, (tuple, list)) and len(between) == 2 and _rising(0, *between)):
+            raise ValueError(f"delay: {topic}: expected the least and the most seconds, found {between!r}")
+        if not _rising(0, share, 1):
+            raise ValueError(f"lose: {topic}: expected a share from 0 to 1, found {share!r}")
+        delay_ns = round(between[0] * NS_PER_S), round(between[1] * NS_PER_S)
+        yield PlannedConnection(topic, delay_ns, share, derive(seed, "connection", topic))
+
+
+def _rising(*numbers: Any) -> bool:
+    """Return whether all of some values are numbers, and none is less than the one before it."""
+    return all(isinstance(one, (int, float)) for one in numbers) and all(a <= b for a, b in pairwise(numbers))
 
 
 def _absolute(name: str) -> str:

@@ -15,8 +15,10 @@ from grader.core.limits import Limits
 from grader.core.trace import ClockKind, FaultKind
 from grader.execution import wall_runner as module
 from grader.execution.observer import Observer
+from grader.execution.plan import PlannedConnection
 from grader.execution.student_process import NodeProcess
 from grader.execution.wall_runner import WallRunner
+from grader.stimuli.messages import PlannedMessages
 from grader.stimuli.recorded import PlannedRecording
 
 SILENT = {"kind": "silent"}
@@ -243,3 +245,19 @@ def test_two_recordings_on_one_topic_do_not_end_each_other(clock: Clock) -> None
         ("/odom", True),
     ]
     assert len(run.trace.deliveries("/odom")) == 2
+
+
+@pytest.mark.parametrize("latched", [False, True])
+@pytest.mark.parametrize("delay_ms", [0, 80])
+def test_a_stream_that_follows_soon_takes_the_publisher_over_or_comes_after_it(
+    clock: Clock, latched: bool, delay_ms: int
+) -> None:
+    """One with the same QoS goes on with the publisher; otherwise the first one goes before the second one comes."""
+    usual: dict[str, Any] = {"type": FLOAT, "period_ns": 100 * MS, "repeats": 1, "best_effort": False}
+    first = PlannedMessages("/a", start_ns=400 * MS, stop_ns=500 * MS, latched=False, values=({},), **usual)
+    second = PlannedMessages("/a", start_ns=550 * MS, stop_ns=0, latched=latched, values=({}, {}), **usual)
+    connections = (PlannedConnection("/a", (delay_ms * MS, delay_ms * MS), 0.0, "1"),) if delay_ms else ()
+    run = Run(quiet, messages=(first, second), connections=connections, duration_ns=900 * MS)
+    assert len(run.trace.deliveries("/a")) == 3
+    changes = [(bool(kind), latched) for _, kind, latched in run.observer.advertised]
+    assert changes == ([(True, False), (False, False), (True, True)] if latched else [(True, False)])

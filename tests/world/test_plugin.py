@@ -8,6 +8,8 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+import grader
+
 NODES = Path(__file__).parent / "nodes"
 
 pytestmark = pytest.mark.ros
@@ -70,109 +72,57 @@ def test_a_failure_leaves_its_recording_and_a_page(suite: pytest.Pytester) -> No
 
 
 MISSING = """
+import pytest
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
 def test_it(ros):
     ros.run("ehco.py")
+
+def test_a_class(ros):
+    ros.publish("/in", String)
+
+def test_a_block(ros):
+    with ros.expects_failure():
+        ros.advance(1.0)
+
+def test_a_function_of_the_test(ros):
+    def answer(request):
+        return request.missing
+    ros.serve("/allowed", Trigger, answer)
+    ros.run("switch.py")
+    ros.call("/enable", __import__("std_srvs.srv").srv.SetBool.Request())
+
+@pytest.fixture
+def echo(ros_session, request):
+    with ros_session.open(request.path.parent) as ros:
+        yield ros
+
+def test_a_world_of_a_fixture(echo):
+    echo.publish("/in", String())
+    echo.advance(-1)
 """
 
 
 def test_a_mistake_in_a_test_is_shown_at_its_line_with_a_hint(suite: pytest.Pytester) -> None:
-    """A file that is not there; nothing of the grader's own code is shown."""
+    """A file that is not there, or an object of a wrong class; nothing of the grader's own code is shown."""
     text = run(suite, MISSING).stdout.str()
+    for line, error in (
+        ('ros.publish("/in", String)', "TypeError: /in: expected a message, found the class String; write String()"),
+        ("with ros.expects_failure():", "AssertionError: expected that a program fails, but none did"),
+        ("return request.missing", "AttributeError: 'Trigger_Request' object has no attribute 'missing'"),
+        ("echo.advance(-1)", "ValueError: expected seconds to advance, found -1: time does not go back"),
+    ):
+        assert f">       {line}" in text
+        assert f"E       {error}" in text
+    assert str(Path(grader.__file__).parent) not in text
+    assert "contextlib.py" not in text
+    whole = run(suite, MISSING, "--full-trace", "-k", "class").stdout.str()
+    assert str(Path(grader.__file__).parent) in whole
     assert '>       ros.run("ehco.py")' in text
     assert "SubmissionError: ehco.py: expected a file, found none" in text
     assert "hint: did you mean echo.py?" in text
     assert "grader/world" not in text
-
-
-RACE = """
-import pytest
-from std_msgs.msg import String
-
-@pytest.mark.ros(seeds=8)
-def test_the_last_word(ros):
-    ros.run("echo.py", name="one", remappings={"/out": "/said"}, env={"WORD": "one"})
-    ros.run("echo.py", name="two", remappings={"/out": "/said"}, env={"WORD": "two"})
-    listener = ros.run("last.py")
-    ros.publish("/in", String(data="x"))
-    ros.advance(1.0)
-    assert listener.logs[-1].text == "two"
-"""
-LAST = """
-import rclpy
-from rclpy.node import Node
-from std_msgs.msg import String
-
-class Last(Node):
-    def __init__(self):
-        super().__init__("last")
-        self.create_subscription(String, "/said", lambda m: self.get_logger().info(m.data), 10)
-
-rclpy.init()
-rclpy.spin(Last())
-"""
-
-
-def test_a_race_is_found_under_several_seeds_and_repeated_by_its_own(suite: pytest.Pytester) -> None:
-    """Two programs that are ready at the same moment: which speaks last follows from the seed."""
-    echo = suite.path / "echo.py"
-    text = echo.read_text(encoding="utf-8").replace("import rclpy\n", "import os\n\nimport rclpy\n", 1)
-    echo.write_text(text.replace("publish(message)", "publish(String(data=os.environ['WORD']))"), encoding="utf-8")
-    suite.makepyfile(last=LAST)
-    result = run(suite, RACE, "-q", "-rf")
-    outcomes = result.parseoutcomes()
-    assert outcomes["passed"] + outcomes["failed"] == 8
-    assert min(outcomes["passed"], outcomes["failed"]) > 0
-    failed = re.findall(r"^FAILED test_it.py::test_the_last_word\[seed(\d)\]", result.stdout.str(), re.MULTILINE)
-    result.stdout.fnmatch_lines([f"seed {failed[0]}: repeat it with --ros-seed {failed[0]}"])
-    for _ in range(2):
-        run(suite, RACE, "--ros-seed", failed[0]).assert_outcomes(failed=1)
-    passed = next(str(seed) for seed in range(8) if str(seed) not in failed)
-    run(suite, RACE, "--ros-seed", passed).assert_outcomes(passed=1)
-
-
-HASTY = """
-import rclpy
-from std_srvs.srv import Trigger
-
-rclpy.init()
-node = rclpy.create_node("hasty")
-client = node.create_client(Trigger, "/ready")
-node.get_logger().info("asked" if client.service_is_ready() else "nobody there")
-rclpy.spin(node)
-"""
-SERVER = """
-import rclpy
-from std_srvs.srv import Trigger
-
-rclpy.init()
-node = rclpy.create_node("server")
-node.create_service(Trigger, "/ready", lambda request, response: response)
-rclpy.spin(node)
-"""
-TOGETHER = """
-import pytest
-
-@pytest.mark.ros(seeds=8)
-def test_the_service_is_there(ros):
-    ros.run("server.py")
-    hasty = ros.run("hasty.py")
-    assert ros.nodes() == ["/hasty", "/server"]
-    assert [log.text for log in hasty.logs] == ["asked"]
-
-def test_without_a_seed(ros):
-    ros.run("server.py")
-    assert [log.text for log in ros.run("hasty.py").logs] == ["asked"]
-"""
-
-
-def test_programs_start_together_where_their_order_is_drawn(suite: pytest.Pytester) -> None:
-    """A client that asks before the server is up is found under some seeds, and repeated by each of them."""
-    suite.makepyfile(hasty=HASTY, server=SERVER)
-    result = run(suite, TOGETHER, "-q", "-rf")
-    failed = re.findall(r"^FAILED test_it.py::test_the_service_is_there\[seed(\d)\]", result.stdout.str(), re.MULTILINE)
-    result.assert_outcomes(passed=9 - len(failed), failed=len(failed))
-    assert 0 < len(failed) < 8
-    run(suite, TOGETHER, "--ros-seed", failed[0], "-k", "is_there").assert_outcomes(failed=1, deselected=1)
 
 
 DISTURBED = """
@@ -303,4 +253,62 @@ def test_a_wrong_option_of_the_marker_is_told(suite: pytest.Pytester) -> None:
     text = "import pytest\n@pytest.mark.ros(sede=1)\ndef test_it(ros): pass\n"
     result = run(suite, text)
     assert result.ret != 0
-    result.stdout.fnmatch_lines(["*@pytest.mark.ros: expected seed, seeds, delay, lose by name, found sede"])
+    result.stdout.fnmatch_lines(["*@pytest.mark.ros: expected clock, seed, seeds, delay, lose by name, found sede"])
+
+
+CLOCKS = """
+import pytest
+from std_msgs.msg import String
+
+def answers(ros):
+    ros.run("echo.py")
+    ros.publish("/in", String(data="a"), rate=20)
+    ros.wait_until(lambda: ros.messages("/out")[2], timeout=60)
+    return ros.trace().clock.value
+
+def test_by_default(ros):
+    assert answers(ros) == CLOCK
+
+@pytest.mark.ros(clock="virtual")
+def test_virtual(ros):
+    assert answers(ros) == "virtual"
+
+@pytest.mark.ros(clock="wall")
+def test_wall(ros):
+    assert answers(ros) == "wall"
+
+@pytest.mark.ros(seeds=3)
+def test_seeds(ros):
+    assert answers(ros) == CLOCK
+
+@pytest.mark.ros(lose={"/in": 1.0})
+def test_it_fails(ros):
+    ros.run("echo.py")
+    ros.publish("/in", String(data="a"), rate=20)
+    ros.wait_until(lambda: ros.messages("/out"), timeout=0.3)
+"""
+
+
+@pytest.mark.parametrize(("arguments", "clock", "seeds"), [((), "virtual", 3), (("--ros-clock", "wall"), "wall", 1)])
+def test_the_clock_is_an_option_and_a_marker(
+    suite: pytest.Pytester, arguments: tuple[str, ...], clock: str, seeds: int
+) -> None:
+    """The marker wins; on the wall clock a test with several seeds runs once."""
+    result = run(suite, CLOCKS.replace("CLOCK", repr(clock)), "-rf", *arguments)
+    result.assert_outcomes(passed=3 + seeds, failed=1)
+    repeating = "repeat it with" if clock == "virtual" else "the same delays and losses are drawn with"
+    result.stdout.fnmatch_lines(["*StepTimeout: the condition did not hold*", f"seed 0: {repeating} --ros-seed 0"])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("clock='real'", "*clock: expected virtual or wall, found 'real'"),
+        ("clock='wall', seeds=3", "*seeds draws the order of what is ready, which the wall clock leaves to chance: *"),
+    ],
+)
+def test_a_wrong_clock_is_told(suite: pytest.Pytester, options: str, words: str) -> None:
+    """So is what it cannot do."""
+    result = run(suite, f"import pytest\n@pytest.mark.ros({options})\ndef test_it(ros): pass\n")
+    assert result.ret != 0
+    result.stdout.fnmatch_lines([words])

@@ -12,6 +12,7 @@ from geometry_msgs.msg import Twist
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int32, String
 from std_srvs.srv import SetBool, Trigger
+from test_msgs.action import Fibonacci
 
 from grader.core.errors import HarnessError, SubmissionError
 from grader.world.errors import NoMessage, ProgramFailed, StepTimeout
@@ -455,6 +456,49 @@ def test_what_cannot_be_published_is_told(
         ros.advance(-1.0)
 
 
+WRONG_USES = [
+    (lambda ros: ros.publish("/a", Trigger.Request()), "/a: expected a ROS message, found Trigger_Request"),
+    (lambda ros: ros.call("/a", String()), r"/a: expected a request such as Trigger\.Request\(\), found String"),
+    (lambda ros: ros.call("/a", Trigger.Response()), "found Trigger_Response"),
+    (lambda ros: ros.call("/a", Trigger.Request), "expected a request such as .*, found the class Trigger_Request"),
+    (lambda ros: ros.call("/a", Trigger), "found the class Trigger"),
+    (lambda ros: ros.call("/a", {"data": True}), "found dict"),
+    (
+        lambda ros: ros.send_goal("/a", Trigger.Request()),
+        r"/a: expected a goal such as Fibonacci\.Goal\(\), found Trigger",
+    ),
+    (lambda ros: ros.send_goal("/a", Fibonacci.Result()), "found Fibonacci_Result"),
+    (lambda ros: ros.serve("/a", String, lambda _: None), "expected the class of a ROS service, found String"),
+    (lambda ros: ros.serve("/a", Fibonacci, lambda _: None), "expected the class of a ROS service, found Fibonacci"),
+    (
+        lambda ros: ros.serve("/on", SetBool, lambda _: None),
+        "/on: expected std_srvs/srv/Trigger, as it is served already",
+    ),
+]
+
+
+def test_a_wrong_use_is_told_and_leaves_the_world_usable(ros: World) -> None:
+    """What is no message, request, goal or service is named, with what was expected."""
+    ros.serve("/on", Trigger, lambda _: Trigger.Response())
+    for use, words in WRONG_USES:
+        with pytest.raises((TypeError, ValueError), match=words):
+            use(ros)
+    ros.run("nodes/echo.py")
+    ros.publish("/in", String(data="on"))
+    ros.settle()
+    assert [m.data for m in ros.messages("/out")] == ["on"]
+
+
+def test_requests_without_a_response_and_nodes_that_are_not_there_are_told(ros: World) -> None:
+    """A timeout counts requests and responses; the service of a node is told by the node."""
+    ros.run("nodes/switch.py")
+    ros.run("nodes/echo.py")
+    with pytest.raises(StepTimeout, match=r"meanwhile:\n  /enable: 1 request, no responses"):
+        ros.call("/enable", SetBool.Request(data=True), timeout=1.0)
+    with pytest.raises(StepTimeout, match=r"there is no node /ehco\n  hint: did you mean /echo\?"):
+        ros.set_parameter("/ehco", "a", 1, timeout=1.0)
+
+
 def test_a_type_that_is_not_installed_leaves_the_world_usable(ros: World) -> None:
     """What the worker refuses, it refuses without ending the run."""
     ros.run("nodes/echo.py")
@@ -470,3 +514,14 @@ def test_a_log_may_be_waited_for_that_nobody_has_written(ros: World) -> None:
     echo = ros.run("nodes/echo.py")
     with pytest.raises(StepTimeout, match=r"echo\.py has logged nothing"):
         ros.wait_until(lambda: echo.logs[-1].text == "done", timeout=0.1)
+
+
+@pytest.mark.parametrize("seed", [None, 3])
+def test_no_failure_at_the_start_is_missed(ros_session: Worlds, write: Write, seed: int | None) -> None:
+    """With a seed, programs come up with the next step: at the end of a block, or of the test, at the latest."""
+    bad = write("raise ValueError('at once')\n")
+    with ros_session.open(seed=seed) as ros, ros.expects_failure("ValueError: at once") as failure:
+        ros.run(bad)
+    assert failure.program is not None
+    with pytest.raises(ProgramFailed, match="ValueError: at once"), ros_session.open(seed=seed) as ros:
+        ros.run(bad)
