@@ -76,6 +76,7 @@ _FACTS: tuple[tuple[Kind, str, Callable[[Trace], object]], ...] = (
     (Kind.CONTENT, "left out", lambda trace: trace.left_out),
     (Kind.CONTENT, "not started", lambda trace: trace.unstarted),
     (Kind.CONTENT, "newer Python", lambda trace: trace.newer),
+    (Kind.CONTENT, "result of the test", lambda trace: trace.tested),
     (Kind.GRADER, "written files", lambda trace: trace.written),
     (Kind.GRADER, "notes", lambda trace: trace.notes),
     (Kind.GRADER, "suspicious actions", lambda trace: trace.reached),

@@ -257,7 +257,7 @@ def test_a_stream_that_follows_soon_takes_the_publisher_over_or_comes_after_it(
     first = PlannedMessages("/a", start_ns=400 * MS, stop_ns=500 * MS, latched=False, values=({},), **usual)
     second = PlannedMessages("/a", start_ns=550 * MS, stop_ns=0, latched=latched, values=({}, {}), **usual)
     connections = (PlannedConnection("/a", (delay_ms * MS, delay_ms * MS), 0.0, "1"),) if delay_ms else ()
-    run = Run(quiet, messages=(first, second), connections=connections, duration_ns=900 * MS)
+    run = Run(quiet, stimuli=(first, second), connections=connections, duration_ns=900 * MS)
     assert len(run.trace.deliveries("/a")) == 3
     changes = [(bool(kind), latched) for _, kind, latched in run.observer.advertised]
     assert changes == ([(True, False), (False, False), (True, True)] if latched else [(True, False)])

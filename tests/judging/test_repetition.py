@@ -24,6 +24,7 @@ from grader.core.trace import (
     Request,
     Start,
     StartWay,
+    Tested,
     Trace,
 )
 from grader.core.verification import Cause, Difference, Kind
@@ -123,6 +124,7 @@ def test_what_belongs_to_the_whole_recording() -> None:
     first = trace(*USUAL)
     assert between(first, replace(first, stop_ns=5)).kind is Kind.TIME
     assert between(first, replace(first, starts=(Start("a.py", "a.py", StartWay.SCRIPT),))).kind is Kind.CONTENT
+    assert between(first, replace(first, tested=Tested(passed=True))).kind is Kind.CONTENT
 
 
 def test_the_clock() -> None:
@@ -143,7 +145,7 @@ def test_measured_times_of_the_grader_do_not_count() -> None:
 def test_every_part_of_a_recording_is_compared_or_left_out_on_purpose() -> None:
     """A new field of a trace has to be put here, and into the comparison if it should repeat."""
     compared = {"observations", "clock_reason", "stop_ns", "starts", "written", "left_out", "newer", "notes", "reached"}
-    compared |= {"unstarted"}
+    compared |= {"unstarted", "tested"}
     same_by_plan = {"scenario", "clock"}
     failures = {"harness_problem", "suspected", "author_mistake"}  # then nothing is compared
     measured = {"may_drift", "most_starved_ns", "incomplete"}
