@@ -24,8 +24,10 @@ from grader.core.trace import (
     Request,
     Start,
     StartWay,
-    Tested,
     Trace,
+)
+from grader.core.trace import (
+    Tested as Outcome,
 )
 from grader.core.verification import Cause, Difference, Kind
 from grader.judging.repetition import events, first_difference
@@ -124,7 +126,7 @@ def test_what_belongs_to_the_whole_recording() -> None:
     first = trace(*USUAL)
     assert between(first, replace(first, stop_ns=5)).kind is Kind.TIME
     assert between(first, replace(first, starts=(Start("a.py", "a.py", StartWay.SCRIPT),))).kind is Kind.CONTENT
-    assert between(first, replace(first, tested=Tested(passed=True))).kind is Kind.CONTENT
+    assert between(first, replace(first, tested=Outcome(passed=True))).kind is Kind.CONTENT
 
 
 def test_the_clock() -> None:
