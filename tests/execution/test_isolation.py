@@ -657,7 +657,7 @@ def test_a_worker_opens_nothing_of_the_instructor(sandbox: Sandbox, tmp_path: Pa
     readable, writable = (set(map(Path, found)) for found in said(finish(command)))
     package = HOST.parent
     seen = {path.relative_to(package).parts[0] for path in readable if package in path.parents}
-    assert seen == {"__init__.py", "api.py", "core", "simulation", "student_host", "execution"}
+    assert seen == {"__init__.py", "api.py", "core", "simulation", "stimuli", "student_host", "execution"}
     needed = (*ros.runtime.read_paths, ros.runtime.executable, package, sandbox.submission, Path("/dev"), SEEN_AT)
     roots = {path.resolve() for path in needed} | set(needed)
     accounts = {Path("/etc", name) for name in account_files(0, 0, Path("/"))}  # the grader's own
