@@ -37,6 +37,9 @@ BACKGROUND_PARAMETERS = frozenset({"use_sim_time", "start_type_description_servi
 BACKGROUND_SERVICES = ("rcl_interfaces/", "type_description_interfaces/")
 #: How long, in real time, to wait for an announced message before it counts as lost.
 ARRIVAL_S = 1.0
+#: When nothing more has come for so long, in real time, the newest of several messages has arrived: the middleware
+#: delivers them one after the other, some microseconds apart.
+QUIET_S = 0.01
 #: How long one wait of rclpy for such a message takes at most.
 ONE_WAIT_NS = 10_000_000
 #: How long, in real time, to wait until a counterpart has disappeared.
@@ -283,23 +286,37 @@ class Ledger:
                     continue
                 self._include(receiver)
                 depth = _depth(receiver)
-                expected = self._expected.get(receiver, 0) + min(count, depth)
+                before = self._expected.get(receiver, 0)
+                expected = before + min(count, depth)
                 self._expected[receiver] = expected
                 # If older messages were left unread, readiness does not show that the newest has arrived.
                 unread = expected > 1 or depth == 1 or self.kept(receiver)
                 if channel.startswith("topic ") and unread and not self.awaited[receiver.handle.pointer]:
-                    self._keep_all(receiver)
+                    self._keep_all(receiver, more=before + count > depth)
         self.await_arrivals(list(self._expected))
 
-    def _keep_all(self, subscription: Any) -> None:
-        """Take all expected messages of a subscription that no wait set reads, and keep as many as its queue holds."""
+    def _keep_all(self, subscription: Any, *, more: bool) -> None:
+        """Take all expected messages of a subscription that no wait set reads, and keep as many as its queue holds.
+
+        Args:
+            subscription: The subscription.
+            more: Whether more were sent than its queue holds. How many of them the middleware has dropped cannot be
+                known, so an older one may be there while the newest is still on its way: none may come for a while.
+        """
         kept = self._kept.setdefault(subscription, deque(maxlen=_depth(subscription)))
-        while self._expected.get(subscription, 0) > 0 and self.await_arrivals([subscription]):
+
+        def take() -> None:
             with subscription.handle:
                 found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
-            self._expected[subscription] -= 1
             if found is not None:
                 kept.append(found)
+
+        while self._expected.get(subscription, 0) > 0 and self.await_arrivals([subscription]):
+            take()
+            self._expected[subscription] -= 1
+        context = self._context()
+        while more and context is not None and _valid(subscription) and _await_ready(subscription, context, QUIET_S):
+            take()
 
     def kept(self, subscription: Any) -> deque[Any]:
         """Return the messages that were taken for a subscription ahead of time, oldest first."""
@@ -608,10 +625,10 @@ def _asked(look: Callable[[], Any]) -> int | None:
         return None
 
 
-def _await_ready(receiver: Any, context: Any) -> bool:
+def _await_ready(receiver: Any, context: Any, within_s: float = ARRIVAL_S) -> bool:
     """Wait, in real time, until one message can be taken from a receiver."""
     if isinstance(receiver, Receiver):
-        return receiver.is_ready_within(ARRIVAL_S, REAL_WAIT_SET, context)
+        return receiver.is_ready_within(within_s, REAL_WAIT_SET, context)
     kind = (
         "subscription"
         if hasattr(receiver, "topic_name")
@@ -628,7 +645,7 @@ def _await_ready(receiver: Any, context: Any) -> bool:
             wait_set.wait(ONE_WAIT_NS)
             return receiver.handle.pointer in wait_set.get_ready_entities(kind)
 
-        return originals.wait_until(is_ready, ARRIVAL_S, pause_s=0)
+        return originals.wait_until(is_ready, within_s, pause_s=0)
 
 
 REAL_WAIT_SET: Any = _rclpy.WaitSet
