@@ -38,7 +38,7 @@ BACKGROUND_SERVICES = ("rcl_interfaces/", "type_description_interfaces/")
 #: How long, in real time, to wait for an announced message before it counts as lost.
 ARRIVAL_S = 1.0
 #: When nothing more has come for so long, in real time, the newest of several messages has arrived: the middleware
-#: delivers them one after the other, some microseconds apart.
+#: delivers them some microseconds apart.
 QUIET_S = 0.01
 #: How long one wait of rclpy for such a message takes at most.
 ONE_WAIT_NS = 10_000_000
