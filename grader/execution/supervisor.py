@@ -541,14 +541,14 @@ class Recorder:
         with contextlib.suppress(queue.Empty):
             while found is None:
                 worker = self._idle.get_nowait()
-                is_fit = worker is not None and not worker.gone and (plan is None or worker.suits(plan))
-                if is_fit:
+                if worker is not None and worker.gone:
+                    worker = None
+                if worker is not None and (plan is None or worker.suits(plan)):
                     found = worker
                 else:
-                    others.append(worker if worker is not None and not worker.gone else None)
+                    others.append(worker)
         if found is None and others:  # its place is that of the new one
-            empty = next((n for n, worker in enumerate(others) if worker is None), 0)
-            self._discard(others.pop(empty))
+            self._discard(others.pop(others.index(None) if None in others else 0))
         for worker in reversed(others):
             self._idle.put(worker)
         return found or self._pool.submit(self._start).result()

@@ -27,7 +27,7 @@ from grader.core.submission import Submission
 from grader.core.trace import Trace
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.supervisor import Job
-from grader.execution.test_runs import record_tests
+from grader.execution.test_runs import TestJob, record_tests
 from grader.judging.judge_run import judge_exercise
 from grader.mutation.explained import Explained, Explanation, read_explained
 from grader.mutation.operators import mutants_of
@@ -63,8 +63,7 @@ class TrialRunner:
         """Grade a complete submission; the traces are those of its scenarios."""
         jobs = plan_jobs(self.request, [self.exercise], submission, self.bags, self.seed, self.interfaces)
         recorded = self.session.record(jobs, self.request.clock, self.progress)
-        tests = plan_tests([self.exercise], submission, self.seed, interfaces=self.interfaces, trusted=self.interfaces)
-        recorded |= record_tests(self.session.recorder, tests, self.progress)
+        recorded |= record_tests(self.session.recorder, self._tests(submission), self.progress)
         self.recordings += len(recorded)
         traces = {scenario: trace for (_, scenario), trace in recorded.items()}
         return result_of(judge_exercise(self.exercise, traces, submission, read_sources(submission))), traces
@@ -82,13 +81,7 @@ class TrialRunner:
                 for key, job in self._jobs(c, submissions[c.id]).items()
             }
             recorded = self.session.record(jobs, self.request.clock, self.progress)
-            tests = {
-                (c.id, key[1]): job
-                for c in chunk
-                for key, job in plan_tests(
-                    [self.exercise], submissions[c.id], self.seed, interfaces=self.interfaces, trusted=self.interfaces
-                ).items()
-            }
+            tests = {(c.id, key[1]): job for c in chunk for key, job in self._tests(submissions[c.id]).items()}
             recorded |= record_tests(self.session.recorder, tests, self.progress)
             self.recordings += len(recorded)
             for candidate in chunk:
@@ -101,6 +94,9 @@ class TrialRunner:
         jobs = plan_jobs(self.request, [self.exercise], submission, self.bags, self.seed, self.interfaces)
         concerned = {s.id for s in self.exercise.scenarios if candidate.file in s.processes}
         return {key: job for key, job in jobs.items() if key[1] in concerned}
+
+    def _tests(self, submission: Submission) -> Mapping[tuple[str, str], TestJob]:
+        return plan_tests([self.exercise], submission, self.seed, interfaces=self.interfaces, trusted=self.interfaces)
 
     def _judged(self, candidate: Candidate, submission: Submission, own: Mapping[str, Trace]) -> TrialResult:
         sources = {**self.sources, candidate.file: candidate.source}

@@ -9,7 +9,6 @@ import sys
 from collections.abc import Sequence
 from functools import cache
 from importlib import invalidate_caches
-from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
@@ -59,41 +58,33 @@ def modules_for(folder: Path) -> tuple[Path, ...]:
     return modules_named(sources, own, find_ros(workspaces=True))
 
 
-class PackageFinder(MetaPathFinder):
-    """Finds packages that are not installed, where nothing else finds them.
+def find_package(folder: Path, name: str, target: ModuleType | None = None) -> ModuleSpec | None:
+    """Return the place of a package that is not installed; None for anything else.
 
     Args:
         folder: Lies in the workspace.
+        name: The package.
+        target: As for a finder of modules.
+
+    Raises:
+        ImportError: It cannot be built.
     """
+    try:
+        found = [str(place) for place in _places(folder, name)]
+    except GraderError as error:
+        hint = f"; {error.hint}" if error.hint else ""
+        raise ImportError(f"{name}: {error.message}{hint}", name=name) from None
+    let_import(found)
+    return PathFinder.find_spec(name, found, target) if found else None
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._is_looking = False
 
-    def find_spec(
-        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
-        """Return the place of a package; None for anything else. Raises ImportError if it cannot be built."""
-        if path is not None or self._is_looking:  # a build looks whether other modules have these names
-            return None
-        self._is_looking = True
-        try:
-            found = [str(folder) for folder in self._modules(fullname)]
-        except GraderError as error:
-            hint = f"; {error.hint}" if error.hint else ""
-            raise ImportError(f"{fullname}: {error.message}{hint}", name=fullname) from None
-        finally:
-            self._is_looking = False
-        let_import(found)
-        return PathFinder.find_spec(fullname, found, target) if found else None
-
-    def _modules(self, name: str) -> tuple[Path, ...]:
-        workspace = workspace_around(self._folder)
-        if workspace is not None and name in {package.name for package in _unbuilt(workspace)}:
-            return modules_for(self._folder)
-        if name in LENDABLE or name in {package.name for package in shipped_packages()}:
-            return modules_named([name.encode()], (), find_ros(workspaces=True))
-        return ()
+def _places(folder: Path, name: str) -> tuple[Path, ...]:
+    workspace = workspace_around(folder)
+    if workspace is not None and name in {package.name for package in _unbuilt(workspace)}:
+        return modules_for(folder)
+    if name in LENDABLE or name in {package.name for package in shipped_packages()}:
+        return modules_named([name.encode()], (), find_ros(workspaces=True))
+    return ()
 
 
 def let_import(folders: Sequence[str]) -> None:
