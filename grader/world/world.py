@@ -180,7 +180,7 @@ class World:
         self._is_real = self._clock is ClockKind.WALL
         self._near = tuple(near)
         self._seed = seed
-        self._plan = plan or Plan(
+        plan = plan or Plan(
             scenario=name,
             processes=(),
             root="/",
@@ -193,8 +193,8 @@ class World:
             drawn_order=drawn_order and not self._is_real,
             working=str(Path.cwd()),
             interfaces=_modules_for(self._near[:1]),
-            connections=tuple(_connections(seed, delay or {}, lose or {})),
         )
+        self._plan = replace(plan, connections=tuple(_connections(seed, delay or {}, lose or {})))
         self._observations: list[Observation] = []
         self._messages: dict[str, list[Message]] = {}
         self._read: dict[str, list[Received]] = {}

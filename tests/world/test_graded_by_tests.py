@@ -136,6 +136,36 @@ def test_a_failed_assertion_is_the_reason(grade: Grade) -> None:
     )
 
 
+ON_THEIR_WAY = """
+import pytest
+from sensor_msgs.msg import LaserScan
+
+
+def first_move(ros):
+    ros.publish("/scan", LaserScan(ranges=[2.0] * 360), rate=10)
+    ros.run("obstacle_stop.py", parameters={"distance": 0.5})
+    ros.advance(2.0)
+    return next((one.t for one in ros.received("/cmd_vel") if one.message.linear.x), None)
+
+
+@pytest.mark.points(1)
+@pytest.mark.ros(lose={"/scan": 1.0})
+def test_lost(ros):
+    assert first_move(ros) is None
+
+
+@pytest.mark.points(1)
+@pytest.mark.ros(delay={"/scan": (1.0, 1.0)})
+def test_late(ros):
+    assert 1.0 <= first_move(ros) < 1.2
+"""
+
+
+def test_messages_of_a_test_may_come_late_or_not_at_all(grade: Grade) -> None:
+    """As its marker says, for programs in the sandbox as for one's own."""
+    assert outcomes(grade(RIGHT, ON_THEIR_WAY)) == ["met", "met"]
+
+
 def test_what_does_not_fit_is_the_hint(grade: Grade) -> None:
     """Where nobody hears the test, the hint names the topic, whatever the assertion says."""
     deaf = verdicts(grade(RIGHT.replace('"/scan"', '"/scn"')))["test_stops_0_1"]
