@@ -30,12 +30,12 @@ from typing import Any
 sys.path.append(str(Path(__file__).resolve().parent.parent / "tests"))
 import sample_folders  # where the test submissions are
 
-from grader.app.grade import grade_in
-from grader.app.request import GradeRequest
-from grader.core.errors import GraderError
-from grader.execution.recording_session import RecordingSession, open_session
-from grader.files import write_whole
-from grader.reporting.json_report import dumps
+from grader.grading.app.grade import grade_in
+from grader.grading.app.request import GradeRequest
+from grader.grading.reporting.json_report import dumps
+from grader.runtime.files import write_whole
+from grader.runtime.model.errors import GraderError
+from grader.runtime.session import RecordingSession, open_session
 
 CHECKED = "auto-checked"
 MODES = ("virtual", "wall", "auto", "auto-load", CHECKED)

@@ -28,7 +28,7 @@ from rclpy.node import Node
 from std_msgs.msg import Int32, String
 from std_srvs.srv import Trigger
 
-from grader.execution.sandbox.environment import dds_profile
+from grader.runtime.sandbox.environment import dds_profile
 from grader.world.opening import Worlds, open_worlds
 from grader.world.world import World
 

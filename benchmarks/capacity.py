@@ -37,22 +37,22 @@ import msgspec
 from class_of_100 import kinds, make_class
 from distributed import LocalCluster
 
-from grader.app.grade import read_exercises, wanted_files
-from grader.app.request import GradeRequest
-from grader.classroom import receiving as remote
-from grader.classroom import store as kept
-from grader.classroom.class_run import grade_class
-from grader.classroom.cluster.dispatcher import connected
-from grader.classroom.grading import ALL, CHANGED, ClassRequest, digest_of
-from grader.classroom.intake import HandedInEntry
-from grader.classroom.local import LocalScheduler, MakeScheduler, Task
-from grader.classroom.messages import GradingJob, JobResult, Terms, files_below
-from grader.classroom.store import ResultStatus
-from grader.classroom.watching import Watcher
-from grader.classroom.worker import PARTS
-from grader.core.shipped import shipped
-from grader.execution.temp_dirs import scratch_folder
-from grader.similarity.finding import read_given
+from grader.course.classroom import receiving as remote
+from grader.course.classroom import store as kept
+from grader.course.classroom.class_run import grade_class
+from grader.course.classroom.cluster.dispatcher import connected
+from grader.course.classroom.grading import ALL, CHANGED, ClassRequest, digest_of
+from grader.course.classroom.intake import HandedInEntry
+from grader.course.classroom.local import LocalScheduler, MakeScheduler, Task
+from grader.course.classroom.messages import GradingJob, JobResult, Terms, files_below
+from grader.course.classroom.store import ResultStatus
+from grader.course.classroom.watching import Watcher
+from grader.course.classroom.worker import PARTS
+from grader.course.similarity.finding import read_given
+from grader.grading.app.grade import read_exercises, wanted_files
+from grader.grading.app.request import GradeRequest
+from grader.runtime.shipped import shipped
+from grader.runtime.temp_dirs import scratch_folder
 
 GRADE = str(Path(sys.executable).with_name("grade"))
 #: Submissions that are graded in truth; at least one of each kind.

@@ -10,10 +10,10 @@ import sys
 import time
 from pathlib import Path
 
-from grader.app.request import GradeRequest
-from grader.app.start import grade
-from grader.reporting.html.assets import bundle
-from grader.reporting.html.render import render_html
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.start import grade
+from grader.grading.reporting.html.assets import bundle
+from grader.grading.reporting.html.render import render_html
 
 ROOT = Path(__file__).resolve().parent.parent
 ROUNDS = 20

@@ -19,14 +19,14 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from grader.core.errors import EnvironmentFault
-from grader.core.limits import Limits
-from grader.execution.codec import from_json, to_json
-from grader.execution.ros_installation import PythonRuntime, RosInstallation, find_ros
-from grader.execution.sandbox.choose import choose_isolation
-from grader.execution.sandbox.environment import quick_discovery, runtime_environment
-from grader.execution.sandbox.protocol import StudentProcess
-from grader.execution.sandbox.tiers import HOST, ISOLATING, isolation_from_name
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.model.limits import Limits
+from grader.runtime.recording.codec import from_json, to_json
+from grader.runtime.ros_installation import PythonRuntime, RosInstallation, find_ros
+from grader.runtime.sandbox.choose import choose_isolation
+from grader.runtime.sandbox.environment import quick_discovery, runtime_environment
+from grader.runtime.sandbox.protocol import StudentProcess
+from grader.runtime.sandbox.tiers import HOST, ISOLATING, isolation_from_name
 
 NODE = """
 import rclpy, os

@@ -28,15 +28,15 @@ import tempfile
 import time
 from pathlib import Path
 
-from grader.execution.temp_dirs import FRESH_S, sweep
-from grader.execution.usage import families
+from grader.runtime.temp_dirs import FRESH_S, sweep
+from grader.runtime.usage import families
 
 ROOT = Path(__file__).resolve().parent.parent
 GRADE = str(Path(sys.executable).with_name("grade"))
 KINDS = ("grader", "worker", "starter", "student", "bubblewrap")
 REFERENCE = ROOT / "reference_solutions"
-STARTS_STARTER = "grader.execution.worker_main"
-MODULES = {STARTS_STARTER: "worker", "grader.classroom.worker": "job"}
+STARTS_STARTER = "grader.runtime.worker.worker_main"
+MODULES = {STARTS_STARTER: "worker", "grader.course.classroom.worker": "job"}
 #: Kinds that remove their temporary folder themselves; after a kill, the next grading does it.
 SWEPT = ("grader", "job")
 #: Outcomes that cost no student anything, and the beginnings of the words about a grading that ended wrongly.

@@ -38,8 +38,8 @@ from program_comparison import compared, differences_of_each, on_the_wall_clock
 from program_description import Program
 from program_strategy import drawn, programs
 
-from grader.execution.recording_session import RecordingSession, open_session
-from grader.files import write_whole
+from grader.runtime.files import write_whole
+from grader.runtime.session import RecordingSession, open_session
 
 #: How many programs are drawn and recorded together.
 AT_ONCE = 50
@@ -47,9 +47,9 @@ AT_ONCE = 50
 WALL_TRIES = 3
 #: What runs in the student's process, and what steps it.
 MEASURED = (
-    "student_host",
-    *(f"execution/{name}.py" for name in ("discovery", "observer", "runner", "service_ends", "service_peers")),
-    *(f"execution/{name}.py" for name in ("topic_peers", "trace_recorder", "virtual_runner", "worker", "workload")),
+    "host",
+    *(f"worker/{name}.py" for name in ("discovery", "observer", "runner", "service_ends", "service_peers")),
+    *(f"worker/{name}.py" for name in ("topic_peers", "trace_recorder", "virtual_runner", "worker", "workload")),
 )
 #: The first lines of a module that notes which of its functions are called, in a file that its process can append to.
 NOTING = """
@@ -199,9 +199,9 @@ def reached(arguments: argparse.Namespace) -> int:
         shutil.copytree(ROOT / "grader", folder / "grader", ignore=shutil.ignore_patterns("__pycache__"))
         every: list[str] = []
         for part in MEASURED:
-            place = folder / "grader" / part
+            place = folder / "grader" / "runtime" / part
             for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
-                every += noting(path, str(path.relative_to(folder / "grader")), str(log))
+                every += noting(path, str(path.relative_to(folder / "grader" / "runtime")), str(log))
         command = [sys.executable, __file__, str(arguments.count), "--seed", str(arguments.seed), "--isolation", "none"]
         subprocess.run(command, check=False, env={**os.environ, "PYTHONPATH": str(folder)})
         called = set(log.read_text(encoding="utf-8").splitlines())
@@ -209,7 +209,7 @@ def reached(arguments: argparse.Namespace) -> int:
     for module, count in modules.items():
         missing = [one.split()[1] for one in every if one.split()[0] == module and one not in called]
         print(f"{module}: {count - len(missing)} of {count}; not {', '.join(missing) or 'any'}")
-    for part in ("student_host", "execution"):
+    for part in ("host", "worker"):
         known = [one for one in every if one.startswith(part)]
         found = sum(one in called for one in known)
         print(f"{part}: {found} of {len(known)} functions ({100 * found / len(known):.0f} %)")

@@ -20,7 +20,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from grader.app import rejudge
+from grader.grading.app import rejudge
 
 ROOT = Path(__file__).resolve().parent.parent
 GRADE = str(Path(sys.executable).with_name("grade"))

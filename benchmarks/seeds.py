@@ -13,7 +13,7 @@ from pathlib import Path
 
 from agreement import run, table, what_is_known
 
-from grader.app.request import GradeRequest
+from grader.grading.app.request import GradeRequest
 
 
 def seeds_in(text: str) -> range:

@@ -19,10 +19,10 @@ from typing import Any
 
 from agreement import busy, print_nothing
 
-from grader.app.grade import grade_in
-from grader.app.request import GradeRequest
-from grader.execution.recording_session import RecordingSession, open_session
-from grader.reporting.json_report import report_to_json
+from grader.grading.app.grade import grade_in
+from grader.grading.app.request import GradeRequest
+from grader.grading.reporting.json_report import report_to_json
+from grader.runtime.session import RecordingSession, open_session
 
 HERE = Path(__file__).resolve().parent
 

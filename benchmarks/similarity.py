@@ -19,12 +19,8 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "classroom")]
 import copies  # noqa: E402  beside the tests
 from sample_folders import folders_in  # noqa: E402  as above
 
-from grader.similarity.finding import (  # noqa: E402  as above
-    find_similar,
-    read_given,
-    read_programs,
-)
-from grader.similarity.library import Handed  # noqa: E402  as above
+from grader.course.similarity.finding import find_similar, read_given, read_programs  # noqa: E402  as above
+from grader.course.similarity.library import Handed  # noqa: E402  as above
 
 CLASSES = ("velocity", "odom", "fan", "joint", "angle", "battery")
 WAYS = tuple(copies.DISGUISES)

@@ -28,9 +28,9 @@ from attack_rubric import publisher_rubric
 from attack_runs import HERE, REFERENCE, Attack, read_attacks
 from sample_folders import folders_in
 
-from grader.app.request import GradeRequest
-from grader.app.start import grade
-from grader.core.errors import GraderError
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.start import grade
+from grader.runtime.model.errors import GraderError
 
 NODE = "velocity_publisher"
 #: Runs after which everything that is loaded once has been loaded, and that count for nothing.

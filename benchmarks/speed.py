@@ -31,7 +31,7 @@ from class_of_100 import kinds, make_class
 from counting import counted, counts
 from rosbags.rosbag2 import Reader
 
-from grader.core.quantities import NS_PER_S
+from grader.runtime.model.quantities import NS_PER_S
 
 ROOT = Path(__file__).resolve().parent.parent
 GRADE = str(Path(sys.executable).with_name("grade"))
@@ -180,8 +180,8 @@ def class_of(grade: str, place: Path, size: int, jobs: int) -> Cost:
 
 def plain_start() -> Cost:
     """Return what a plain start took, on the ROS that the grader would use."""
-    from grader.execution.ros_installation import find_ros  # noqa: PLC0415  only the environment of this Python has it
-    from grader.execution.sandbox.environment import runtime_environment  # noqa: PLC0415
+    from grader.runtime.ros_installation import find_ros  # noqa: PLC0415  only the environment of this Python has it
+    from grader.runtime.sandbox.environment import runtime_environment  # noqa: PLC0415
 
     runtime = find_ros().runtime
     with tempfile.TemporaryDirectory() as home:

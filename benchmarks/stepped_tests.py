@@ -16,7 +16,7 @@ from pathlib import Path
 
 from sensor_msgs.msg import LaserScan
 
-from grader.execution.usage import families, usage
+from grader.runtime.usage import families, usage
 from grader.world.opening import Worlds, open_worlds
 
 NODES = Path(__file__).resolve().parent.parent / "tests" / "world" / "nodes"

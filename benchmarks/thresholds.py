@@ -24,11 +24,11 @@ from pathlib import Path
 
 from agreement import busy, print_nothing
 
-from grader.app.grade import grade_in
-from grader.app.request import GradeRequest
-from grader.core.errors import GraderError
-from grader.execution.recording_session import RecordingSession, open_session
-from grader.files import write_whole
+from grader.grading.app.grade import grade_in
+from grader.grading.app.request import GradeRequest
+from grader.runtime.files import write_whole
+from grader.runtime.model.errors import GraderError
+from grader.runtime.session import RecordingSession, open_session
 
 HERE = Path(__file__).resolve().parent / "thresholds"
 RUBRIC = HERE / "pace.yaml"

@@ -27,17 +27,17 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from ruamel.yaml import YAML
 
 from grader import api
-from grader.app.explain import explain_checks, explain_rubrics
 from grader.cli.main import app
-from grader.core import quantities
-from grader.core.chart import Chart, Panel
-from grader.core.exercise import Criterion, Exercise
-from grader.core.report import CheckExplanation, CriterionExplanation, Parameter, Report
-from grader.judging.run_check import check_name
-from grader.reporting.html.render import render_html
-from grader.rubrics.exercise_checks import known_checks
-from grader.rubrics.loader import read_rubric
-from grader.rubrics.schema import rubric_schema
+from grader.grading.app.explain import explain_checks, explain_rubrics
+from grader.grading.judging.run_check import check_name
+from grader.grading.model.chart import Chart, Panel
+from grader.grading.model.exercise import Criterion, Exercise
+from grader.grading.model.report import CheckExplanation, CriterionExplanation, Parameter, Report
+from grader.grading.reporting.html.render import render_html
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.grading.rubrics.loader import read_rubric
+from grader.grading.rubrics.schema import rubric_schema
+from grader.runtime.model import quantities
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path += [str(ROOT / "tests"), str(ROOT / "tests" / "recorded")]
@@ -371,7 +371,7 @@ _BOUND = re.compile(
     r"_?(MOST|MAX|LONGEST|LARGEST|DEEPEST)(_|$)|.*(?<!NS_PER)_(BYTES|CHARACTERS|S|NS|MS|LIMIT|TRIES)$|_?(TRIES|DEPTH)$"
 )
 #: Packages whose bounds only shorten what is shown.
-_SHOWN = ("grader/reporting/", "grader/mutation/", "grader/ros_packages/")
+_SHOWN = ("grader/grading/reporting/", "grader/course/mutation/", "grader/runtime/ros_packages/")
 _UNITS = {name: value for name, value in vars(quantities).items() if isinstance(value, int)}
 
 

@@ -14,215 +14,215 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from grader.classroom.local import Attempt as Attempt
-    from grader.classroom.local import ClassScheduler as ClassScheduler
-    from grader.classroom.local import failed_attempt as failed_attempt
-    from grader.classroom.receiving import UnwantedError as UnwantedError
-    from grader.classroom.receiving import grade_packed as grade_packed
-    from grader.classroom.schedulers import Connect as Connect
-    from grader.classroom.sending import pack_task as pack_task
-    from grader.classroom.sending import store_answer as store_answer
-    from grader.core.chart import Band as Band
-    from grader.core.chart import Chart as Chart
-    from grader.core.chart import Level as Level
-    from grader.core.chart import Look as Look
-    from grader.core.chart import Panel as Panel
-    from grader.core.chart import Point as Point
-    from grader.core.chart import Series as Series
-    from grader.core.chart import Tone as Tone
-    from grader.core.errors import ClassError as ClassError
-    from grader.core.errors import EnvironmentFault as EnvironmentFault
-    from grader.core.errors import EvidenceError as EvidenceError
-    from grader.core.errors import GraderError as GraderError
-    from grader.core.errors import HarnessError as HarnessError
-    from grader.core.errors import KeyFileError as KeyFileError
-    from grader.core.errors import RecordingError as RecordingError
-    from grader.core.errors import RubricError as RubricError
-    from grader.core.errors import SubmissionError as SubmissionError
-    from grader.core.errors import VariantError as VariantError
-    from grader.core.exercise import NODE_GRAPH as NODE_GRAPH
-    from grader.core.exercise import Check as Check
-    from grader.core.exercise import Finding as Finding
-    from grader.core.exercise import Location as Location
-    from grader.core.exercise import Outcome as Outcome
-    from grader.core.exercise import Problem as Problem
-    from grader.core.exercise import ProblemKind as ProblemKind
-    from grader.core.exercise import Roles as Roles
-    from grader.core.quantities import NS_PER_MS as NS_PER_MS
-    from grader.core.quantities import NS_PER_S as NS_PER_S
-    from grader.core.quantities import ActionType as ActionType
-    from grader.core.quantities import DurationNs as DurationNs
-    from grader.core.quantities import FieldNumber as FieldNumber
-    from grader.core.quantities import FieldOf as FieldOf
-    from grader.core.quantities import Hertz as Hertz
-    from grader.core.quantities import MessageType as MessageType
-    from grader.core.quantities import Pattern as Pattern
-    from grader.core.quantities import ServiceType as ServiceType
-    from grader.core.quantities import Topic as Topic
-    from grader.core.quantities import counted as counted
-    from grader.core.quantities import seconds as seconds
-    from grader.core.quantities import within as within
-    from grader.core.report import ExerciseReport as ExerciseReport
-    from grader.core.report import Report as Report
-    from grader.core.report import Summary as Summary
-    from grader.core.report import Verdict as Verdict
-    from grader.core.trace import ClockKind as ClockKind
-    from grader.core.trace import Delivery as Delivery
-    from grader.core.trace import Endpoint as Endpoint
-    from grader.core.trace import Fault as Fault
-    from grader.core.trace import FaultKind as FaultKind
-    from grader.core.trace import GraphSnapshot as GraphSnapshot
-    from grader.core.trace import LogRecord as LogRecord
-    from grader.core.trace import Mark as Mark
-    from grader.core.trace import Message as Message
-    from grader.core.trace import OutputLine as OutputLine
-    from grader.core.trace import Request as Request
-    from grader.core.trace import Response as Response
-    from grader.core.trace import ServiceEnd as ServiceEnd
-    from grader.core.trace import Trace as Trace
-    from grader.core.trace import unmet_policy as unmet_policy
-    from grader.judging.charts import Lanes as Lanes
-    from grader.judging.charts import compared_panels as compared_panels
-    from grader.judging.charts import drawn_case as drawn_case
-    from grader.judging.charts import gaps_panel as gaps_panel
-    from grader.judging.charts import series as series
-    from grader.judging.charts import time_chart as time_chart
-    from grader.judging.checks.services import too_few_responses as too_few_responses
-    from grader.judging.diagnosis.rules import NO_SOURCE as NO_SOURCE
-    from grader.judging.diagnosis.rules import Case as Case
-    from grader.judging.diagnosis.rules import Clue as Clue
-    from grader.judging.diagnosis.rules import Crash as Crash
-    from grader.judging.diagnosis.rules import Maker as Maker
-    from grader.judging.diagnosis.rules import Rule as Rule
-    from grader.judging.diagnosis.rules import crash_rule as crash_rule
-    from grader.judging.diagnosis.rules import file_for as file_for
-    from grader.judging.diagnosis.rules import hint_rule as hint_rule
-    from grader.judging.diagnosis.rules import lines_of as lines_of
-    from grader.judging.diagnosis.rules import log_call as log_call
-    from grader.judging.diagnosis.rules import silent_topic as silent_topic
-    from grader.judging.diagnosis.rules import unheard_topic as unheard_topic
-    from grader.judging.diagnosis.values import draws as draws
-    from grader.judging.diagnosis.wiring import Constant as Constant
-    from grader.judging.diagnosis.wiring import Made as Made
-    from grader.judging.diagnosis.wiring import conditions as conditions
-    from grader.judging.diagnosis.wiring import constant as constant
-    from grader.judging.diagnosis.wiring import elsewhere_because as elsewhere_because
-    from grader.judging.diagnosis.wiring import given_leaf as given_leaf
-    from grader.judging.diagnosis.wiring import goes_to as goes_to
-    from grader.judging.diagnosis.wiring import head_of as head_of
-    from grader.judging.diagnosis.wiring import is_flag as is_flag
-    from grader.judging.diagnosis.wiring import is_log as is_log
-    from grader.judging.diagnosis.wiring import made as made
-    from grader.judging.diagnosis.wiring import made_for as made_for
-    from grader.judging.diagnosis.wiring import message_classes as message_classes
-    from grader.judging.diagnosis.wiring import names_in as names_in
-    from grader.judging.diagnosis.wiring import node_made as node_made
-    from grader.judging.diagnosis.wiring import number_in_code as number_in_code
-    from grader.judging.diagnosis.wiring import publish_calls as publish_calls
-    from grader.judging.diagnosis.wiring import python_loggers as python_loggers
-    from grader.judging.diagnosis.wiring import reached as reached
-    from grader.judging.diagnosis.wiring import received as received
-    from grader.judging.diagnosis.wiring import roots as roots
-    from grader.judging.diagnosis.wiring import runs as runs
-    from grader.judging.diagnosis.wiring import short as short
-    from grader.judging.diagnosis.wiring import spins as spins
-    from grader.judging.diagnosis.wiring import target_of as target_of
-    from grader.judging.diagnosis.wiring import text_in_code as text_in_code
-    from grader.judging.diagnosis.wiring import timer_code as timer_code
-    from grader.judging.diagnosis.wiring import used as used
-    from grader.judging.diagnosis.wiring import value_of as value_of
-    from grader.judging.diagnosis.wiring import variable_of as variable_of
-    from grader.judging.diagnosis.wiring import waits_for_ever as waits_for_ever
-    from grader.judging.facts import AnswerFacts as AnswerFacts
-    from grader.judging.facts import AnswerRow as AnswerRow
-    from grader.judging.facts import DrawFacts as DrawFacts
-    from grader.judging.facts import LogFacts as LogFacts
-    from grader.judging.facts import LogPaceFacts as LogPaceFacts
-    from grader.judging.facts import OtherEnd as OtherEnd
-    from grader.judging.facts import RateFacts as RateFacts
-    from grader.judging.facts import SeriesFacts as SeriesFacts
-    from grader.judging.facts import WrongLogFacts as WrongLogFacts
-    from grader.judging.findings import FAULT_KEY as FAULT_KEY
-    from grader.judging.findings import explain_fault as explain_fault
-    from grader.judging.findings import explain_no_client as explain_no_client
-    from grader.judging.findings import explain_no_message as explain_no_message
-    from grader.judging.findings import explain_no_server as explain_no_server
-    from grader.judging.findings import explain_no_subscription as explain_no_subscription
-    from grader.judging.findings import fault_hint as fault_hint
-    from grader.judging.findings import fault_sentence as fault_sentence
-    from grader.judging.findings import faulted as faulted
-    from grader.judging.findings import first_fault as first_fault
-    from grader.judging.findings import met as met
-    from grader.judging.findings import not_met as not_met
-    from grader.judging.findings import only_printed as only_printed
-    from grader.judging.findings import partly as partly
-    from grader.judging.findings import waiting_for as waiting_for
-    from grader.judging.logs.matching import chance as chance
-    from grader.judging.logs.outputs import number_told as number_told
-    from grader.judging.logs.outputs import printed_lines as printed_lines
-    from grader.judging.logs.outputs import shape_of as shape_of
-    from grader.judging.logs.outputs import student_records as student_records
-    from grader.judging.logs.outputs import written as written
-    from grader.judging.plots import Drawing as Drawing
-    from grader.judging.plots import Plot as Plot
-    from grader.judging.plots import threshold_drawing as threshold_drawing
-    from grader.judging.series import lag_ns as lag_ns
-    from grader.judging.series import steps_behind as steps_behind
-    from grader.judging.service_calls import Call as Call
-    from grader.judging.service_calls import calls_of as calls_of
-    from grader.judging.source import Function as Function
-    from grader.judging.source import Source as Source
-    from grader.judging.source import argument as argument
-    from grader.judging.source import chain as chain
-    from grader.judging.source import covers as covers
-    from grader.judging.source import first_line as first_line
-    from grader.judging.source import last_line as last_line
-    from grader.judging.source import last_name as last_name
-    from grader.judging.source import parameters as parameters
-    from grader.judging.source import subtree as subtree
-    from grader.judging.source import text_of as text_of
-    from grader.judging.source import words as words
-    from grader.judging.texts import Printed as Printed
-    from grader.judging.texts import clean as clean
-    from grader.judging.texts import printed_numbers as printed_numbers
-    from grader.judging.texts import segments as segments
-    from grader.judging.texts import template_of as template_of
-    from grader.judging.texts import with_decimal_points as with_decimal_points
-    from grader.judging.values import EXACT as EXACT
-    from grader.judging.values import JITTER_NS as JITTER_NS
-    from grader.judging.values import Held as Held
-    from grader.judging.values import Reading as Reading
-    from grader.judging.values import as_number as as_number
-    from grader.judging.values import carries_number as carries_number
-    from grader.judging.values import delivered as delivered
-    from grader.judging.values import delivered_numbers as delivered_numbers
-    from grader.judging.values import heard_from_ns as heard_from_ns
-    from grader.judging.values import held as held
-    from grader.judging.values import last_of_instant as last_of_instant
-    from grader.judging.values import number_at as number_at
-    from grader.judging.values import per_trace as per_trace
-    from grader.judging.values import published as published
-    from grader.judging.values import published_numbers as published_numbers
-    from grader.judging.values import student_endpoints as student_endpoints
-    from grader.judging.values import value_at as value_at
-    from grader.judging.wording import in_unit as in_unit
-    from grader.judging.wording import listed as listed
-    from grader.judging.wording import moment as moment
-    from grader.judging.wording import number as number
-    from grader.judging.wording import numbers as numbers
-    from grader.judging.wording import quote as quote
-    from grader.judging.wording import span as span
-    from grader.reporting.escape import csv_cell as csv_cell
-    from grader.reporting.escape import shown as shown
-    from grader.reporting.escape import shown_lines as shown_lines
-    from grader.reporting.formats import Format as Format
-    from grader.reporting.json_report import report_to_json as report_to_json
-    from grader.simulation import DifferentialDrive as DifferentialDrive
-    from grader.simulation import Moment as Moment
-    from grader.simulation import Output as Output
-    from grader.simulation import Simulation as Simulation
-    from grader.simulation import Turtle as Turtle
-    from grader.simulation import Unicycle as Unicycle
+    from grader.course.classroom.local import Attempt as Attempt
+    from grader.course.classroom.local import ClassScheduler as ClassScheduler
+    from grader.course.classroom.local import failed_attempt as failed_attempt
+    from grader.course.classroom.receiving import UnwantedError as UnwantedError
+    from grader.course.classroom.receiving import grade_packed as grade_packed
+    from grader.course.classroom.schedulers import Connect as Connect
+    from grader.course.classroom.sending import pack_task as pack_task
+    from grader.course.classroom.sending import store_answer as store_answer
+    from grader.grading.judging.charts import Lanes as Lanes
+    from grader.grading.judging.charts import compared_panels as compared_panels
+    from grader.grading.judging.charts import drawn_case as drawn_case
+    from grader.grading.judging.charts import gaps_panel as gaps_panel
+    from grader.grading.judging.charts import series as series
+    from grader.grading.judging.charts import time_chart as time_chart
+    from grader.grading.judging.checks.services import too_few_responses as too_few_responses
+    from grader.grading.judging.diagnosis.rules import NO_SOURCE as NO_SOURCE
+    from grader.grading.judging.diagnosis.rules import Case as Case
+    from grader.grading.judging.diagnosis.rules import Clue as Clue
+    from grader.grading.judging.diagnosis.rules import Crash as Crash
+    from grader.grading.judging.diagnosis.rules import Maker as Maker
+    from grader.grading.judging.diagnosis.rules import Rule as Rule
+    from grader.grading.judging.diagnosis.rules import crash_rule as crash_rule
+    from grader.grading.judging.diagnosis.rules import file_for as file_for
+    from grader.grading.judging.diagnosis.rules import hint_rule as hint_rule
+    from grader.grading.judging.diagnosis.rules import lines_of as lines_of
+    from grader.grading.judging.diagnosis.rules import log_call as log_call
+    from grader.grading.judging.diagnosis.rules import silent_topic as silent_topic
+    from grader.grading.judging.diagnosis.rules import unheard_topic as unheard_topic
+    from grader.grading.judging.diagnosis.values import draws as draws
+    from grader.grading.judging.diagnosis.wiring import Constant as Constant
+    from grader.grading.judging.diagnosis.wiring import Made as Made
+    from grader.grading.judging.diagnosis.wiring import conditions as conditions
+    from grader.grading.judging.diagnosis.wiring import constant as constant
+    from grader.grading.judging.diagnosis.wiring import elsewhere_because as elsewhere_because
+    from grader.grading.judging.diagnosis.wiring import given_leaf as given_leaf
+    from grader.grading.judging.diagnosis.wiring import goes_to as goes_to
+    from grader.grading.judging.diagnosis.wiring import head_of as head_of
+    from grader.grading.judging.diagnosis.wiring import is_flag as is_flag
+    from grader.grading.judging.diagnosis.wiring import is_log as is_log
+    from grader.grading.judging.diagnosis.wiring import made as made
+    from grader.grading.judging.diagnosis.wiring import made_for as made_for
+    from grader.grading.judging.diagnosis.wiring import message_classes as message_classes
+    from grader.grading.judging.diagnosis.wiring import names_in as names_in
+    from grader.grading.judging.diagnosis.wiring import node_made as node_made
+    from grader.grading.judging.diagnosis.wiring import number_in_code as number_in_code
+    from grader.grading.judging.diagnosis.wiring import publish_calls as publish_calls
+    from grader.grading.judging.diagnosis.wiring import python_loggers as python_loggers
+    from grader.grading.judging.diagnosis.wiring import reached as reached
+    from grader.grading.judging.diagnosis.wiring import received as received
+    from grader.grading.judging.diagnosis.wiring import roots as roots
+    from grader.grading.judging.diagnosis.wiring import runs as runs
+    from grader.grading.judging.diagnosis.wiring import short as short
+    from grader.grading.judging.diagnosis.wiring import spins as spins
+    from grader.grading.judging.diagnosis.wiring import target_of as target_of
+    from grader.grading.judging.diagnosis.wiring import text_in_code as text_in_code
+    from grader.grading.judging.diagnosis.wiring import timer_code as timer_code
+    from grader.grading.judging.diagnosis.wiring import used as used
+    from grader.grading.judging.diagnosis.wiring import value_of as value_of
+    from grader.grading.judging.diagnosis.wiring import variable_of as variable_of
+    from grader.grading.judging.diagnosis.wiring import waits_for_ever as waits_for_ever
+    from grader.grading.judging.facts import AnswerFacts as AnswerFacts
+    from grader.grading.judging.facts import AnswerRow as AnswerRow
+    from grader.grading.judging.facts import DrawFacts as DrawFacts
+    from grader.grading.judging.facts import LogFacts as LogFacts
+    from grader.grading.judging.facts import LogPaceFacts as LogPaceFacts
+    from grader.grading.judging.facts import OtherEnd as OtherEnd
+    from grader.grading.judging.facts import RateFacts as RateFacts
+    from grader.grading.judging.facts import SeriesFacts as SeriesFacts
+    from grader.grading.judging.facts import WrongLogFacts as WrongLogFacts
+    from grader.grading.judging.findings import FAULT_KEY as FAULT_KEY
+    from grader.grading.judging.findings import explain_fault as explain_fault
+    from grader.grading.judging.findings import explain_no_client as explain_no_client
+    from grader.grading.judging.findings import explain_no_message as explain_no_message
+    from grader.grading.judging.findings import explain_no_server as explain_no_server
+    from grader.grading.judging.findings import explain_no_subscription as explain_no_subscription
+    from grader.grading.judging.findings import fault_hint as fault_hint
+    from grader.grading.judging.findings import fault_sentence as fault_sentence
+    from grader.grading.judging.findings import faulted as faulted
+    from grader.grading.judging.findings import first_fault as first_fault
+    from grader.grading.judging.findings import met as met
+    from grader.grading.judging.findings import not_met as not_met
+    from grader.grading.judging.findings import only_printed as only_printed
+    from grader.grading.judging.findings import partly as partly
+    from grader.grading.judging.findings import waiting_for as waiting_for
+    from grader.grading.judging.logs.matching import chance as chance
+    from grader.grading.judging.logs.outputs import number_told as number_told
+    from grader.grading.judging.logs.outputs import printed_lines as printed_lines
+    from grader.grading.judging.logs.outputs import shape_of as shape_of
+    from grader.grading.judging.logs.outputs import student_records as student_records
+    from grader.grading.judging.logs.outputs import written as written
+    from grader.grading.judging.plots import Drawing as Drawing
+    from grader.grading.judging.plots import Plot as Plot
+    from grader.grading.judging.plots import threshold_drawing as threshold_drawing
+    from grader.grading.judging.series import lag_ns as lag_ns
+    from grader.grading.judging.series import steps_behind as steps_behind
+    from grader.grading.judging.service_calls import Call as Call
+    from grader.grading.judging.service_calls import calls_of as calls_of
+    from grader.grading.judging.source import Function as Function
+    from grader.grading.judging.source import Source as Source
+    from grader.grading.judging.source import argument as argument
+    from grader.grading.judging.source import chain as chain
+    from grader.grading.judging.source import covers as covers
+    from grader.grading.judging.source import first_line as first_line
+    from grader.grading.judging.source import last_line as last_line
+    from grader.grading.judging.source import last_name as last_name
+    from grader.grading.judging.source import parameters as parameters
+    from grader.grading.judging.source import subtree as subtree
+    from grader.grading.judging.source import text_of as text_of
+    from grader.grading.judging.source import words as words
+    from grader.grading.judging.texts import Printed as Printed
+    from grader.grading.judging.texts import clean as clean
+    from grader.grading.judging.texts import printed_numbers as printed_numbers
+    from grader.grading.judging.texts import segments as segments
+    from grader.grading.judging.texts import template_of as template_of
+    from grader.grading.judging.texts import with_decimal_points as with_decimal_points
+    from grader.grading.judging.values import EXACT as EXACT
+    from grader.grading.judging.values import JITTER_NS as JITTER_NS
+    from grader.grading.judging.values import Held as Held
+    from grader.grading.judging.values import Reading as Reading
+    from grader.grading.judging.values import as_number as as_number
+    from grader.grading.judging.values import carries_number as carries_number
+    from grader.grading.judging.values import delivered as delivered
+    from grader.grading.judging.values import delivered_numbers as delivered_numbers
+    from grader.grading.judging.values import heard_from_ns as heard_from_ns
+    from grader.grading.judging.values import held as held
+    from grader.grading.judging.values import last_of_instant as last_of_instant
+    from grader.grading.judging.values import number_at as number_at
+    from grader.grading.judging.values import per_trace as per_trace
+    from grader.grading.judging.values import published as published
+    from grader.grading.judging.values import published_numbers as published_numbers
+    from grader.grading.judging.values import student_endpoints as student_endpoints
+    from grader.grading.judging.values import value_at as value_at
+    from grader.grading.judging.wording import in_unit as in_unit
+    from grader.grading.judging.wording import listed as listed
+    from grader.grading.judging.wording import moment as moment
+    from grader.grading.judging.wording import number as number
+    from grader.grading.judging.wording import numbers as numbers
+    from grader.grading.judging.wording import quote as quote
+    from grader.grading.judging.wording import span as span
+    from grader.grading.model.chart import Band as Band
+    from grader.grading.model.chart import Chart as Chart
+    from grader.grading.model.chart import Level as Level
+    from grader.grading.model.chart import Look as Look
+    from grader.grading.model.chart import Panel as Panel
+    from grader.grading.model.chart import Point as Point
+    from grader.grading.model.chart import Series as Series
+    from grader.grading.model.chart import Tone as Tone
+    from grader.grading.model.exercise import NODE_GRAPH as NODE_GRAPH
+    from grader.grading.model.exercise import Check as Check
+    from grader.grading.model.exercise import Finding as Finding
+    from grader.grading.model.exercise import Location as Location
+    from grader.grading.model.exercise import Outcome as Outcome
+    from grader.grading.model.exercise import Problem as Problem
+    from grader.grading.model.exercise import ProblemKind as ProblemKind
+    from grader.grading.model.exercise import Roles as Roles
+    from grader.grading.model.report import ExerciseReport as ExerciseReport
+    from grader.grading.model.report import Report as Report
+    from grader.grading.model.report import Summary as Summary
+    from grader.grading.model.report import Verdict as Verdict
+    from grader.grading.reporting.escape import csv_cell as csv_cell
+    from grader.grading.reporting.escape import shown as shown
+    from grader.grading.reporting.escape import shown_lines as shown_lines
+    from grader.grading.reporting.formats import Format as Format
+    from grader.grading.reporting.json_report import report_to_json as report_to_json
+    from grader.runtime.model.errors import ClassError as ClassError
+    from grader.runtime.model.errors import EnvironmentFault as EnvironmentFault
+    from grader.runtime.model.errors import EvidenceError as EvidenceError
+    from grader.runtime.model.errors import GraderError as GraderError
+    from grader.runtime.model.errors import HarnessError as HarnessError
+    from grader.runtime.model.errors import KeyFileError as KeyFileError
+    from grader.runtime.model.errors import RecordingError as RecordingError
+    from grader.runtime.model.errors import RubricError as RubricError
+    from grader.runtime.model.errors import SubmissionError as SubmissionError
+    from grader.runtime.model.errors import VariantError as VariantError
+    from grader.runtime.model.quantities import NS_PER_MS as NS_PER_MS
+    from grader.runtime.model.quantities import NS_PER_S as NS_PER_S
+    from grader.runtime.model.quantities import ActionType as ActionType
+    from grader.runtime.model.quantities import DurationNs as DurationNs
+    from grader.runtime.model.quantities import FieldNumber as FieldNumber
+    from grader.runtime.model.quantities import FieldOf as FieldOf
+    from grader.runtime.model.quantities import Hertz as Hertz
+    from grader.runtime.model.quantities import MessageType as MessageType
+    from grader.runtime.model.quantities import Pattern as Pattern
+    from grader.runtime.model.quantities import ServiceType as ServiceType
+    from grader.runtime.model.quantities import Topic as Topic
+    from grader.runtime.model.quantities import counted as counted
+    from grader.runtime.model.quantities import seconds as seconds
+    from grader.runtime.model.quantities import within as within
+    from grader.runtime.model.trace import ClockKind as ClockKind
+    from grader.runtime.model.trace import Delivery as Delivery
+    from grader.runtime.model.trace import Endpoint as Endpoint
+    from grader.runtime.model.trace import Fault as Fault
+    from grader.runtime.model.trace import FaultKind as FaultKind
+    from grader.runtime.model.trace import GraphSnapshot as GraphSnapshot
+    from grader.runtime.model.trace import LogRecord as LogRecord
+    from grader.runtime.model.trace import Mark as Mark
+    from grader.runtime.model.trace import Message as Message
+    from grader.runtime.model.trace import OutputLine as OutputLine
+    from grader.runtime.model.trace import Request as Request
+    from grader.runtime.model.trace import Response as Response
+    from grader.runtime.model.trace import ServiceEnd as ServiceEnd
+    from grader.runtime.model.trace import Trace as Trace
+    from grader.runtime.model.trace import unmet_policy as unmet_policy
+    from grader.runtime.simulation import DifferentialDrive as DifferentialDrive
+    from grader.runtime.simulation import Moment as Moment
+    from grader.runtime.simulation import Output as Output
+    from grader.runtime.simulation import Simulation as Simulation
+    from grader.runtime.simulation import Turtle as Turtle
+    from grader.runtime.simulation import Unicycle as Unicycle
     from grader.testing import TraceBuilder as TraceBuilder
     from grader.testing import builtin_check as builtin_check
     from grader.testing import explain as explain
@@ -244,68 +244,68 @@ if TYPE_CHECKING:
 #: The public names by topic and by the module that they are in.
 CONTENTS: dict[str, dict[str, str]] = {
     "Errors": {
-        "grader.core.errors": (
+        "grader.runtime.model.errors": (
             "GraderError RubricError SubmissionError RecordingError EvidenceError ClassError VariantError "
             "KeyFileError EnvironmentFault HarnessError"
         ),
     },
     "Results": {
-        "grader.core.report": "Report ExerciseReport Verdict Summary",
-        "grader.core.exercise": "Outcome",
+        "grader.grading.model.report": "Report ExerciseReport Verdict Summary",
+        "grader.grading.model.exercise": "Outcome",
     },
     "Checks": {
-        "grader.core.exercise": "Check Roles NODE_GRAPH Finding Problem ProblemKind Location",
-        "grader.judging.findings": (
+        "grader.grading.model.exercise": "Check Roles NODE_GRAPH Finding Problem ProblemKind Location",
+        "grader.grading.judging.findings": (
             "met partly not_met only_printed waiting_for explain_fault faulted first_fault fault_sentence "
             "explain_no_message explain_no_subscription explain_no_server explain_no_client fault_hint FAULT_KEY"
         ),
-        "grader.judging.checks.services": "too_few_responses",
+        "grader.grading.judging.checks.services": "too_few_responses",
     },
     "Parameters": {
-        "grader.core.quantities": (
+        "grader.runtime.model.quantities": (
             "DurationNs Hertz FieldNumber Topic MessageType ServiceType ActionType Pattern FieldOf"
         ),
     },
     "Recordings": {
-        "grader.core.trace": (
+        "grader.runtime.model.trace": (
             "Trace Message Delivery LogRecord OutputLine Request Response Fault FaultKind GraphSnapshot Endpoint "
             "ServiceEnd Mark ClockKind unmet_policy"
         ),
-        "grader.judging.values": (
+        "grader.grading.judging.values": (
             "Reading Held published delivered published_numbers delivered_numbers held value_at number_at "
             "student_endpoints as_number carries_number heard_from_ns last_of_instant per_trace EXACT "
             "JITTER_NS"
         ),
-        "grader.judging.logs.outputs": "student_records printed_lines written shape_of number_told",
-        "grader.judging.texts": "Printed printed_numbers clean with_decimal_points segments template_of",
-        "grader.judging.logs.matching": "chance",
-        "grader.judging.series": "lag_ns steps_behind",
-        "grader.judging.service_calls": "Call calls_of",
+        "grader.grading.judging.logs.outputs": "student_records printed_lines written shape_of number_told",
+        "grader.grading.judging.texts": "Printed printed_numbers clean with_decimal_points segments template_of",
+        "grader.grading.judging.logs.matching": "chance",
+        "grader.grading.judging.series": "lag_ns steps_behind",
+        "grader.grading.judging.service_calls": "Call calls_of",
     },
     "Text": {
-        "grader.core.quantities": "NS_PER_S seconds counted within NS_PER_MS",
-        "grader.judging.wording": "moment span number numbers quote listed in_unit",
+        "grader.runtime.model.quantities": "NS_PER_S seconds counted within NS_PER_MS",
+        "grader.grading.judging.wording": "moment span number numbers quote listed in_unit",
     },
     "Charts": {
-        "grader.judging.plots": "Drawing Plot threshold_drawing",
-        "grader.core.chart": "Chart Panel Series Point Band Level Look Tone",
-        "grader.judging.charts": "series time_chart gaps_panel compared_panels drawn_case Lanes",
+        "grader.grading.judging.plots": "Drawing Plot threshold_drawing",
+        "grader.grading.model.chart": "Chart Panel Series Point Band Level Look Tone",
+        "grader.grading.judging.charts": "series time_chart gaps_panel compared_panels drawn_case Lanes",
     },
     "Hint rules": {
-        "grader.judging.diagnosis.rules": (
+        "grader.grading.judging.diagnosis.rules": (
             "Rule Clue Case Crash hint_rule crash_rule silent_topic unheard_topic file_for lines_of log_call "
             "Maker NO_SOURCE"
         ),
-        "grader.judging.facts": (
+        "grader.grading.judging.facts": (
             "RateFacts SeriesFacts DrawFacts AnswerRow AnswerFacts LogFacts WrongLogFacts LogPaceFacts OtherEnd"
         ),
     },
     "Source code": {
-        "grader.judging.source": (
+        "grader.grading.judging.source": (
             "Source first_line last_line covers last_name chain argument parameters text_of subtree words Function"
         ),
-        "grader.judging.diagnosis.values": "draws",
-        "grader.judging.diagnosis.wiring": (
+        "grader.grading.judging.diagnosis.values": "draws",
+        "grader.grading.judging.diagnosis.wiring": (
             "Constant Made constant given_leaf made made_for target_of roots reached runs names_in is_log "
             "publish_calls used conditions is_flag spins node_made variable_of timer_code short received "
             "message_classes value_of number_in_code text_in_code elsewhere_because goes_to head_of "
@@ -313,18 +313,18 @@ CONTENTS: dict[str, dict[str, str]] = {
         ),
     },
     "Report formats": {
-        "grader.reporting.formats": "Format",
-        "grader.reporting.json_report": "report_to_json",
-        "grader.reporting.escape": "shown shown_lines csv_cell",
+        "grader.grading.reporting.formats": "Format",
+        "grader.grading.reporting.json_report": "report_to_json",
+        "grader.grading.reporting.escape": "shown shown_lines csv_cell",
     },
     "Class schedulers": {
-        "grader.classroom.schedulers": "Connect",
-        "grader.classroom.local": "ClassScheduler Attempt failed_attempt",
-        "grader.classroom.sending": "pack_task store_answer",
-        "grader.classroom.receiving": "grade_packed UnwantedError",
+        "grader.course.classroom.schedulers": "Connect",
+        "grader.course.classroom.local": "ClassScheduler Attempt failed_attempt",
+        "grader.course.classroom.sending": "pack_task store_answer",
+        "grader.course.classroom.receiving": "grade_packed UnwantedError",
     },
     "Simulations": {
-        "grader.simulation": "Simulation Moment Output DifferentialDrive Turtle Unicycle",
+        "grader.runtime.simulation": "Simulation Moment Output DifferentialDrive Turtle Unicycle",
     },
     "Own nodes, step by step": {
         "grader.world.opening": "open_world Worlds",
@@ -381,9 +381,9 @@ def grade(  # noqa: PLR0913  options of the command
     Raises:
         GraderError: The submission, a rubric or the machine cannot be used; its class says who must act.
     """
-    from grader.app import start  # noqa: PLC0415  takes long
-    from grader.app.keeping import EvidenceWriter  # noqa: PLC0415
-    from grader.app.request import GradeRequest  # noqa: PLC0415
+    from grader.grading.app import start  # noqa: PLC0415  takes long
+    from grader.grading.app.keeping import EvidenceWriter  # noqa: PLC0415
+    from grader.grading.app.request import GradeRequest  # noqa: PLC0415
 
     request = GradeRequest(
         str(submission),
@@ -419,9 +419,9 @@ def observe(
     Raises:
         GraderError: A program or the machine cannot be used; its class says who must act.
     """
-    from grader.app.observe import ObserveRequest  # noqa: PLC0415  takes long
-    from grader.app.observe import observe as observed  # noqa: PLC0415
-    from grader.core.quantities import nanoseconds  # noqa: PLC0415
+    from grader.grading.app.observe import ObserveRequest  # noqa: PLC0415  takes long
+    from grader.grading.app.observe import observe as observed  # noqa: PLC0415
+    from grader.runtime.model.quantities import nanoseconds  # noqa: PLC0415
 
     files, folders = tuple(map(Path, programs)), tuple(map(Path, interfaces))
     request = ObserveRequest(files, nanoseconds(duration_s), clock=clock, isolation=isolation, interfaces=folders)
@@ -440,9 +440,9 @@ def rejudge(evidence: str | Path, *, rubrics: Sequence[str | Path] = (), exercis
         EvidenceError: The folder is damaged, or has no recording of these exercises.
         RubricError: A rubric cannot be used.
     """
-    from grader.app.rejudge import judgement  # noqa: PLC0415  takes long
-    from grader.app.rejudge import rejudge as judged_again  # noqa: PLC0415
-    from grader.execution.evidence.store import open_evidence  # noqa: PLC0415
+    from grader.grading.app.rejudge import judgement  # noqa: PLC0415  takes long
+    from grader.grading.app.rejudge import rejudge as judged_again  # noqa: PLC0415
+    from grader.grading.evidence.store import open_evidence  # noqa: PLC0415
 
     how = judgement(tuple(exercises), tuple(map(Path, rubrics)), pictures=True)
     return judged_again(open_evidence(Path(evidence)), how)

@@ -142,7 +142,7 @@ def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
 
     For a fixture of a wider scope than a test: `with ros_session.open() as ros: ...`.
     """
-    from grader.core.errors import EnvironmentFault  # noqa: PLC0415 - no other test waits for it
+    from grader.runtime.model.errors import EnvironmentFault  # noqa: PLC0415 - no other test waits for it
     from grader.world.opening import open_worlds  # noqa: PLC0415 - the same
 
     with contextlib.ExitStack() as stack:

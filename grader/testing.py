@@ -16,11 +16,17 @@ from dataclasses import field
 from fractions import Fraction
 from typing import Any
 
-from grader.core.dataclass import dataclass
-from grader.core.exercise import Check, Criterion, Finding, Outcome, ask
-from grader.core.quantities import NS_PER_S, nanoseconds
-from grader.core.report import Verdict
-from grader.core.trace import (
+from grader.grading.judging.authored import breach
+from grader.grading.judging.checks import CHECKS
+from grader.grading.judging.diagnosis import fault_of
+from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, unfit
+from grader.grading.judging.findings import met, not_met, partly
+from grader.grading.judging.source import read
+from grader.grading.model.exercise import Check, Criterion, Finding, Outcome, ask
+from grader.grading.model.report import Verdict
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.quantities import NS_PER_S, nanoseconds
+from grader.runtime.model.trace import (
     ClockKind,
     Delivery,
     Endpoint,
@@ -37,12 +43,6 @@ from grader.core.trace import (
     ServiceEnd,
     Trace,
 )
-from grader.judging.authored import breach
-from grader.judging.checks import CHECKS
-from grader.judging.diagnosis import fault_of
-from grader.judging.diagnosis.rules import Case, Clue, Rule, unfit
-from grader.judging.findings import met, not_met, partly
-from grader.judging.source import read
 
 __all__ = ["TraceBuilder", "builtin_check", "explain", "judge", "met", "not_met", "partly"]
 
@@ -84,7 +84,7 @@ def builtin_check(name: str, **parameters: Any) -> Check:
         KeyError: There is no such check.
         TypeError: A parameter is missing, or there is no such parameter.
     """
-    from grader.rubrics.exercise_checks import known_checks  # noqa: PLC0415  takes long
+    from grader.grading.rubrics.exercise_checks import known_checks  # noqa: PLC0415  takes long
 
     check: Check = known_checks()[name](**parameters)
     return check

@@ -2,9 +2,9 @@
 
 from fractions import Fraction
 
-from grader.core.exercise import Outcome
-from grader.core.report import Environment, ExerciseReport, Report, Verdict
-from grader.core.trace import ClockKind
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Environment, ExerciseReport, Report, Verdict
+from grader.runtime.model.trace import ClockKind
 
 
 def a_report(*outcomes: Outcome, score: None = None) -> Report:

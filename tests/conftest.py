@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, settings
 
-from grader.core.errors import EnvironmentFault
-from grader.execution.ros_installation import RosInstallation, find_ros
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.ros_installation import RosInstallation, find_ros
 
 #: The markers of tests that `-m fast` leaves out.
 NOT_FAST = ("ros", "browser", "sandbox", "slow", "long", "nightly")

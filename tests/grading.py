@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from grader.app.grade import Progress
-from grader.app.request import GradeRequest
-from grader.app.start import grade
-from grader.core.exercise import Outcome
-from grader.core.report import Report
+from grader.grading.app.grade import Progress
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.start import grade
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Report
 
 #: Even if every second attempt is undecided, so many are it less than once in a million runs: 2 ** -20.
 ATTEMPTS = 20

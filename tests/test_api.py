@@ -18,7 +18,8 @@ import pytest
 
 import grader
 from grader import api
-from grader.core import errors, exercise
+from grader.grading.model import exercise
+from grader.runtime.model import errors
 
 ROOT = Path(__file__).resolve().parent.parent
 PINNED = ROOT / "tests" / "api.txt"
@@ -73,7 +74,7 @@ def test_every_name_is_there_once_and_type_checkers_know_it() -> None:
 def test_every_error_is_public_and_in_the_tree_of_the_docstring() -> None:
     """Who must act is said there for each."""
     known = {name for name, kind in vars(errors).items() if isinstance(kind, type) and issubclass(kind, Exception)}
-    assert known == set(api.CONTENTS["Errors"]["grader.core.errors"].split())
+    assert known == set(api.CONTENTS["Errors"]["grader.runtime.model.errors"].split())
     assert all(re.search(rf"\b{name}\b", errors.__doc__ or "") for name in known)
 
 
@@ -102,7 +103,12 @@ def test_examples_and_pages_use_only_public_names() -> None:
 
 
 @pytest.mark.parametrize(
-    "line", ["import grader.core.trace", "from grader.core.trace import Trace", "from grader.api import secret"]
+    "line",
+    [
+        "import grader.runtime.model.trace",
+        "from grader.runtime.model.trace import Trace",
+        "from grader.api import secret",
+    ],
 )
 def test_a_planted_import_is_found(line: str) -> None:
     """The rule can fail."""
@@ -120,7 +126,7 @@ def test_a_simulation_imports_neither_judging_nor_its_libraries() -> None:
     """It runs beside the nodes, where they are not there."""
     names = " ".join(api.CONTENTS["Simulations"].values()).replace(" ", ", ")
     loaded = modules_of(f"from grader.api import DurationNs, Topic, seconds, {names}")
-    assert "grader.simulation.robots" in loaded
+    assert "grader.runtime.simulation.robots" in loaded
     assert not {name for name in loaded if re.match(r"grader\.(judging|reporting|app)|msgspec|pydantic", name)}
 
 
@@ -134,7 +140,7 @@ def test_the_members_of_a_check_are_declared_in_one_place() -> None:
     members = {name for name in vars(exercise.Check) if not name.startswith("_")}
     assert members == {"judge", "roles", "expected", "drawing", "judge_sources", "of_beginning"}
     asked: set[str] = set()
-    for path in (Path(grader.__file__).parent / "judging").rglob("*.py"):
+    for path in (Path(grader.__file__).parent / "grading" / "judging").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             named = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
             if named in ("getattr", "has") and isinstance(node, ast.Call):

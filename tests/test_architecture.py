@@ -18,15 +18,15 @@ IMPURE = {"os", "subprocess", "socket", "time", "datetime", "random", "threading
 #: Modules in pure packages that are not pure: a path is a value in some, two find what is shipped and rubrics, others
 #: deliver what has been rendered or read what a platform says in the environment.
 EXCUSED = {
-    "core/grading_options.py": {"pathlib"},
-    "core/rubric_files.py": {"os", "pathlib"},
-    "core/shipped.py": {"pathlib"},
-    "core/submission.py": {"pathlib"},
-    "reporting/delivery.py": IMPURE,
-    "reporting/formats.py": {"os", "pathlib"},
-    "reporting/platforms/classroom50.py": {"pathlib", "datetime"},
-    "reporting/platforms/github.py": {"pathlib"},
-    "reporting/junit.py": {"pathlib"},
+    "grading/model/grading_options.py": {"pathlib"},
+    "grading/model/rubric_files.py": {"os", "pathlib"},
+    "runtime/shipped.py": {"pathlib"},
+    "runtime/model/submission.py": {"pathlib"},
+    "grading/reporting/delivery.py": IMPURE,
+    "grading/reporting/formats.py": {"os", "pathlib"},
+    "grading/reporting/platforms/classroom50.py": {"pathlib", "datetime"},
+    "grading/reporting/platforms/github.py": {"pathlib"},
+    "grading/reporting/junit.py": {"pathlib"},
 }
 #: What the host may import besides the standard library and its own modules.
 HOST_MAY_IMPORT = {"yaml", "rclpy", "time_machine", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "std_srvs"}
@@ -55,9 +55,9 @@ PATTERN_METHODS = {"search", "match", "fullmatch", "finditer", "findall", "split
 OF_PROGRAMS = r"o|t|side\.program|log|line|lines\[n\]|output|record|episode|value|self"
 #: Modules that look into such texts all the same, and why.
 READS_TEXT = {
-    "reporting/audience.py": "takes the parts with numbers out of what a student sees",
-    "reporting/text.py": "does not name a place twice",
-    "reporting/wording.py": "leaves out how every reason of a blocked criterion begins",
+    "grading/reporting/audience.py": "takes the parts with numbers out of what a student sees",
+    "grading/reporting/text.py": "does not name a place twice",
+    "grading/reporting/wording.py": "leaves out how every reason of a blocked criterion begins",
 }
 
 
@@ -140,7 +140,7 @@ def test_what_is_no_reading_is_let_be(line: str, tmp_path: Path) -> None:
 
 
 #: Packages that are pure.
-PURE = ("core", "judging", "reporting", "mutation/operators")
+PURE = ("runtime/model", "grading/model", "grading/judging", "grading/reporting", "course/mutation/operators")
 
 
 def impurities(package: Path) -> list[str]:
@@ -162,19 +162,19 @@ def test_judging_and_rendering_are_pure() -> None:
 def test_a_planted_impurity_is_found(tmp_path: Path) -> None:
     """Also inside a function, and under another name."""
     planted = {
-        "judging/checks/bad.py": "def f():\n    from time import sleep as rest\n",
-        "core/bad.py": "import os.path as p, random\n",
-        "reporting/bad.py": "import datetime\n",
-        "reporting/delivery.py": "import tempfile\n",
+        "grading/judging/checks/bad.py": "def f():\n    from time import sleep as rest\n",
+        "runtime/model/bad.py": "import os.path as p, random\n",
+        "grading/reporting/bad.py": "import datetime\n",
+        "grading/reporting/delivery.py": "import tempfile\n",
     }
     for name, source in planted.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(source)
     assert impurities(tmp_path) == [
-        "core/bad.py imports os",
-        "core/bad.py imports random",
-        "judging/checks/bad.py imports time",
-        "reporting/bad.py imports datetime",
+        "grading/judging/checks/bad.py imports time",
+        "grading/reporting/bad.py imports datetime",
+        "runtime/model/bad.py imports os",
+        "runtime/model/bad.py imports random",
     ]
 
 
@@ -182,7 +182,7 @@ def host_needs(package: Path) -> list[str]:
     """Return what the host imports beyond the standard library, ROS and itself, as sentences."""
     return [
         f"{path.name} imports {imported}"
-        for path in sorted((package / "student_host").rglob("*.py"))
+        for path in sorted((package / "runtime" / "host").rglob("*.py"))
         for imported in imports_of(path)
         if not imported.startswith(".") or imported.startswith("..")
         if imported.split(".")[0] not in HOST_MAY_IMPORT | sys.stdlib_module_names
@@ -199,10 +199,10 @@ def test_the_host_needs_little() -> None:
 
 def test_a_planted_need_is_found(tmp_path: Path) -> None:
     """Other libraries, the rest of the grader, and what lies above the host's folder."""
-    (tmp_path / "student_host").mkdir()
+    (tmp_path / "runtime" / "host").mkdir(parents=True)
     source = "import os, numpy\nimport rclpy.node\nfrom . import fine\nfrom .fine import a\n"
-    (tmp_path / "student_host" / "bad.py").write_text(source + "from ..core import trace\nimport grader\n")
-    assert host_needs(tmp_path) == ["bad.py imports numpy", "bad.py imports ..core", "bad.py imports grader"]
+    (tmp_path / "runtime" / "host" / "bad.py").write_text(source + "from ..model import trace\nimport grader\n")
+    assert host_needs(tmp_path) == ["bad.py imports numpy", "bad.py imports ..model", "bad.py imports grader"]
 
 
 def test_every_module_says_what_it_holds() -> None:
@@ -253,23 +253,25 @@ def test_places_that_every_machine_has_are_none(place: str) -> None:
 
 #: What asks checks for their roles and facts instead of knowing their classes.
 KNOWS_NO_CHECK = (
-    "judging/diagnosis/__init__.py",
-    "judging/diagnosis/rules.py",
-    "judging/plots.py",
-    "judging/figures.py",
-    "rubrics/check_parameters.py",
+    "grading/judging/diagnosis/__init__.py",
+    "grading/judging/diagnosis/rules.py",
+    "grading/judging/plots.py",
+    "grading/judging/figures.py",
+    "grading/rubrics/check_parameters.py",
 )
 
 
 def test_the_engine_of_hint_rules_and_the_charts_know_no_check() -> None:
     """A check declares what its parameters are, and hands typed facts to rules."""
     for name in KNOWS_NO_CHECK:
-        assert [module for module in imports_of(PACKAGE / name) if module.startswith("grader.judging.checks")] == []
+        assert [
+            module for module in imports_of(PACKAGE / name) if module.startswith("grader.grading.judging.checks")
+        ] == []
 
 
 def test_no_hint_rule_reads_the_evidence_of_reports() -> None:
     """That is JSON for readers of reports; what rules need is in typed facts."""
-    rules = sorted((PACKAGE / "judging" / "diagnosis").glob("*.py"))
+    rules = sorted((PACKAGE / "grading" / "judging" / "diagnosis").glob("*.py"))
     reads = [
         f"{path.name}:{node.lineno}"
         for path in rules

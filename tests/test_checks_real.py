@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.request import GradeRequest
-from grader.app.start import grade
-from grader.judging.checks import CHECKS
-from grader.judging.run_check import check_name
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.loader import read_rubric
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.start import grade
+from grader.grading.judging.checks import CHECKS
+from grader.grading.judging.run_check import check_name
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.loader import read_rubric
 
 ROOT = Path(__file__).resolve().parent.parent
 REAL = ROOT / "tests" / "real_checks"

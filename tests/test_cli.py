@@ -19,13 +19,13 @@ from cli_samples import a_report
 from click.testing import CliRunner, Result
 
 import grader
-from grader.app import start as session
-from grader.app.request import GradeRequest
 from grader.cli import interactive, main
-from grader.core import errors
-from grader.core.exercise import Outcome
-from grader.core.report import Report
-from grader.core.scenario import ODOMETRY
+from grader.grading.app import start as session
+from grader.grading.app.request import GradeRequest
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Report
+from grader.runtime.model import errors
+from grader.runtime.model.scenario import ODOMETRY
 
 
 class Session:
@@ -471,7 +471,7 @@ CHILD = """
 import sys
 sys.path.insert(0, {folder!r})
 from cli_samples import a_report
-from grader.app import start as session
+from grader.grading.app import start as session
 from grader.cli import main
 def grade(request, progress, *_, **__):
     progress("exercise 1: \\x1b[31malone")
@@ -549,7 +549,8 @@ def test_help_starts_light() -> None:
     code = (
         "import sys\nfrom grader.cli import main\n"
         "try: main.app(['--help'])\nexcept SystemExit: pass\n"
-        "heavy = {'rich', 'pydantic', 'rosbags', 'ruamel', 'rclpy', 'numpy', 'fractions', 'grader.core.trace'}\n"
+        "heavy = {'rich', 'pydantic', 'rosbags', 'ruamel', 'rclpy', 'numpy', 'fractions'}\n"
+        "heavy |= {'grader.runtime.model.trace'}\n"
         "sys.exit(', '.join(sorted(heavy & set(sys.modules))) or 0)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

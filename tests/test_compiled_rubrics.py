@@ -9,18 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from grader import compiled as compiled_module
-from grader.app import bags
-from grader.app.bags import read_recordings
-from grader.app.grade import read_exercises
-from grader.app.request import GradeRequest
-from grader.compiled import compiled, state_of, state_of_package
-from grader.core.scenario import ODOMETRY
-from grader.core.shipped import shipped
-from grader.execution.bag import read_bag
-from grader.rubrics import builtin
-from grader.rubrics.builtin import builtin_exercises, builtin_headers, builtin_recording, builtin_rubrics
-from grader.rubrics.loader import read_rubric
+from grader.grading.app import bags
+from grader.grading.app.bags import read_recordings
+from grader.grading.app.grade import read_exercises
+from grader.grading.app.request import GradeRequest
+from grader.grading.rubrics import builtin
+from grader.grading.rubrics.builtin import builtin_exercises, builtin_headers, builtin_recording, builtin_rubrics
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime import compiled as compiled_module
+from grader.runtime.compiled import compiled, state_of, state_of_package
+from grader.runtime.model.scenario import ODOMETRY
+from grader.runtime.recording.bag import read_bag
+from grader.runtime.shipped import shipped
 
 
 @pytest.fixture

@@ -18,8 +18,8 @@ from sample_folders import GOLDEN, collections
 
 from grader import api
 from grader.cli.main import app
-from grader.core.rubric_files import rubric_file
-from grader.judging.checks import CHECKS
+from grader.grading.judging.checks import CHECKS
+from grader.grading.model.rubric_files import rubric_file
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [
@@ -82,9 +82,9 @@ def test_what_does_not_exist_is_found() -> None:
     """A link, a path, a path inside a command, one of several, and a pattern that fits nothing."""
     text = (
         "[a](docs/none.md#part) [b](README.md) [c](https://a.b/c) `grader/none.py` `python tests/none.py --all`"
-        " `grader/student_host/{clock,none}.py` `rubrics/*.none` `rubrics/*/*.yaml` `out/grader/x.py`"
+        " `grader/runtime/host/{clock,none}.py` `rubrics/*.none` `rubrics/*/*.yaml` `out/grader/x.py`"
     )
-    wanted = ["docs/none.md", "grader/none.py", "tests/none.py", "grader/student_host/none.py", "rubrics/*.none"]
+    wanted = ["docs/none.md", "grader/none.py", "tests/none.py", "grader/runtime/host/none.py", "rubrics/*.none"]
     assert missing(text, ROOT) == wanted
 
 

@@ -11,12 +11,13 @@ from typing import Any
 
 import pytest
 
-from grader.app.grade import EarlyReports, read_exercises
-from grader.app.request import GradeRequest
-from grader.core.exercise import Outcome
-from grader.core.report import Environment, Report
-from grader.core.submission import Run, StudentFile, Submission
-from grader.core.trace import ClockKind, Trace
+from grader.grading.app.grade import EarlyReports, read_exercises
+from grader.grading.app.request import GradeRequest
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Environment, Report
+from grader.grading.model.run import Run
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import ClockKind, Trace
 
 REFERENCE = Path(__file__).resolve().parent.parent / "reference_solutions"
 EXERCISES = read_exercises(GradeRequest("x"))

@@ -18,9 +18,9 @@ from grading import grade_until_decided, say_nothing
 from process_table import running, students_of
 from sample_folders import expected, folder_of, golden
 
-from grader.app.request import GradeRequest
-from grader.app.start import grade
-from grader.core.report import Report
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.start import grade
+from grader.grading.model.report import Report
 
 ROOT = Path(__file__).resolve().parent.parent
 #: What these are told depends on where a loop stood when it was stopped.

@@ -12,14 +12,14 @@ from typing import NoReturn
 import pytest
 from click.testing import CliRunner
 
-from grader.app import doctor
-from grader.app.observe import ObserveRequest
 from grader.cli.main import app
-from grader.core.checkup import Checkup, Fact, TierReport
-from grader.core.errors import EnvironmentFault, HarnessError
-from grader.core.limits import Limits
-from grader.execution import machine
-from grader.reporting.doctor import checkup_to_json, render_checkup
+from grader.grading.app import doctor
+from grader.grading.app.observe import ObserveRequest
+from grader.grading.reporting.doctor import checkup_to_json, render_checkup
+from grader.runtime import machine
+from grader.runtime.model.checkup import Checkup, Fact, TierReport
+from grader.runtime.model.errors import EnvironmentFault, HarnessError
+from grader.runtime.model.limits import Limits
 
 BY_ROOT = TierReport("bubblewrap-root", "A2", usable=False, why="not root", remedy="run it with sudo")
 BY_USER = TierReport("bubblewrap", "A1", usable=False, why="none", remedy="install bubblewrap")

@@ -14,11 +14,11 @@ from click.testing import CliRunner
 from grading import grade_until_decided
 from ruamel.yaml import YAML
 
-from grader.app.request import GradeRequest
 from grader.cli import main
-from grader.core.report import Report
-from grader.judging.diagnosis import CAUSE_KEY
-from grader.rubrics.loader import read_rubric
+from grader.grading.app.request import GradeRequest
+from grader.grading.judging.diagnosis import CAUSE_KEY
+from grader.grading.model.report import Report
+from grader.grading.rubrics.loader import read_rubric
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = sorted(path.parent.name for path in (ROOT / "examples").glob("*/README.md"))

@@ -10,20 +10,20 @@ import pytest
 from click.testing import CliRunner, Result
 from kept_runs import kept_run, velocity_run, velocity_trace
 
-from grader.app import explain as explaining
-from grader.app import grade as session
-from grader.app.explain import explain
-from grader.app.hint_rules import explain_rules, try_rules
-from grader.app.request import GradeRequest
 from grader.cli import main
-from grader.core.errors import GraderError
-from grader.core.exercise import Exercise
-from grader.core.report import CheckExplanation, CriterionExplanation
-from grader.judging.checks import CHECKS
-from grader.judging.diagnosis import RULES
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.check_parameters import manual_of
-from grader.rubrics.loader import read_rubric
+from grader.grading.app import explain as explaining
+from grader.grading.app import grade as session
+from grader.grading.app.explain import explain
+from grader.grading.app.hint_rules import explain_rules, try_rules
+from grader.grading.app.request import GradeRequest
+from grader.grading.judging.checks import CHECKS
+from grader.grading.judging.diagnosis import RULES
+from grader.grading.model.exercise import Exercise
+from grader.grading.model.report import CheckExplanation, CriterionExplanation
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.check_parameters import manual_of
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.errors import GraderError
 
 ROOT = Path(__file__).resolve().parent.parent
 CRITERIA = [(e.id, c.id) for path in builtin_rubrics().values() for e in [read_rubric(path)] for c in e.criteria]

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from grading import grade_until_decided
 
-from grader.app.request import GradeRequest
-from grader.app.seeds import PRACTICE, SeedKey
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.seeds import PRACTICE, SeedKey
 
 PROGRAM = str(Path(__file__).resolve().parent / "foreknowledge")
 

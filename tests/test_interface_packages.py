@@ -19,8 +19,10 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from grader.app import interface_packages
-from grader.app.interface_packages import (
+from grader.cli import main
+from grader.course.classroom.store import Conditions
+from grader.grading.app import interface_packages
+from grader.grading.app.interface_packages import (
     GRADER,
     RUBRIC,
     SUBMISSION,
@@ -29,23 +31,21 @@ from grader.app.interface_packages import (
     offered_digest,
     provide,
 )
-from grader.app.keeping import EvidenceWriter
-from grader.app.rejudge import judgement, rejudge
-from grader.app.request import GradeRequest
-from grader.app.start import grade
-from grader.classroom.store import Conditions
-from grader.cli import main
-from grader.core.grading_options import GradingOptions
-from grader.core.report import Report
-from grader.core.submission import Submission
-from grader.execution import confined_build
-from grader.execution.evidence.store import open_evidence
-from grader.execution.real_time_budget import FOREVER_S
-from grader.execution.recording_session import RecordingSession, open_session
-from grader.execution.ros_installation import find_ros
-from grader.reporting.json_report import report_to_json
-from grader.rubrics.interfaces import Interfaces
-from grader.submissions.projects import read_projects
+from grader.grading.app.keeping import EvidenceWriter
+from grader.grading.app.rejudge import judgement, rejudge
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.start import grade
+from grader.grading.evidence.store import open_evidence
+from grader.grading.model.grading_options import GradingOptions
+from grader.grading.model.report import Report
+from grader.grading.reporting.json_report import report_to_json
+from grader.grading.rubrics.interfaces import Interfaces
+from grader.grading.submissions.projects import read_projects
+from grader.runtime.model.submission import Submission
+from grader.runtime.ros_installation import find_ros
+from grader.runtime.session import RecordingSession, open_session
+from grader.runtime.supervisor import confined_build
+from grader.runtime.supervisor.real_time_budget import FOREVER_S
 
 REAL = Path(__file__).parent / "real_checks"
 RUBRIC_FILE = REAL / "brought.yaml"

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 from sandboxes import USER, unreachable, user_start
 
-from grader.execution.ros_installation import find_ros
-from grader.execution.sandbox.bubblewrap import USER_NAME
-from grader.execution.sandbox.tiers import FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME
+from grader.runtime.ros_installation import find_ros
+from grader.runtime.sandbox.bubblewrap import USER_NAME
+from grader.runtime.sandbox.tiers import FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME
 
 pytestmark = pytest.mark.ros
 

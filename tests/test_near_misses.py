@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from grader.app.grade import belonging, names_a_program, read_exercises, wanted_files
-from grader.app.request import GradeRequest
 from grader.cli import main
-from grader.submissions.submission import stage_submission
+from grader.grading.app.grade import belonging, names_a_program, read_exercises, wanted_files
+from grader.grading.app.request import GradeRequest
+from grader.grading.submissions.submission import stage_submission
 
 FILES = (
     "velocity_publisher.py",

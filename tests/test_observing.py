@@ -9,11 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.observe import ObserveRequest, observe
-from grader.core.errors import SubmissionError
-from grader.core.quantities import NS_PER_MS, NS_PER_S
-from grader.core.report import Summary
-from grader.core.trace import (
+from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.judging.summary import summarise
+from grader.grading.model.report import Summary
+from grader.grading.reporting.observed import render_summary, summary_to_json, without_libraries
+from grader.runtime.model.errors import SubmissionError
+from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
+from grader.runtime.model.trace import (
     ClockKind,
     Endpoint,
     Fault,
@@ -27,8 +29,6 @@ from grader.core.trace import (
     ServiceEnd,
     Trace,
 )
-from grader.judging.summary import summarise
-from grader.reporting.observed import render_summary, summary_to_json, without_libraries
 
 ROOT = Path(__file__).resolve().parent.parent
 FLOAT = "std_msgs/msg/Float32"

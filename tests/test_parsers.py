@@ -59,8 +59,8 @@ def test_nothing_in_the_grader_reads_project_files_outside_of_the_contained_proc
     """Only that process knows TOML, INI files, and how to evaluate setup.py and CMakeLists.txt; nobody imports it."""
     found = all_parsers()
     assert {module for module, kinds in found.items() if "INI or templates" in kinds} == {
-        "grader/submissions/project_reader.py",
-        "grader/submissions/setup_files.py",
+        "grader/grading/submissions/project_reader.py",
+        "grader/grading/submissions/setup_files.py",
     }
     for path in PACKAGE.rglob("*.py"):
         text = path.read_text(encoding="utf-8")

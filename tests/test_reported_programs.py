@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from grading import grade_until_decided
 
-from grader.app.observe import ObserveRequest, observe
-from grader.app.request import GradeRequest
-from grader.core.exercise import Outcome
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import ClockKind
+from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.request import GradeRequest
+from grader.grading.model.exercise import Outcome
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import ClockKind
 
 pytestmark = pytest.mark.ros
 

@@ -7,13 +7,13 @@ from typing import NoReturn
 import pytest
 from click.testing import CliRunner
 
-from grader.app import start
-from grader.app.bags import recording_digest
-from grader.app.grade import read_exercises
-from grader.app.request import GradeRequest, command_words, reproduction
 from grader.cli import main
-from grader.core.scenario import ODOMETRY
-from grader.stimuli.recorded import Recording, TimedMessage
+from grader.grading.app import start
+from grader.grading.app.bags import recording_digest
+from grader.grading.app.grade import read_exercises
+from grader.grading.app.request import GradeRequest, command_words, reproduction
+from grader.runtime.model.scenario import ODOMETRY
+from grader.runtime.stimuli.recorded import Recording, TimedMessage
 
 
 def test_the_seed_is_named_even_if_nobody_asked_for_one() -> None:

@@ -13,15 +13,14 @@ import msgspec
 import pytest
 from click.testing import CliRunner
 
-from grader.app.request import GradeRequest, command_words, request_for, request_to_json
-from grader.classroom.messages import Terms, pack, unpack
-from grader.classroom.store import Conditions
 from grader.cli.remembered import KEPT
 from grader.cli.run_options import run_options
-from grader.core import grading_options as module
-from grader.core.dataclass import dataclass
-from grader.core.exercise import Drawn
-from grader.core.grading_options import (
+from grader.course.classroom.messages import Terms, pack, unpack
+from grader.course.classroom.store import Conditions
+from grader.grading.app.request import GradeRequest, command_words, request_for, request_to_json
+from grader.grading.model import grading_options as module
+from grader.grading.model.exercise import Drawn
+from grader.grading.model.grading_options import (
     BATCH,
     GRADE,
     GradingOptions,
@@ -36,6 +35,7 @@ from grader.core.grading_options import (
     rows,
     with_paths,
 )
+from grader.runtime.model.dataclass import dataclass
 
 #: A value of each option that is not the usual one.
 OTHER: dict[str, Any] = {

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.grade import read_exercises
-from grader.app.request import GradeRequest
-from grader.app.seeds import PRACTICE, PRACTICE_NOTE, SeedKey, kept_key, seed_key
-from grader.core.errors import KeyFileError
-from grader.execution.evidence.store import open_evidence, run_of
+from grader.grading.app.grade import read_exercises
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.seeds import PRACTICE, PRACTICE_NOTE, SeedKey, kept_key, seed_key
+from grader.grading.evidence.store import open_evidence, run_of
+from grader.runtime.model.errors import KeyFileError
 
 ROOT = Path(__file__).resolve().parent.parent
 GRADE = str(Path(sys.executable).with_name("grade"))
@@ -158,12 +158,12 @@ def test_a_run_without_a_key_says_that_its_values_can_be_known() -> None:
 PLANNING = """
 import sys
 from pathlib import Path
-from grader.app.bags import read_recordings
-from grader.app.request import GradeRequest
-from grader.core.submission import StudentFile, Submission
-from grader.execution.evidence.manifest import scenario_digest
-from grader.execution.plan import plan_scenario
-from grader.rubrics.loader import read_rubric
+from grader.grading.app.bags import read_recordings
+from grader.grading.app.request import GradeRequest
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.grading.evidence.manifest import scenario_digest
+from grader.runtime.plan import plan_scenario
+from grader.grading.rubrics.loader import read_rubric
 for path in map(Path, sys.argv[1:]):
     exercise = read_rubric(path)
     files = {name: StudentFile(name, name) for name in exercise.files}

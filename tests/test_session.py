@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.bags import read_given, read_recordings
-from grader.app.grade import read_exercises
-from grader.app.request import GradeRequest
-from grader.app.start import grade, may_run, opened_early
-from grader.core.errors import RecordingError, RubricError, SubmissionError
-from grader.core.exercise import Location, Outcome
-from grader.core.scenario import ODOMETRY
-from grader.execution.ros_installation import find_ros
-from grader.rubrics.builtin import builtin_rubrics, exercise_ids
+from grader.grading.app.bags import read_given, read_recordings
+from grader.grading.app.grade import read_exercises
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.start import grade, may_run, opened_early
+from grader.grading.model.exercise import Location, Outcome
+from grader.grading.rubrics.builtin import builtin_rubrics, exercise_ids
+from grader.runtime.model.errors import RecordingError, RubricError, SubmissionError
+from grader.runtime.model.scenario import ODOMETRY
+from grader.runtime.ros_installation import find_ros
 
 
 def test_all_exercises_are_graded_unless_some_are_named() -> None:

@@ -12,21 +12,22 @@ from typing import Any
 import pytest
 from grading import grade_until_decided, say_nothing
 
-from grader.app.grade import Progress
-from grader.app.request import GradeRequest
-from grader.app.spot_checks import SpotChecks, check, is_drawn, shortened
-from grader.app.start import grade
-from grader.core.exercise import Criterion, Exercise
-from grader.core.report import Report
-from grader.core.scenario import Scenario, Span
-from grader.core.submission import Run, StudentFile, Submission
-from grader.core.trace import ClockKind, Trace
-from grader.execution.plan import Plan
-from grader.execution.supervisor import Job
-from grader.judging.beginnings import BeginningJudge
-from grader.judging.checks.fields import FieldEqual
-from grader.judging.checks.rate import TopicRate
-from grader.student_host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
+from grader.grading.app.grade import Progress
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.spot_checks import SpotChecks, check, is_drawn, shortened
+from grader.grading.app.start import grade
+from grader.grading.judging.beginnings import BeginningJudge
+from grader.grading.judging.checks.fields import FieldEqual
+from grader.grading.judging.checks.rate import TopicRate
+from grader.grading.model.exercise import Criterion, Exercise
+from grader.grading.model.report import Report
+from grader.grading.model.run import Run
+from grader.runtime.host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
+from grader.runtime.model.scenario import Scenario, Span
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.plan import Plan
+from grader.runtime.supervisor.supervisor import Job
 from grader.testing import TraceBuilder
 
 HERE = Path(__file__).parent / "spot_checks"

@@ -11,10 +11,10 @@ from typing import cast
 import pytest
 from click.testing import CliRunner, Result
 
-from grader.app.seeds import ByKey, by_key, checked, read_key
 from grader.cli.main import app
-from grader.core.errors import KeyFileError, VariantError
-from grader.rubrics.variants import VariantOptions
+from grader.grading.app.seeds import ByKey, by_key, checked, read_key
+from grader.grading.rubrics.variants import VariantOptions
+from grader.runtime.model.errors import KeyFileError, VariantError
 
 KEY = b"a course key for tests, not a secret"
 
@@ -85,7 +85,7 @@ def test_a_key_that_cannot_be_used_is_refused(tmp_path: Path, content: bytes | N
 @pytest.fixture
 def sheet(tmp_path: Path) -> Callable[..., Result]:
     """Run `grade rubric variant` on exercise 1 with a rate that varies."""
-    from grader.rubrics.builtin import builtin_rubrics
+    from grader.grading.rubrics.builtin import builtin_rubrics
 
     text = builtin_rubrics()["velocity_publisher"].read_text(encoding="utf-8")
     text = text.replace("\nscenarios:", "\nvariants:\n  rate: {choose: [10 Hz, 15 Hz, 20 Hz]}\nscenarios:", 1)

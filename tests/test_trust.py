@@ -15,12 +15,12 @@ import pytest
 from grading import grade_until_decided
 from ruamel.yaml import YAML
 
-from grader.app.request import GradeRequest
-from grader.app.seeds import SeedKey
-from grader.classroom.intake import take_in
-from grader.core.errors import SubmissionError
-from grader.reporting.json_report import report_to_json
-from grader.submissions.archives import collect_archive
+from grader.course.classroom.intake import take_in
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.seeds import SeedKey
+from grader.grading.reporting.json_report import report_to_json
+from grader.grading.submissions.archives import collect_archive
+from grader.runtime.model.errors import SubmissionError
 
 HERE = Path(__file__).parent / "trust"
 PROGRAMS = YAML(typ="safe").load((HERE / "programs.yaml").read_text(encoding="utf-8"))["programs"]

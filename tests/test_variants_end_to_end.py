@@ -9,8 +9,8 @@ from click.testing import CliRunner, Result
 from report_samples import report_schema
 
 from grader.cli import main
-from grader.core.shipped import shipped
-from grader.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.runtime.shipped import shipped
 
 SOLUTION = shipped("rubrics").parent / "reference_solutions" / "velocity_publisher.py"
 

@@ -16,15 +16,15 @@ from click.testing import CliRunner
 from sandboxes import USER, unreachable, user_start
 from verifying import GRADE, differences, program, verified, written
 
-from grader.app import conditions as module
-from grader.app import verify as verifying
-from grader.app.conditions import LOOPS, Condition, conditions
 from grader.cli.main import app
-from grader.core.conditions import CONDITIONS, SANDBOXES, USUAL
-from grader.core.errors import EnvironmentFault
-from grader.core.verification import State
-from grader.execution.ros_installation import RosInstallation
-from grader.execution.sandbox.tiers import isolation_from_name
+from grader.grading.app import conditions as module
+from grader.grading.app import verify as verifying
+from grader.grading.app.conditions import LOOPS, Condition, conditions
+from grader.grading.model.conditions import CONDITIONS, SANDBOXES, USUAL
+from grader.grading.model.verification import State
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.ros_installation import RosInstallation
+from grader.runtime.sandbox.tiers import isolation_from_name
 
 #: What differs from run to run, and the cause that is found; none where the text tells nothing.
 DIFFERING = {

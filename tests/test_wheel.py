@@ -92,8 +92,8 @@ def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel: Path) -> N
         "exercise_2/odometry/metadata.yaml",
     ):
         assert f"grader/shipped/rubrics/{needed}" in names
-    assert "grader/reporting/report.schema.json" in names
-    assert "grader/student_host/fastdds.xml" in names
+    assert "grader/grading/reporting/report.schema.json" in names
+    assert "grader/runtime/host/fastdds.xml" in names
     assert "grader/py.typed" in names
     assert "grader/shipped/student_template/velocity_publisher.py" in names
     assert not [name for name in names if "reference" in name or name.startswith(("tests/", "student_template/"))]
@@ -101,7 +101,7 @@ def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel: Path) -> N
 
 def test_the_libraries_of_the_report_travel_as_published_with_their_licences(wheel: Path) -> None:
     """Each file in the wheel is the one that the build hook names; nothing else travels beside them."""
-    folder, archive = "grader/reporting/html/vendor", zipfile.ZipFile(wheel)
+    folder, archive = "grader/grading/reporting/html/vendor", zipfile.ZipFile(wheel)
     wanted = {
         f"{folder}/{HOOK['name_of'](package)}/{name}": digest
         for package, files in HOOK["LIBRARIES"].items()

@@ -16,9 +16,9 @@ from sample_folders import expected
 from test_documents import parsed
 
 from grader.cli.main import app
-from grader.core.report import Report
-from grader.reporting import delivery
-from grader.reporting.text import render_text
+from grader.grading.model.report import Report
+from grader.grading.reporting import delivery
+from grader.grading.reporting.text import render_text
 
 ROOT = Path(__file__).resolve().parent.parent
 TEMPLATE = ROOT / "student_template"

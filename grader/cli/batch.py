@@ -15,12 +15,12 @@ from grader.cli.options import (
 )
 from grader.cli.remembered import RepeatingCommand, is_left_out, options_to_keep
 from grader.cli.run_options import run_options
-from grader.core.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED, UNUSABLE
-from grader.core.extras import require
-from grader.core.grading_options import BATCH, GradingOptions
+from grader.grading.model.grading_options import BATCH, GradingOptions
+from grader.runtime.model.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED, UNUSABLE
+from grader.runtime.model.extras import require
 
 if TYPE_CHECKING:
-    from grader.classroom.outputs import Graded
+    from grader.course.classroom.outputs import Graded
 
 _LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "canvas")
 _RERUNS = ("changed", "failed", "undecided", "all")
@@ -100,14 +100,14 @@ def command(  # noqa: PLR0913  one parameter an option
     """
     if similarity:
         require("--similarity", "copydetect", "similarity")
-    from grader.app.request import request_for
-    from grader.classroom.class_run import grade_class
-    from grader.classroom.grading import ClassRequest
-    from grader.classroom.outputs import platforms, render_summary, summary_json
-    from grader.classroom.schedulers import opened
-    from grader.classroom.watching import shown_watcher
-    from grader.core.shipped import shipped
-    from grader.similarity.finding import read_given
+    from grader.course.classroom.class_run import grade_class
+    from grader.course.classroom.grading import ClassRequest
+    from grader.course.classroom.outputs import platforms, render_summary, summary_json
+    from grader.course.classroom.schedulers import opened
+    from grader.course.classroom.watching import shown_watcher
+    from grader.course.similarity.finding import read_given
+    from grader.grading.app.request import request_for
+    from grader.runtime.shipped import shipped
 
     if canvas_gradebook is not None and canvas is None:
         raise click.BadParameter("--canvas-gradebook needs --canvas with the assignment's number")
@@ -148,7 +148,7 @@ def command(  # noqa: PLR0913  one parameter an option
 
 def _code(graded: Graded) -> int:
     """Return the exit code: mistakes in a rubric come first, then what failed here, then unusable submissions."""
-    from grader.classroom.gradebook import Status
+    from grader.course.classroom.gradebook import Status
 
     if graded.book.author_mistakes:
         return UNUSABLE

@@ -13,10 +13,10 @@ import click
 from click.shell_completion import BashComplete, CompletionItem, add_completion_class, get_completion_class
 
 from grader.cli.options import print_for_programs
-from grader.core.errors import ALL_MET
-from grader.core.rubric_files import rubrics_in
-from grader.core.shipped import shipped
-from grader.reporting.formats import EVIDENCE, FORMATS, added_formats
+from grader.grading.model.rubric_files import rubrics_in
+from grader.grading.reporting.formats import EVIDENCE, FORMATS, added_formats
+from grader.runtime.model.errors import ALL_MET
+from grader.runtime.shipped import shipped
 
 _Items = list[CompletionItem[str]]
 _VARIABLE = "_GRADE_COMPLETE"

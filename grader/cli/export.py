@@ -8,8 +8,8 @@ import click
 
 from grader.cli.completion import complete_exercise
 from grader.cli.options import PATH, RUBRIC, complain, print_for_programs, write_file
-from grader.core.checkup import NO_SANDBOX, TIERS
-from grader.core.errors import ALL_MET
+from grader.runtime.model.checkup import NO_SANDBOX, TIERS
+from grader.runtime.model.errors import ALL_MET
 
 _exercises = click.option(
     "--exercise",
@@ -44,7 +44,7 @@ def _gradescope(
     target: Path, exercises: tuple[str, ...], rubrics: tuple[Path, ...], isolation: str, seed_key: Path | None
 ) -> int:
     """Write an autograder ZIP that Gradescope takes as it is."""
-    from grader.packaging import Chosen, gradescope
+    from grader.course.packaging import Chosen, gradescope
 
     if isolation == NO_SANDBOX:
         complain("without a sandbox a student's program can write its own result")
@@ -59,7 +59,7 @@ def _gradescope(
 @click.option("--isolation", type=_tiers, default="auto", show_default=True, help="The sandbox on the runner.")
 def _classroom50(target: Path, exercises: tuple[str, ...], rubrics: tuple[Path, ...], isolation: str) -> int:
     """Write the FOLDER of an assignment's autograder for Classroom 50."""
-    from grader.packaging import Chosen, classroom50
+    from grader.course.packaging import Chosen, classroom50
 
     for name, content in classroom50(Chosen(tuple(dict.fromkeys(exercises)), rubrics, isolation)).items():
         write_file(target / name, content, parents=True)
@@ -70,7 +70,7 @@ def _classroom50(target: Path, exercises: tuple[str, ...], rubrics: tuple[Path, 
 @click.argument("action", metavar="OWNER/NAME@COMMIT")
 def _workflow(action: str) -> int:
     """Print the workflow for students' repositories that grades with your copy of the grader."""
-    from grader.packaging import workflow
+    from grader.course.packaging import workflow
 
     print_for_programs(workflow(action))
     return ALL_MET
@@ -79,7 +79,7 @@ def _workflow(action: str) -> int:
 @command.command(name="constraints")
 def _constraints() -> int:
     """Print the versions of all that the grader needs here, as constraints for pip."""
-    from grader.packaging import pins
+    from grader.course.packaging import pins
 
     print_for_programs(pins())
     return ALL_MET

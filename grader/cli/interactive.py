@@ -11,8 +11,8 @@ from pathlib import Path
 import click
 
 from grader.cli.options import complain
-from grader.core.errors import GraderError
-from grader.submissions.collected import PAGE_NAME
+from grader.grading.submissions.collected import PAGE_NAME
+from grader.runtime.model.errors import GraderError
 
 #: Where `grade --open` writes the page, unless `-o html=PATH` says otherwise: browsers in containers read neither
 #: temporary nor hidden folders.
@@ -39,8 +39,8 @@ def folder_at_hand(rubrics: tuple[Path, ...]) -> str | None:
 
     Otherwise, print an error with examples of commands, and return None.
     """
-    from grader.app.grade import read_exercises, wanted_files
-    from grader.app.request import GradeRequest
+    from grader.grading.app.grade import read_exercises, wanted_files
+    from grader.grading.app.request import GradeRequest
 
     wanted = wanted_files(read_exercises(GradeRequest(submission="", rubrics=rubrics, every=True)))
     here = Path()

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from grader.cli.options import PATH, print_result
-from grader.core.errors import ALL_MET
+from grader.runtime.model.errors import ALL_MET
 
 
 @click.group(name="interfaces")
@@ -36,8 +36,8 @@ def _list(*, folders: tuple[Path, ...], as_json: bool) -> int:
 
 
 def _print(folders: tuple[Path, ...], *, ready: bool, as_json: bool) -> int:
-    from grader.app.interface_packages import described
-    from grader.reporting.interface_list import packages_to_json, render_packages
+    from grader.grading.app.interface_packages import described
+    from grader.grading.reporting.interface_list import packages_to_json, render_packages
 
     found = described(folders, ready=ready)
     print_result(

@@ -34,8 +34,11 @@ from grader.cli.options import (
 )
 from grader.cli.outputs import outputs_option
 from grader.cli.run_options import run_options
-from grader.core.dataclass import dataclass
-from grader.core.errors import (
+from grader.grading.model.grading_options import GRADE, OBSERVE, GradingOptions
+from grader.grading.model.report import exit_code
+from grader.grading.reporting.formats import EVIDENCE, known
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.errors import (
     ALL_MET,
     INTERRUPTED,
     UNDECIDED,
@@ -43,22 +46,19 @@ from grader.core.errors import (
     GraderError,
     HarnessError,
     RubricError,
-    exit_code,
 )
-from grader.core.grading_options import GRADE, OBSERVE, GradingOptions
-from grader.reporting.formats import EVIDENCE, known
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
     from click.shell_completion import CompletionItem
 
-    from grader.app.keeping import EvidenceWriter
-    from grader.app.request import GradeRequest
-    from grader.core.report import Report
-    from grader.execution.recording_session import RecordingSession
-    from grader.reporting.audience import Readers
-    from grader.reporting.delivery import Output
+    from grader.grading.app.keeping import EvidenceWriter
+    from grader.grading.app.request import GradeRequest
+    from grader.grading.model.report import Report
+    from grader.grading.reporting.audience import Readers
+    from grader.grading.reporting.delivery import Output
+    from grader.runtime.session import RecordingSession
 
 _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
@@ -137,7 +137,7 @@ def _grade(*, submission: str | None, options: GradingOptions, watch: bool, no_p
     started = context.find_object(float) or time.monotonic()
     if submission is not None and (context.args or not os.path.exists(submission)):  # noqa: PTH110 - any name is valid
         _check_submission(submission, context.args)
-    from grader.app import start
+    from grader.grading.app import start
 
     with ExitStack() as stack:
         session = None
@@ -152,7 +152,7 @@ def _grade(*, submission: str | None, options: GradingOptions, watch: bool, no_p
 def _check_submission(submission: str, others: Sequence[str]) -> None:
     """Raise an error with what was probably meant, if there are several submissions, or none and something like it."""
     from grader.cli.near_misses import meant_by, too_many
-    from grader.submissions.submission import not_there
+    from grader.grading.submissions.submission import not_there
 
     if others:
         raise too_many(submission, others)
@@ -180,7 +180,7 @@ def _graded(  # noqa: PLR0913  one parameter an option
 ) -> int:
     """Check the options, grade, and return the exit code."""
     from grader.cli import interactive
-    from grader.reporting.delivery import Output, prepared
+    from grader.grading.reporting.delivery import Output, prepared
 
     rendered = tuple(output for output in outputs if output.format != EVIDENCE)
     if watch and (as_json or rendered != outputs):
@@ -191,8 +191,8 @@ def _graded(  # noqa: PLR0913  one parameter an option
         rendered = (*rendered, Output("html", interactive.PAGE))
     wanted = prepared((*rendered, Output("json")) if as_json else rendered, verbose=verbose)
     for_whom = readers(audience, as_of)
-    from grader.app.request import request_for
-    from grader.app.seeds import PRACTICE
+    from grader.grading.app.request import request_for
+    from grader.grading.app.seeds import PRACTICE
 
     key = drawn_with(options.seed, seed_key)
     submission = interactive.folder_at_hand(options.rubrics) if submission is None else submission
@@ -224,9 +224,9 @@ class _Grading:
 
     def once(self, started: float, session: RecordingSession | None = None) -> int:
         """Grade, in a session if one is given, and return the exit code; the user waits since `started`."""
-        from grader.app import start
-        from grader.reporting.audience import told
-        from grader.reporting.delivery import deliver, early_delivery
+        from grader.grading.app import start
+        from grader.grading.reporting.audience import told
+        from grader.grading.reporting.delivery import deliver, early_delivery
 
         remember = self.writer.remember if self.writer is not None else None
         early = early_delivery(self.outputs, self.readers)
@@ -251,8 +251,8 @@ class _Grading:
 
     def each_save(self, started: float) -> int:
         """Grade now and after each save, in one session; return the exit code of the last time at Ctrl-C."""
-        from grader.app import start
         from grader.cli.interactive import saves
+        from grader.grading.app import start
 
         saved, code = saves(Path(self.request.submission)), ALL_MET
         next(saved)
@@ -273,8 +273,8 @@ class _Grading:
                     click.clear()
 
     def _warn(self, report: Report) -> None:
-        from grader.core.checkup import missing
-        from grader.core.releases import TRIED
+        from grader.runtime.model.checkup import missing
+        from grader.runtime.model.releases import TRIED
 
         for found in () if self.readers.only_students else missing(report.environment.containment):
             complain(f"sandbox {report.environment.isolation}: {found}")
@@ -283,7 +283,7 @@ class _Grading:
 
 
 def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> EvidenceWriter:
-    from grader.app.keeping import EvidenceWriter
+    from grader.grading.app.keeping import EvidenceWriter
 
     return EvidenceWriter(folders, request)
 
@@ -309,9 +309,9 @@ def _observe(  # noqa: PLR0913  one parameter an option
     FOLDER/NAME or FOLDER/PACKAGE/NAME.
     Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
     """
-    from grader.app import observe
-    from grader.app.inputs import read_sent, read_simulations
-    from grader.reporting.observed import render_summary, summary_to_json
+    from grader.grading.app import observe
+    from grader.grading.app.inputs import read_sent, read_simulations
+    from grader.grading.reporting.observed import render_summary, summary_to_json
 
     request = observe.ObserveRequest(
         files,
@@ -336,8 +336,8 @@ def _doctor(*, as_json: bool) -> int:
 
     Exit codes: 0 if strangers' programs can be graded safely here, 2 if not.
     """
-    from grader.app.doctor import examine
-    from grader.reporting.doctor import checkup_to_json, render_checkup
+    from grader.grading.app.doctor import examine
+    from grader.grading.reporting.doctor import checkup_to_json, render_checkup
 
     with shown_progress(wanted=True) as progress:
         checkup = examine(progress)
@@ -365,8 +365,8 @@ def _explain(*, name: str | None, rubrics: tuple[Path, ...], rules: bool, eviden
         raise click.BadParameter("--on needs --rules, and no NAME: all rules are tried on the recording")
     if rules:
         return _explain_rules(name or "", rubrics, evidence, as_json=as_json)
-    from grader.app.explain import everything, explain
-    from grader.reporting.explained import explanations_to_json, list_all, render_explanations
+    from grader.grading.app.explain import everything, explain
+    from grader.grading.reporting.explained import explanations_to_json, list_all, render_explanations
 
     found = everything(rubrics) if name is None else explain(name, rubrics)
     render = list_all if name is None else render_explanations
@@ -375,8 +375,8 @@ def _explain(*, name: str | None, rubrics: tuple[Path, ...], rules: bool, eviden
 
 
 def _explain_rules(name: str, rubrics: tuple[Path, ...], evidence: Path | None, *, as_json: bool) -> int:
-    from grader.app.hint_rules import explain_rules, try_rules
-    from grader.reporting.explained import render_rules, render_trials, rules_to_json
+    from grader.grading.app.hint_rules import explain_rules, try_rules
+    from grader.grading.reporting.explained import render_rules, render_trials, rules_to_json
 
     if evidence is None:
         rules = explain_rules(rubrics, name)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from grader.reporting.formats import FORMATS
+from grader.grading.reporting.formats import FORMATS
 
 #: How alike a name must be to one that exists, and how many entries of a folder are compared with it.
 _ALIKE, _MOST_ENTRIES = 0.75, 500
@@ -52,8 +52,8 @@ def _gradable(entry: Path) -> bool:
 
 def _exercise(name: str) -> str:
     """Return a hint about the option for an exercise: `grade 1`, `grade project 2`, `grade exercise_1`."""
-    from grader.core.errors import RubricError
-    from grader.rubrics.builtin import builtin_exercises, exercise_ids
+    from grader.grading.rubrics.builtin import builtin_exercises, exercise_ids
+    from grader.runtime.model.errors import RubricError
 
     spaced = re.sub(r"[\s_-]+", " ", name).strip()
     for written in (name.removeprefix("exercise "), spaced.casefold().removeprefix("exercise ")):

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from grader.core.errors import GraderError
-from grader.core.rubric_files import rubric_file
+from grader.grading.model.rubric_files import rubric_file
+from grader.runtime.model.errors import GraderError
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from grader.app.grade import Progress
-    from grader.app.seeds import ByKey, SeedKey
-    from grader.reporting.audience import Readers
-    from grader.reporting.formats import PageLayout
+    from grader.grading.app.grade import Progress
+    from grader.grading.app.seeds import ByKey, SeedKey
+    from grader.grading.reporting.audience import Readers
+    from grader.grading.reporting.formats import PageLayout
 
 
 PATH = click.Path(path_type=Path)
@@ -56,8 +56,8 @@ def audience_options(command: _Command) -> _Command:
 
 def readers(audience: str | None, day: str) -> Readers:
     """Return the readers of the reports, from the values of `--audience` and `--as-of`."""
-    from grader.core.exercise import Audience
-    from grader.reporting.audience import Readers
+    from grader.grading.model.exercise import Audience
+    from grader.grading.reporting.audience import Readers
 
     return Readers(None if audience is None else Audience(audience), day)
 
@@ -68,7 +68,7 @@ def drawn_by(student: str, key: Path | None) -> ByKey | None:
         return None
     if key is None or not student:
         raise click.BadParameter("--student and --variant-key need each other")
-    from grader.app.seeds import by_key
+    from grader.grading.app.seeds import by_key
 
     return by_key(key, student)
 
@@ -77,7 +77,7 @@ def drawn_with(seed: int | None, path: Path | None) -> SeedKey | None:
     """Return the seed key from `--seed-key` or the environment; None if neither has one."""
     if seed is not None and path is not None:
         raise click.BadParameter("--seed and --seed-key exclude each other: a seed needs no key")
-    from grader.app.seeds import seed_key
+    from grader.grading.app.seeds import seed_key
 
     return seed_key(path)
 
@@ -118,14 +118,14 @@ def nearest(found: str, known: Sequence[str]) -> str:
 
 def print_for_programs(text: str) -> None:
     """Print text in UTF-8, and nothing else, on standard output."""
-    from grader.reporting.delivery import show
+    from grader.grading.reporting.delivery import show
 
     show(lambda _: text, for_people=False)
 
 
 def print_result(to_json: Callable[[], str], render: Callable[[PageLayout], str], *, as_json: bool) -> None:
     """Print a result on standard output: as JSON, or as text rendered for its width and colour."""
-    from grader.reporting.delivery import show
+    from grader.grading.reporting.delivery import show
 
     show((lambda _: to_json()) if as_json else render, for_people=not as_json)
 
@@ -145,7 +145,7 @@ def inputs_options(command: _Command) -> _Command:
 
 def complain(*lines: str, kind: str = "warning") -> None:
     """Write lines of a warning, an error or a hint on standard error; they may hold foreign text."""
-    from grader.reporting.escape import shown
+    from grader.grading.reporting.escape import shown
 
     for line in lines:
         click.echo(f"{kind}: {shown(line)}", err=True)
@@ -153,7 +153,7 @@ def complain(*lines: str, kind: str = "warning") -> None:
 
 def write_file(path: Path, content: bytes, *, parents: bool = False) -> None:
     """Write a file atomically, and its folders if asked; raises GraderError if that fails."""
-    from grader.files import write_whole
+    from grader.runtime.files import write_whole
 
     try:
         if parents:
@@ -190,7 +190,7 @@ def _progress_bar() -> Iterator[Progress]:
     from rich.progress import Progress as Bar
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    from grader.reporting.escape import shown
+    from grader.grading.reporting.escape import shown
 
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:

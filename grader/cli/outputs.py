@@ -10,10 +10,10 @@ import click
 
 from grader.cli.completion import complete_output
 from grader.cli.options import nearest
-from grader.reporting.formats import EVIDENCE, FORMATS, added_formats, format_of
+from grader.grading.reporting.formats import EVIDENCE, FORMATS, added_formats, format_of
 
 if TYPE_CHECKING:
-    from grader.reporting.delivery import Output
+    from grader.grading.reporting.delivery import Output
 
 
 class _OutputOption(click.Option):
@@ -62,6 +62,6 @@ def _parse_output(value: str) -> Output:
         )
     if format_ == EVIDENCE and path == "-":
         raise click.BadParameter("evidence is a folder: expected evidence=FOLDER, found evidence=-")
-    from grader.reporting.delivery import Output
+    from grader.grading.reporting.delivery import Output
 
     return Output(format_, None if path == "-" else Path(path))

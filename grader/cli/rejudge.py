@@ -21,17 +21,17 @@ from grader.cli.options import (
     write_file,
 )
 from grader.cli.outputs import outputs_option
-from grader.core.errors import exit_code
-from grader.reporting.formats import EVIDENCE, FORMATS, known
+from grader.grading.model.report import exit_code
+from grader.grading.reporting.formats import EVIDENCE, FORMATS, known
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from grader.app.rejudge import Judgement, Wanted
-    from grader.reporting.audience import Readers
-    from grader.reporting.delivery import Output
-    from grader.reporting.json_report import ReportData
+    from grader.grading.app.rejudge import Judgement, Wanted
+    from grader.grading.reporting.audience import Readers
+    from grader.grading.reporting.delivery import Output
+    from grader.grading.reporting.json_report import ReportData
 
 #: The format of pages, which show the mark that counts where students read them.
 PAGE = "html"
@@ -86,9 +86,9 @@ def command(  # noqa: PLR0913  one parameter an option
 
     Exit codes are those of grading; 2 also where a part of a class had to be refused.
     """
-    from grader.app import rejudge
-    from grader.execution.evidence.store import is_evidence
-    from grader.reporting.delivery import Output
+    from grader.grading.app import rejudge
+    from grader.grading.evidence.store import is_evidence
+    from grader.grading.reporting.delivery import Output
 
     if any(output.format == EVIDENCE for output in outputs):
         raise click.BadParameter("evidence is kept while grading, not while judging again")
@@ -127,10 +127,10 @@ def _confirmed(code: int, count: int, *, verify: bool) -> int:
 
 def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fraction | None, for_whom: Readers) -> int:
     """Judge one submission, and deliver its report as grading does."""
-    from grader.app import rejudge
-    from grader.execution.evidence.store import open_evidence
-    from grader.reporting.audience import told
-    from grader.reporting.delivery import deliver, prepared
+    from grader.grading.app import rejudge
+    from grader.grading.evidence.store import open_evidence
+    from grader.grading.reporting.audience import told
+    from grader.grading.reporting.delivery import deliver, prepared
 
     wanted = tuple(replace(output, evidence=folder) for output in prepared(outputs))
     report = rejudge.rejudge(open_evidence(folder), how)
@@ -138,7 +138,7 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
     if for_whom.only_students:
         pages = [output.path for output in wanted if output.format == PAGE and output.path is not None]
         if pages:
-            from grader.reporting.json_report import report_to_json
+            from grader.grading.reporting.json_report import report_to_json
 
             data = report_to_json(told(report, for_whom))
             _add_marks([(report.name, folder, page, data) for page in pages])
@@ -149,8 +149,8 @@ def _class(  # noqa: PLR0913  one parameter an option
     evidence: Sequence[Path], how: Judgement, wanted: Wanted, *, as_json: bool, jobs: int | None, table: Path | None
 ) -> int:
     """Judge many submissions, print their results, and write one file for each submission and format."""
-    from grader.app import rejudge
-    from grader.reporting.rejudged import render_changes, render_changes_table, render_results, results_to_json
+    from grader.grading.app import rejudge
+    from grader.grading.reporting.rejudged import render_changes, render_changes_table, render_results, results_to_json
 
     if any(output.path is None for output in wanted.files):
         raise click.BadParameter("a class has many reports: expected FORMAT=FOLDER, found FORMAT=-")
@@ -175,6 +175,6 @@ def _class(  # noqa: PLR0913  one parameter an option
 
 def _add_marks(pages: Sequence[tuple[str, Path, Path, ReportData]]) -> None:
     """Put the marks of a class into pages for students: name, evidence, page and report of each."""
-    from grader.classroom.handing_back import HandedBack, add_marks
+    from grader.course.classroom.handing_back import HandedBack, add_marks
 
     complain(*add_marks([HandedBack(*page) for page in pages]))

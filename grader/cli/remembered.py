@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from grader.cli.options import complain
-from grader.core.grading_options import BATCH, names
-from grader.core.rubric_files import rubric_file
+from grader.grading.model.grading_options import BATCH, names
+from grader.grading.model.rubric_files import rubric_file
 
 if TYPE_CHECKING:
-    from grader.classroom.last_run import LastRun
+    from grader.course.classroom.last_run import LastRun
 
 #: The option whose values have a topic in front of a path.
 _BAGS = "bags"
@@ -80,7 +80,7 @@ class RepeatingCommand(click.Command):
         typed, _, _ = self.make_parser(ctx).parse_args(args=list(args))
         if not typed.get("results"):
             return super().parse_args(ctx, args)
-        from grader.classroom.last_run import read_last_run
+        from grader.course.classroom.last_run import read_last_run
 
         given = {name: _texts(typed[name]) for name in self._kept if name in typed}
         dropped = {name for name, param in self._kept.items() if typed.get(_left_out(param))}
@@ -111,7 +111,7 @@ class RepeatingCommand(click.Command):
 
     def _check(self, name: str, texts: tuple[str, ...], last: LastRun) -> None:
         """Raise ClassError if the last run used a file that is no longer there."""
-        from grader.core.errors import ClassError
+        from grader.runtime.model.errors import ClassError
 
         gone = [path for text in texts if self._is_path(name) and not os.path.lexists(path := _place(name, text))]
         if gone:

@@ -18,13 +18,13 @@ from grader.cli.options import (
     write_file,
 )
 from grader.cli.run_options import run_option
-from grader.core.errors import ALL_MET, NOT_ALL_MET, UNUSABLE, GraderError, RubricError
-from grader.core.extras import require
-from grader.core.grading_options import BATCH, GRADE
-from grader.core.rubric_files import notes_on, rubric_files, rubric_of
+from grader.grading.model.grading_options import BATCH, GRADE
+from grader.grading.model.rubric_files import notes_on, rubric_files, rubric_of
+from grader.runtime.model.errors import ALL_MET, NOT_ALL_MET, UNUSABLE, GraderError, RubricError
+from grader.runtime.model.extras import require
 
 if TYPE_CHECKING:
-    from grader.mutation.results import SelftestResult
+    from grader.course.mutation.results import SelftestResult
 
 
 def _all_rubrics(ctx: click.Context, param: click.Parameter, named: tuple[Path, ...]) -> tuple[Path, ...]:
@@ -45,8 +45,8 @@ def _check(*, files: tuple[Path, ...], interfaces: tuple[Path, ...]) -> int:
 
     Exit code 2 if one of them cannot be used; what is merely odd is a warning.
     """
-    from grader.authoring.checking import check_rubric, complaints
-    from grader.reporting.escape import shown
+    from grader.course.authoring.checking import check_rubric, complaints
+    from grader.grading.reporting.escape import shown
 
     code = ALL_MET
     for path in files:
@@ -70,9 +70,9 @@ def _schema(*, rubric: Path | None) -> int:
 
     That for a rubric FILE knows the checks of its own as well.
     """
-    from grader.rubrics.exercise_checks import known_checks
-    from grader.rubrics.loader import own_checks
-    from grader.rubrics.schema import schema_text
+    from grader.grading.rubrics.exercise_checks import known_checks
+    from grader.grading.rubrics.loader import own_checks
+    from grader.grading.rubrics.schema import schema_text
 
     print_for_programs(schema_text({**known_checks(), **({} if rubric is None else own_checks(rubric))}))
     return ALL_MET
@@ -89,9 +89,9 @@ def _variant(*, rubric: Path, key: Path | None, old_key: Path | None, student: s
     key = key or old_key
     if key is None:
         raise click.UsageError("Missing option '--variant-key'.")
-    from grader.app.seeds import by_key
-    from grader.reporting.explained import render_sheet, sheet_to_json
-    from grader.rubrics.loader import read_rubric
+    from grader.grading.app.seeds import by_key
+    from grader.grading.reporting.explained import render_sheet, sheet_to_json
+    from grader.grading.rubrics.loader import read_rubric
 
     exercise = read_rubric(rubric, draw=by_key(key, student))
     print_for_programs(sheet_to_json(exercise) if format_ == "json" else render_sheet(exercise))
@@ -107,8 +107,8 @@ def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
 
     Without a FILE the rubrics that come with the grader are explained.
     """
-    from grader.app.explain import explain_checks, explain_rubrics
-    from grader.reporting.explained import explanations_to_json, list_checks, render_explanations
+    from grader.grading.app.explain import explain_checks, explain_rubrics
+    from grader.grading.reporting.explained import explanations_to_json, list_checks, render_explanations
 
     found = explain_checks(files) if checks else explain_rubrics(files)
     render = list_checks if checks else render_explanations
@@ -142,11 +142,11 @@ def _new(  # noqa: PLR0913  one parameter an option
     It is a skeleton: comments tell what was seen, and what its author has to decide. The reference meets all of it.
     With -o, rubric.schema.json is written beside it, with which editors complete and check it.
     """
-    from grader.app.inputs import read_sent, read_simulations
-    from grader.app.observe import ObserveRequest
-    from grader.authoring.starting import new_rubric
-    from grader.reporting.escape import shown
-    from grader.rubrics.schema import FILE, schema_text
+    from grader.course.authoring.starting import new_rubric
+    from grader.grading.app.inputs import read_sent, read_simulations
+    from grader.grading.app.observe import ObserveRequest
+    from grader.grading.reporting.escape import shown
+    from grader.grading.rubrics.schema import FILE, schema_text
 
     if output is not None and output.exists():
         raise GraderError(f"{output}: expected a new file, found an existing one", "name another, or remove it")
@@ -215,8 +215,8 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
     point, 1 not, 2 the command or one of its inputs cannot be used.
     """
     require("grade selftest", "libcst", "authors")
-    from grader.mutation.running import SelftestOptions, selftest
-    from grader.mutation.showing import render_results, results_to_json
+    from grader.course.mutation.running import SelftestOptions, selftest
+    from grader.course.mutation.showing import render_results, results_to_json
 
     # A shell pattern such as mine/*.yaml matches the notes as well.
     named = [path for path in rubrics if rubric_of(path) is None]
@@ -240,7 +240,7 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
 
 
 def _add_notes(result: SelftestResult, reference: Path | None, template: Path | None) -> None:
-    from grader.mutation.writing import noted
+    from grader.course.mutation.writing import noted
 
     path = notes_on(Path(result.rubric))
     before = path.read_text(encoding="utf-8-sig") if path.exists() else None

@@ -1,4 +1,4 @@
-"""The options of a run on the command line, made from the rows of `grader/core/grading_options.py`."""
+"""The options of a run on the command line, made from the rows of `grader/grading/model/grading_options.py`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import click
 
 from grader.cli.completion import complete_exercise
 from grader.cli.options import PATH, RUBRIC
-from grader.core.grading_options import OBSERVE, GradingOptions, Kind, Option, names, percent, rows
-from grader.core.scenario import ODOMETRY
+from grader.grading.model.grading_options import OBSERVE, GradingOptions, Kind, Option, names, percent, rows
+from grader.runtime.model.scenario import ODOMETRY
 
 _Command = Callable[..., int]
 _Function = TypeVar("_Function", bound=Callable[..., Any])

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from grader.cli.options import PATH, complain, print_result
-from grader.core.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET
-from grader.core.extras import require
+from grader.runtime.model.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET
+from grader.runtime.model.extras import require
 
 if TYPE_CHECKING:
-    from grader.classroom.uploading.marks import Platform
+    from grader.course.classroom.uploading.marks import Platform
 
 _Command = TypeVar("_Command", bound=Callable[..., object])
 
@@ -51,7 +51,7 @@ def _canvas(**given: Any) -> int:
     Exit codes: 0 every mark is there or would be sent, 1 somebody is left out, 2 something cannot be used or reached.
     """
     require("grade upload", "canvasapi", "upload")
-    from grader.classroom.uploading.canvas import TOKEN, Canvas
+    from grader.course.classroom.uploading.canvas import TOKEN, Canvas
 
     return _upload(Canvas, TOKEN, **given)
 
@@ -64,7 +64,7 @@ def _moodle(**given: Any) -> int:
     Exit codes: 0 every mark is there or would be sent, 1 somebody is left out, 2 something cannot be used or reached.
     """
     require("grade upload", "requests", "upload")
-    from grader.classroom.uploading.moodle import TOKEN, Moodle
+    from grader.course.classroom.uploading.moodle import TOKEN, Moodle
 
     return _upload(Moodle, TOKEN, **given)
 
@@ -82,11 +82,11 @@ def _upload(  # noqa: PLR0913  one parameter an option
     scores_only: bool,
     skip_unknown: bool,
 ) -> int:
-    from grader.classroom.store import open_store
-    from grader.classroom.uploading import marks
-    from grader.classroom.uploading.web import address_of, token_of
-    from grader.classroom.uploading.wording import render_comparison, render_sent
-    from grader.core.errors import ClassError
+    from grader.course.classroom.store import open_store
+    from grader.course.classroom.uploading import marks
+    from grader.course.classroom.uploading.web import address_of, token_of
+    from grader.course.classroom.uploading.wording import render_comparison, render_sent
+    from grader.runtime.model.errors import ClassError
 
     address, token = address_of(url), token_of(variable, token_file)
     known = marks.read_marks(results)

@@ -17,12 +17,12 @@ from grader.cli.options import (
     shown_progress,
 )
 from grader.cli.run_options import run_options
-from grader.core.conditions import CONDITIONS, TOGETHER
-from grader.core.errors import ALL_MET, NOT_ALL_MET, UNDECIDED
-from grader.core.grading_options import VERIFY, GradingOptions
+from grader.grading.model.conditions import CONDITIONS, TOGETHER
+from grader.grading.model.grading_options import VERIFY, GradingOptions
+from grader.runtime.model.errors import ALL_MET, NOT_ALL_MET, UNDECIDED
 
 if TYPE_CHECKING:
-    from grader.core.verification import Verification
+    from grader.grading.model.verification import Verification
 
 _EPILOG = (
     "Exit codes: 0 all recordings that can be compared are the same, 1 some differ, 2 the command or something it was "
@@ -76,11 +76,11 @@ def command(  # noqa: PLR0913  one parameter an option
         raise click.BadParameter("--evidence says what was recorded, and with which seed: leave out the other options")
     key = drawn_with(options.seed, seed_key)
     draw = drawn_by(options.student, options.variant_key)
-    from grader.app.request import request_for
-    from grader.app.seeds import PRACTICE
-    from grader.app.verify import VerifyRequest, verify
-    from grader.core.verification import State
-    from grader.reporting.verified import render_verification, verification_to_json
+    from grader.grading.app.request import request_for
+    from grader.grading.app.seeds import PRACTICE
+    from grader.grading.app.verify import VerifyRequest, verify
+    from grader.grading.model.verification import State
+    from grader.grading.reporting.verified import render_verification, verification_to_json
 
     how = request_for("", options, seed_key=key or PRACTICE, draw=draw)
     wanted = (TOGETHER,) if quick else conditions
@@ -98,7 +98,7 @@ def command(  # noqa: PLR0913  one parameter an option
 
 def _keep(found: Verification, evidence: Path, text: str) -> None:
     """Add the result to the evidence."""
-    from grader.execution.evidence.store import add_verification
+    from grader.grading.evidence.store import add_verification
 
     add_verification(evidence, text.encode())
     complain(f"{evidence} now says that the recordings are {found.state.value}", kind="kept")

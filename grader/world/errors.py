@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.core.trace import Fault
+from grader.runtime.model.trace import Fault
 
 
 class ProgramFailed(AssertionError):  # noqa: N818 - reads as what happened

@@ -1,4 +1,4 @@
-"""The program that runs the tests of a rubric on a submission; `grader.execution.test_runs` starts it.
+"""The program that runs the tests of a rubric on a submission; `grader.runtime.supervisor.test_runs` starts it.
 
 Usage: python -m grader.world.graded FD FILE. It says which tests pytest collects, is told which to run on what, and
 then says for each test when it begins and how it has ended. In between it passes on the commands of the test.
@@ -18,17 +18,17 @@ from typing import Any
 
 import pytest
 
-from grader.core.author_files import line_of, words_of
-from grader.core.errors import GraderError, HarnessError, SubmissionError
-from grader.core.scenario import is_launch_file
-from grader.core.trace import Message
-from grader.execution.codec import from_json, observation_to_json, to_json
-from grader.execution.interfaces import built, message_class
-from grader.execution.plan import Plan, PlannedStart, derive
-from grader.execution.steps import LaunchFailedError
-from grader.execution.supervisor import WorkerLostError
-from grader.execution.test_runs import TestJob
-from grader.judging.wording import listed, nearest
+from grader.grading.judging.wording import listed, nearest
+from grader.runtime.message_classes import built, message_class
+from grader.runtime.model.author_files import line_of, words_of
+from grader.runtime.model.errors import GraderError, HarnessError, SubmissionError
+from grader.runtime.model.scenario import is_launch_file
+from grader.runtime.model.trace import Message
+from grader.runtime.plan import Plan, PlannedStart, derive
+from grader.runtime.recording.codec import from_json, observation_to_json, to_json
+from grader.runtime.steps import LaunchFailedError
+from grader.runtime.supervisor.supervisor import WorkerLostError
+from grader.runtime.supervisor.test_runs import TestJob
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
 from grader.world.programs import Found, Runnable
 from grader.world.world import World

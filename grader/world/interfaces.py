@@ -13,12 +13,12 @@ from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
 
-from grader.app.interface_packages import is_installed, modules_named
-from grader.app.programs import package_of, workspace_of
-from grader.app.ros_packages import LENDABLE
-from grader.core.errors import GraderError
-from grader.execution.ros_installation import find_ros
-from grader.interfaces.definitions import InterfacePackage, find_packages, shipped_packages
+from grader.grading.app.interface_packages import is_installed, modules_named
+from grader.grading.app.programs import package_of, workspace_of
+from grader.grading.app.ros_packages import LENDABLE
+from grader.runtime.interfaces.definitions import InterfacePackage, find_packages, shipped_packages
+from grader.runtime.model.errors import GraderError
+from grader.runtime.ros_installation import find_ros
 
 #: The largest file that is searched for the names of packages.
 MOST_BYTES = 1 << 20

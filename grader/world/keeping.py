@@ -6,14 +6,14 @@ import json
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from grader.app.grade import environment_of
-from grader.core.trace import Delivery, Fault, LogRecord, Message, Observation, OutputLine, Trace
-from grader.execution.evidence.recording_file import recording_bytes
-from grader.execution.recording_session import RecordingSession
-from grader.execution.serialization import fields_of
-from grader.files import write_whole
-from grader.judging.figures import playback
-from grader.reporting.html.render import render_run
+from grader.grading.app.grade import environment_of
+from grader.grading.judging.figures import playback
+from grader.grading.reporting.html.render import render_run
+from grader.runtime.files import write_whole
+from grader.runtime.model.trace import Delivery, Fault, LogRecord, Message, Observation, OutputLine, Trace
+from grader.runtime.recording.recording_file import recording_bytes
+from grader.runtime.serialization import fields_of
+from grader.runtime.session import RecordingSession
 
 #: Who published on a topic, in the words of a test.
 SENDERS = {"grader": "test", "student": "program"}

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from grader.core.dataclass import dataclass
-from grader.core.errors import EnvironmentFault
-from grader.execution.recording_session import RecordingSession, open_session
-from grader.execution.sandbox.choose import OWN_PROGRAMS
-from grader.execution.test_runs import VARIABLE
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.sandbox.choose import OWN_PROGRAMS
+from grader.runtime.session import RecordingSession, open_session
+from grader.runtime.supervisor.test_runs import VARIABLE
 from grader.world.world import World
 
 

@@ -7,8 +7,10 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from grader.core.exercise import Finding
-from grader.core.trace import (
+from grader.grading.judging.findings import explain_no_message, explain_no_server, explain_no_subscription, not_met
+from grader.grading.judging.wording import listed, moment, nearest, quote, span
+from grader.grading.model.exercise import Finding
+from grader.runtime.model.trace import (
     Delivery,
     Endpoint,
     Fault,
@@ -24,8 +26,6 @@ from grader.core.trace import (
     Trace,
     unmet_policy,
 )
-from grader.judging.findings import explain_no_message, explain_no_server, explain_no_subscription, not_met
-from grader.judging.wording import listed, moment, nearest, quote, span
 from grader.world.errors import NoMessage, StepTimeout
 from grader.world.programs import Program
 

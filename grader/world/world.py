@@ -12,12 +12,13 @@ from pathlib import Path
 from random import Random
 from typing import Any, ParamSpec, TypeVar
 
-from grader.app.programs import package_of
-from grader.core.dataclass import dataclass
-from grader.core.errors import GraderError
-from grader.core.limits import Limits
-from grader.core.quantities import GIB, MIB, NS_PER_S, seconds
-from grader.core.trace import (
+from grader.grading.app.programs import package_of
+from grader.runtime.message_classes import built, plain_fields
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.errors import GraderError
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import GIB, MIB, NS_PER_S, seconds
+from grader.runtime.model.trace import (
     ClockKind,
     Endpoint,
     Fault,
@@ -31,10 +32,9 @@ from grader.core.trace import (
     Response,
     Trace,
 )
-from grader.execution.interfaces import built, plain_fields
-from grader.execution.plan import Plan, PlannedConnection, PlannedStart, derive, ros_arguments
-from grader.execution.recording_session import RecordingSession
-from grader.execution.serialization import (
+from grader.runtime.plan import Plan, PlannedConnection, PlannedStart, derive, ros_arguments
+from grader.runtime.programs.shares import install_shares
+from grader.runtime.serialization import (
     QoSProfile,
     parameter_message,
     qos_words,
@@ -44,12 +44,12 @@ from grader.execution.serialization import (
     type_name,
     type_of_part,
 )
-from grader.execution.shares import install_shares
-from grader.execution.stepping import SteppedRun
-from grader.execution.steps import Advance, Call, Command, Interrupt, Kill, Publish, SendGoal, Serve, Simulate, Start
-from grader.simulation.loading import made
-from grader.simulation.participant import Moment, Simulation
-from grader.stimuli.goals import PlannedGoal
+from grader.runtime.session import RecordingSession
+from grader.runtime.simulation.loading import made
+from grader.runtime.simulation.participant import Moment, Simulation
+from grader.runtime.steps import Advance, Call, Command, Interrupt, Kill, Publish, SendGoal, Serve, Simulate, Start
+from grader.runtime.stimuli.goals import PlannedGoal
+from grader.runtime.supervisor.stepping import SteppedRun
 from grader.world import telling
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
 from grader.world.interfaces import let_import, modules_for

@@ -14,10 +14,10 @@ from click.testing import CliRunner
 from packaging.requirements import Requirement
 from stand_in_runner import ROOT
 
-from grader import packaging
 from grader.cli.main import app
-from grader.core.errors import EnvironmentFault, KeyFileError, RubricError
-from grader.packaging import CLASSROOM50_BYTES, Chosen, classroom50, gradescope, pins, wheel
+from grader.course import packaging
+from grader.course.packaging import CLASSROOM50_BYTES, Chosen, classroom50, gradescope, pins, wheel
+from grader.runtime.model.errors import EnvironmentFault, KeyFileError, RubricError
 
 pytestmark = pytest.mark.slow
 
@@ -85,7 +85,7 @@ def test_the_wheel_holds_what_an_installation_needs_and_no_solution() -> None:
         "grader/shipped/rubrics/exercise_1/rubric.yaml",
         "grader/shipped/rubrics/exercise_2/odometry/odometry.mcap",
     }
-    assert needed | {"grader/shipped/integrations/prepare", "grader/reporting/report.schema.json"} <= names
+    assert needed | {"grader/shipped/integrations/prepare", "grader/grading/reporting/report.schema.json"} <= names
     assert not [n for n in names if "__pycache__" in n or "reference" in n or "template/" in n]
     record = next(n for n in names if n.endswith("RECORD"))
     rows = list(csv.reader(archive.read(record).decode().splitlines()))

@@ -10,8 +10,8 @@ from ruamel.yaml import YAML
 from stand_in_runner import ROOT
 
 import grader
-from grader.core.errors import GraderError
-from grader.packaging import workflow
+from grader.course.packaging import workflow
+from grader.runtime.model.errors import GraderError
 
 BIN = Path(sys.executable).parent
 OWN = ROOT / ".github"

@@ -15,7 +15,7 @@ from attack_rubric import controller_rubric, publisher_rubric
 from attack_verdicts import criteria_of, objections
 from ruamel.yaml import YAML
 
-from grader.reporting.formats import FORMATS
+from grader.grading.reporting.formats import FORMATS
 
 HERE = Path(__file__).resolve().parent
 REFERENCE = ROOT / "reference_solutions" / "velocity_publisher.py"

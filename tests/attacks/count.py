@@ -20,9 +20,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from arena import UNPRIVILEGED
 from attack_runs import Attack, read_attacks, run_unit, units
 
-from grader.core.checkup import NO_SANDBOX, TIERS
-from grader.execution.ros_installation import find_ros
-from grader.execution.sandbox.choose import inspect_tiers
+from grader.runtime.model.checkup import NO_SANDBOX, TIERS
+from grader.runtime.ros_installation import find_ros
+from grader.runtime.sandbox.choose import inspect_tiers
 
 
 def main() -> int:

@@ -16,9 +16,9 @@ from arena import UNPRIVILEGED, Arena, Ran
 from attack_runs import HERE, read_attacks, run_unit, units
 from attack_verdicts import EARNS, objections
 
-from grader.core.errors import EnvironmentFault
-from grader.execution.ros_installation import find_ros
-from grader.execution.sandbox.choose import inspect_tiers
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.ros_installation import find_ros
+from grader.runtime.sandbox.choose import inspect_tiers
 
 TIERS = ("bubblewrap-root", "bubblewrap")
 #: The tier that grading would take here; the other one is left to the nightly run.

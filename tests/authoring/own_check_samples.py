@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.core.exercise import Finding
-from grader.core.quantities import DurationNs
-from grader.core.trace import Trace
+from grader.grading.model.exercise import Finding
+from grader.runtime.model.quantities import DurationNs
+from grader.runtime.model.trace import Trace
 from grader.testing import met, not_met
 
 

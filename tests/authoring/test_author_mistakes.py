@@ -13,20 +13,21 @@ import numpy as np
 import pytest
 from own_check_samples import CHECKS_FILE, PUMP, RUBRIC, write_rubric
 
-from grader.classroom.gradebook import Gradebook, Row, Status
-from grader.core.author_files import AuthorMistake
-from grader.core.errors import UNUSABLE, exit_code
-from grader.core.exercise import Finding, Location, Outcome
-from grader.core.report import Environment, ExerciseReport, Report
-from grader.core.submission import Run, StudentFile, Submission
-from grader.core.trace import ClockKind, Trace
-from grader.execution.codec import trace_to_json
-from grader.execution.evidence.packed import trace_from_json
-from grader.judging.judge_run import judge_run
-from grader.reporting import wording
-from grader.reporting.formats import FORMATS, PageLayout
-from grader.reporting.json_report import report_to_json
-from grader.rubrics.loader import read_rubric
+from grader.course.classroom.gradebook import Gradebook, Row, Status
+from grader.grading.judging.judge_run import judge_run
+from grader.grading.model.exercise import Finding, Location, Outcome
+from grader.grading.model.report import Environment, ExerciseReport, Report, exit_code
+from grader.grading.model.run import Run
+from grader.grading.reporting import wording
+from grader.grading.reporting.formats import FORMATS, PageLayout
+from grader.grading.reporting.json_report import report_to_json
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.author_files import AuthorMistake
+from grader.runtime.model.errors import UNUSABLE
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.recording.codec import trace_to_json
+from grader.runtime.recording.packed import trace_from_json
 from grader.testing import TraceBuilder, partly
 
 RAISED = 'raise LookupError("nobody thought of silence")'
@@ -49,8 +50,10 @@ def report(folder: Path, checks: str, trace: Trace | None = None, rubric: str = 
 
 def returning(text: str) -> str:
     """Return the file of checks with another statement for a silent pump."""
-    given = "from grader.core.exercise import Location, Problem\n\n"
-    return CHECKS_FILE.replace(RAISED, text).replace("from grader.core.trace", f"{given}from grader.core.trace")
+    given = "from grader.grading.model.exercise import Location, Problem\n\n"
+    return CHECKS_FILE.replace(RAISED, text).replace(
+        "from grader.runtime.model.trace", f"{given}from grader.runtime.model.trace"
+    )
 
 
 def assert_rendered(report: Report) -> None:
@@ -169,7 +172,8 @@ def test_a_simulation_that_fails_is_the_authors_mistake_too(tmp_path: Path) -> N
             "pump_checks.py:37: ZeroDivisionError",
         ),
         (
-            "    def drawing(self, trace):\n        from grader.core import chart\n        return chart.Chart(5)\n",
+            "    def drawing(self, trace):\n        from grader.grading.model import chart\n"
+            "        return chart.Chart(5)\n",
             "pump_checks.py:38: TypeError: Chart.__init__() ",
         ),
     ],
@@ -196,7 +200,7 @@ def test_a_class_tells_it_once(tmp_path: Path) -> None:
 WORLD = """\
 from dataclasses import dataclass
 
-from grader.simulation import Simulation
+from grader.runtime.simulation import Simulation
 
 
 @dataclass

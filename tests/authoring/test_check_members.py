@@ -9,13 +9,13 @@ from typing import Any, ClassVar
 import pytest
 
 from grader.api import NODE_GRAPH, Check, Drawing, Finding, Plot, Roles, Trace, TraceBuilder, met, not_met
-from grader.authoring.checking import check_rubric
-from grader.core.exercise import has, named, of_beginning, reads_sources, roles_of
-from grader.core.submission import StudentFile, Submission
-from grader.judging.judge_run import judge_exercise
-from grader.judging.plots import chart_of, shows_graph
-from grader.rubrics.exercise_checks import known_checks
-from grader.rubrics.loader import read_rubric
+from grader.course.authoring.checking import check_rubric
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.judging.plots import chart_of, shows_graph
+from grader.grading.model.exercise import has, named, of_beginning, reads_sources, roles_of
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.submission import StudentFile, Submission
 
 FLOAT = "std_msgs/msg/Float32"
 FLOW = TraceBuilder("pump.py", stop_s=2.0).messages("/flow", FLOAT, {"data": 1.5}, rate_hz=10).trace()

@@ -8,16 +8,16 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from grader.app.inputs import messages, read_sent, read_simulations, simulated
 from grader.cli import main
-from grader.core.errors import GraderError
-from grader.stimuli.messages import MessageStream
-from grader.stimuli.simulation import Simulated
+from grader.grading.app.inputs import messages, read_sent, read_simulations, simulated
+from grader.runtime.model.errors import GraderError
+from grader.runtime.stimuli.messages import MessageStream
+from grader.runtime.stimuli.simulation import Simulated
 
 WORLD = """\
 from dataclasses import dataclass
 
-from grader.simulation import DifferentialDrive
+from grader.runtime.simulation import DifferentialDrive
 
 
 @dataclass

@@ -17,23 +17,23 @@ from click.testing import CliRunner, Result
 from own_check_samples import CHECKS_FILE, PUMP, RUBRIC, write_rubric
 from ruamel.yaml import YAML
 
-from grader.app.grade import read_exercises
-from grader.app.request import GradeRequest
-from grader.classroom.messages import GradingJob, Terms
-from grader.classroom.receiving import write_task
-from grader.classroom.sending import checks_of
-from grader.classroom.store import Conditions
 from grader.cli import main
-from grader.core.author_files import run
-from grader.core.errors import RubricError
-from grader.core.exercise import Location, Outcome
-from grader.core.grading_options import GradingOptions
-from grader.core.report import Verdict
-from grader.core.submission import StudentFile, Submission
-from grader.core.trace import Trace
-from grader.judging.judge_run import judge_exercise
-from grader.packaging import Chosen, classroom50
-from grader.rubrics.loader import RubricMistakes, read_rubric, side_files
+from grader.course.classroom.messages import GradingJob, Terms
+from grader.course.classroom.receiving import write_task
+from grader.course.classroom.sending import checks_of
+from grader.course.classroom.store import Conditions
+from grader.course.packaging import Chosen, classroom50
+from grader.grading.app.grade import read_exercises
+from grader.grading.app.request import GradeRequest
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.model.exercise import Location, Outcome
+from grader.grading.model.grading_options import GradingOptions
+from grader.grading.model.report import Verdict
+from grader.grading.rubrics.loader import RubricMistakes, read_rubric, side_files
+from grader.runtime.model.author_files import run
+from grader.runtime.model.errors import RubricError
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import Trace
 from grader.testing import TraceBuilder, judge
 
 FLOAT = "std_msgs/msg/Float32"

@@ -9,17 +9,17 @@ from typing import Any
 import pytest
 from own_check_samples import CHECKS_FILE, RUBRIC, write_rubric
 
-from grader.classroom.sending import checks_of
-from grader.core.errors import RubricError
-from grader.core.exercise import Location, Outcome
-from grader.core.report import ExerciseReport
-from grader.core.submission import StudentFile, Submission
-from grader.core.trace import Trace
-from grader.judging.checks import CHECKS
-from grader.judging.diagnosis import RULES, rules_of
-from grader.judging.diagnosis.rules import FIRST, Clue, Rule
-from grader.judging.judge_run import judge_exercise
-from grader.rubrics.loader import read_rubric, side_files
+from grader.course.classroom.sending import checks_of
+from grader.grading.judging.checks import CHECKS
+from grader.grading.judging.diagnosis import RULES, rules_of
+from grader.grading.judging.diagnosis.rules import FIRST, Clue, Rule
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.model.exercise import Location, Outcome
+from grader.grading.model.report import ExerciseReport
+from grader.grading.rubrics.loader import read_rubric, side_files
+from grader.runtime.model.errors import RubricError
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import Trace
 from grader.testing import TraceBuilder, explain
 
 FLOAT = "std_msgs/msg/Float32"
@@ -103,7 +103,8 @@ def test_a_rule_travels_with_its_rubric(tmp_path: Path) -> None:
 def test_one_file_may_hold_checks_and_rules(tmp_path: Path) -> None:
     """Then a rule can name the class of a check, and its facts."""
     both = CHECKS_FILE.replace(
-        "from grader.core.exercise", "from grader.api import Clue, hint_rule\nfrom grader.core.exercise"
+        "from grader.grading.model.exercise",
+        "from grader.api import Clue, hint_rule\nfrom grader.grading.model.exercise",
     )
     both += "\n\n@hint_rule(StartsEarly)\ndef slow(case):\n    return Clue(str(case.check.within))\n"
     (found,) = report(write_rubric(tmp_path, WITH_HINTS.replace("pump_hints.py", "pump_checks.py"), both)).verdicts

@@ -9,9 +9,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from grader.cli import main
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.exercise_checks import known_checks
-from grader.rubrics.schema import schema_text
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.grading.rubrics.schema import schema_text
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 GOOD = """\

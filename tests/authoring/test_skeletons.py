@@ -14,13 +14,13 @@ import pytest
 from click.testing import CliRunner
 from ruamel.yaml import YAML
 
-from grader.authoring.checking import check_rubric
-from grader.authoring.questions import Seen, questions
-from grader.authoring.skeleton import Draft, DraftCriterion, DraftQuantity, DraftStimulus, as_id, rubric_text
-from grader.authoring.starting import stimuli_for
 from grader.cli import main
-from grader.core.trace import Offer
-from grader.rubrics.loader import read_rubric
+from grader.course.authoring.checking import check_rubric
+from grader.course.authoring.questions import Seen, questions
+from grader.course.authoring.skeleton import Draft, DraftCriterion, DraftQuantity, DraftStimulus, as_id, rubric_text
+from grader.course.authoring.starting import stimuli_for
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.trace import Offer
 from grader.testing import TraceBuilder
 
 ROOT = Path(__file__).resolve().parent.parent.parent

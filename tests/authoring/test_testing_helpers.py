@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from grader.core.exercise import Finding, Location, Problem, ProblemKind
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import FaultKind, Trace
-from grader.execution.ending import exited
-from grader.judging.checks.logs import UsesLogger
-from grader.judging.checks.rate import TopicRate
-from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
+from grader.grading.judging.checks.logs import UsesLogger
+from grader.grading.judging.checks.rate import TopicRate
+from grader.grading.judging.checks.topics import FieldValues, Publishes, Subscribes
+from grader.grading.model.exercise import Finding, Location, Problem, ProblemKind
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import FaultKind, Trace
+from grader.runtime.worker.ending import exited
 from grader.testing import TraceBuilder, judge, met
 
 FLOAT = "std_msgs/msg/Float32"

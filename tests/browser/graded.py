@@ -6,14 +6,14 @@ from pathlib import Path
 from report_samples import report
 from tracing import FLOAT32, Recording, held_at, position_logs, scripted, velocity
 
-from grader.core.exercise import Exercise
-from grader.core.report import ExerciseReport, Report
-from grader.core.submission import StudentFile, Submission
-from grader.core.trace import FaultKind, Trace
-from grader.judging.figures import illustrated
-from grader.judging.judge_run import judge_exercise
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.loader import read_rubric
+from grader.grading.judging.figures import illustrated
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.model.exercise import Exercise
+from grader.grading.model.report import ExerciseReport, Report
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import FaultKind, Trace
 
 CHAPTER = ("velocity_publisher", "odom_subscriber", "two_node_communication")
 SENSOR, CONTROLLER = "/temperature_sensor", "/fan_controller"

@@ -12,13 +12,13 @@ from typing import Any
 import class_reports
 from class_samples import course
 
-from grader.classroom.class_run import grade_class
-from grader.classroom.local import Attempt, OnStep, Task
-from grader.classroom.store import ResultStatus, State
-from grader.classroom.watching import Watcher
-from grader.reporting.html.render import render_html
-from grader.reporting.json_report import dumps
-from grader.submissions.submission import stage_submission
+from grader.course.classroom.class_run import grade_class
+from grader.course.classroom.local import Attempt, OnStep, Task
+from grader.course.classroom.store import ResultStatus, State
+from grader.course.classroom.watching import Watcher
+from grader.grading.reporting.html.render import render_html
+from grader.grading.reporting.json_report import dumps
+from grader.grading.submissions.submission import stage_submission
 
 FIRST = ("Ada", "Bogdan", "Chiara", "Dmitri", "Élodie", "Fatima", "Giang", "Hyun", "Ines", "Jakob", "Kwame", "Łukasz",
          "Mariam", "Noor", "Øyvind", "Priya", "Quentin", "Rania", "Søren", "Tomás")  # fmt: skip

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import pytest
 from report_samples import criterion, exercise, report
 
-from grader.core.chart import Chart, Level, Moment, Panel, Series, Tone
-from grader.core.exercise import Outcome
-from grader.reporting.html.render import render_html
+from grader.grading.model.chart import Chart, Level, Moment, Panel, Series, Tone
+from grader.grading.model.exercise import Outcome
+from grader.grading.reporting.html.render import render_html
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

@@ -13,9 +13,9 @@ from urllib.parse import quote
 import graded
 import pytest
 
-from grader.core.chart import Playback
-from grader.reporting.html.assets import bundle
-from grader.reporting.html.render import render_html
+from grader.grading.model.chart import Playback
+from grader.grading.reporting.html.assets import bundle
+from grader.grading.reporting.html.render import render_html
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Locator, Page

@@ -9,14 +9,14 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from grader.app.request import GradeRequest
-from grader.classroom.grading import ClassRequest
-from grader.classroom.local import Attempt, Task
-from grader.classroom.outputs import Graded
-from grader.classroom.store import ResultStatus, State, unusable_digest
-from grader.classroom.watching import Watcher
-from grader.core.errors import SubmissionError
-from grader.submissions.submission import stage_submission
+from grader.course.classroom.grading import ClassRequest
+from grader.course.classroom.local import Attempt, Task
+from grader.course.classroom.outputs import Graded
+from grader.course.classroom.store import ResultStatus, State, unusable_digest
+from grader.course.classroom.watching import Watcher
+from grader.grading.app.request import GradeRequest
+from grader.grading.submissions.submission import stage_submission
+from grader.runtime.model.errors import SubmissionError
 
 GRADING = GradeRequest("", exercises=("velocity_publisher",))
 
@@ -98,7 +98,7 @@ def course(source: Path, results: Path, **changes: Any) -> ClassRequest:
 
 def grade(wanted: ClassRequest, scheduler: FakeScheduler | None = None, watcher: Watcher | None = None) -> Graded:
     """Grade a class with the fake scheduler, or another one."""
-    from grader.classroom.class_run import grade_class
+    from grader.course.classroom.class_run import grade_class
 
     return grade_class(wanted, watcher or Watcher(lambda line: None), lambda line: None, scheduler or FakeScheduler())
 

@@ -7,9 +7,9 @@ import random
 from collections.abc import Mapping
 from typing import Any
 
-from grader.similarity.finding import programs_of
-from grader.similarity.library import Handed
-from grader.submissions.collected import Collected
+from grader.course.similarity.finding import programs_of
+from grader.course.similarity.library import Handed
+from grader.grading.submissions.collected import Collected
 
 FILE = "odom_subscriber.py"
 

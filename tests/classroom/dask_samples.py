@@ -11,11 +11,11 @@ from types import SimpleNamespace
 from typing import Any
 
 from grader import __version__
-from grader.classroom import store as kept
-from grader.classroom.local import Task
-from grader.classroom.messages import Fitness, GradingJob, JobResult, pack, unpack
-from grader.classroom.store import Conditions, ResultStatus, State
-from grader.core.grading_options import GradingOptions
+from grader.course.classroom import store as kept
+from grader.course.classroom.local import Task
+from grader.course.classroom.messages import Fitness, GradingJob, JobResult, pack, unpack
+from grader.course.classroom.store import Conditions, ResultStatus, State
+from grader.grading.model.grading_options import GradingOptions
 
 CONDITIONS = Conditions(
     "0", (("velocity_publisher", "sha256:1"),), "", GradingOptions(exercises=("velocity_publisher",))

@@ -16,13 +16,13 @@ from dask_samples import task
 from sample_folders import folder_of
 
 from grader.api import grade_packed, pack_task, store_answer
-from grader.app.doctor import _added
-from grader.classroom.local import Attempt
-from grader.classroom.messages import Parcel, pack
-from grader.classroom.store import State
 from grader.cli.main import app
-from grader.core.entry_points import SCHEDULERS as GROUP
-from grader.core.entry_points import load
+from grader.course.classroom.local import Attempt
+from grader.course.classroom.messages import Parcel, pack
+from grader.course.classroom.store import State
+from grader.grading.app.doctor import _added
+from grader.grading.model.entry_points import SCHEDULERS as GROUP
+from grader.grading.model.entry_points import load
 
 #: A scheduler that does as the fake one of this folder's tests, but for a method.
 MODULE = """
@@ -96,7 +96,7 @@ def run(scheduler: str, code: int = 0, *options: str) -> Result:
 def test_dask_is_registered_like_any_other() -> None:
     """The metadata of the installed grader name it; nothing else of the grader knows where it is."""
     found = [entry for entry in metadata.entry_points(group=GROUP) if entry.dist and entry.dist.name == "rclpy-grader"]
-    assert [(entry.name, entry.value) for entry in found] == [("dask", "grader.classroom.cluster:connect")]
+    assert [(entry.name, entry.value) for entry in found] == [("dask", "grader.course.classroom.cluster:connect")]
     assert load(GROUP, "dask", object, "a function") is not None
 
 
@@ -165,7 +165,7 @@ def test_addresses_and_files_stay_those_of_dask(package: Path, monkeypatch: pyte
     if ":" not in text:
         Path(text).write_text("{}")
     opened = []
-    monkeypatch.setattr("grader.classroom.cluster.connect", lambda place, jobs, warn: opened.append(place))
+    monkeypatch.setattr("grader.course.classroom.cluster.connect", lambda place, jobs, warn: opened.append(place))
     run(text, 2)
     assert opened == [text]
 

@@ -16,12 +16,12 @@ from class_samples import FakeScheduler, course, grade, hand_in, report, scores
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.app.request import GradeRequest
-from grader.classroom.adjustments import Adjustments, Amount, Decision, adjust, read_adjustments
-from grader.classroom.gradebook import decision_line
-from grader.classroom.outputs import platforms, render_summary
-from grader.classroom.platforms import feedback
-from grader.core.errors import ClassError
+from grader.course.classroom.adjustments import Adjustments, Amount, Decision, adjust, read_adjustments
+from grader.course.classroom.gradebook import decision_line
+from grader.course.classroom.outputs import platforms, render_summary
+from grader.course.classroom.platforms import feedback
+from grader.grading.app.request import GradeRequest
+from grader.runtime.model.errors import ClassError
 
 RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"
 RULES = """late:

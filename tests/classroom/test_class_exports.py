@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 from class_samples import course, grade, hand_in
 
-from grader.classroom.outputs import Graded, platforms
-from grader.core.errors import ClassError
+from grader.course.classroom.outputs import Graded, platforms
+from grader.runtime.model.errors import ClassError
 
 ROSTER = """Student,ID,SIS User ID,SIS Login ID,Section,Email address
 "Lovelace, Ada",1001,S1,ada,A,ada@x.edu

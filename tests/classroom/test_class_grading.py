@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from class_samples import GRADING, FakeScheduler, course, grade, hand_in, scores
 
-from grader.app.seeds import SeedKey
-from grader.classroom.gradebook import Status
-from grader.classroom.outputs import Graded
-from grader.classroom.store import SEED_KEY, State, Store, open_store
-from grader.core.errors import ClassError, HarnessError
+from grader.course.classroom.gradebook import Status
+from grader.course.classroom.outputs import Graded
+from grader.course.classroom.store import SEED_KEY, State, Store, open_store
+from grader.grading.app.seeds import SeedKey
+from grader.runtime.model.errors import ClassError, HarnessError
 
 
 def regraded(tmp_path: Path, **changes: Any) -> tuple[list[str], Graded]:

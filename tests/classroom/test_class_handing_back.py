@@ -10,10 +10,10 @@ import pytest
 from click.testing import CliRunner, Result
 from test_class_regrading import grade, rubric
 
-from grader.classroom.final_marks import load_mark
-from grader.classroom.outputs import platforms, render_summary
-from grader.classroom.uploading.marks import read_marks
 from grader.cli.main import app
+from grader.course.classroom.final_marks import load_mark
+from grader.course.classroom.outputs import platforms, render_summary
+from grader.course.classroom.uploading.marks import read_marks
 
 ADJUST = """late: {per_day: 10 %}
 students:

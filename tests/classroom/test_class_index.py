@@ -12,8 +12,8 @@ import pytest
 from class_reports import drawn_report
 from class_samples import FakeScheduler, course, grade, hand_in
 
-from grader.classroom.class_page import without_folders
-from grader.reporting.html.render import render_html
+from grader.course.classroom.class_page import without_folders
+from grader.grading.reporting.html.render import render_html
 
 RUN = re.compile(r'<div id="run">.*?</div>\n<nav', re.DOTALL)
 

@@ -15,9 +15,9 @@ from typing import Any
 
 import pytest
 
-from grader.classroom.downloads import AUTO
-from grader.classroom.intake import HandedInEntry, Intake, take_in
-from grader.core.errors import ClassError
+from grader.course.classroom.downloads import AUTO
+from grader.course.classroom.intake import HandedInEntry, Intake, take_in
+from grader.runtime.model.errors import ClassError
 
 PY = b"print('hello')\n"
 
@@ -283,7 +283,7 @@ def test_what_is_bad_in_a_folder_around_everything_spoils_nobody_else(tmp_path: 
 
 def test_a_bad_file_of_a_student_refuses_all_of_that_student(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A part of the work would get a part of the marks."""
-    monkeypatch.setattr("grader.classroom.downloads.MAX_ARCHIVE_BYTES", 1000)
+    monkeypatch.setattr("grader.course.classroom.downloads.MAX_ARCHIVE_BYTES", 1000)
     files = {"lovelaceada_1_2_a.py": PY, "lovelaceada_1_3_b.bin": b"x" * 5000, "rossbob_2_4_a.py": PY}
     ada, bob = found(tmp_path, zipped(tmp_path / "hw.zip", files)).entries
     assert ("MiB a file" in ada.problem, bob.problem) == (True, "")
@@ -311,7 +311,7 @@ def test_a_member_of_nobody_is_named(tmp_path: Path, bad: str) -> None:
 
 def test_one_student_cannot_fill_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is too large is refused by itself, counted while it is unpacked."""
-    monkeypatch.setattr("grader.classroom.downloads.MAX_ARCHIVE_BYTES", 1000)
+    monkeypatch.setattr("grader.course.classroom.downloads.MAX_ARCHIVE_BYTES", 1000)
     archive = zipped(tmp_path / "hw.zip", {"ada/a.bin": b"\0" * 5000, "bob/b.py": PY})
     ada, bob = found(tmp_path, archive).entries
     assert "MiB a file" in ada.problem

@@ -13,12 +13,12 @@ import pytest
 from class_samples import FakeScheduler, hand_in
 from click.testing import CliRunner, Result
 
-from grader.classroom.last_run import LastRun, dump_last_run, read_last_run
 from grader.cli import batch
 from grader.cli.main import app
 from grader.cli.remembered import KEPT
-from grader.core.errors import ClassError
-from grader.rubrics.builtin import builtin_recording
+from grader.course.classroom.last_run import LastRun, dump_last_run, read_last_run
+from grader.grading.rubrics.builtin import builtin_recording
+from grader.runtime.model.errors import ClassError
 
 #: Parameters that concern one run only: what it is given, where it runs, how much it says.
 OF_ONE_RUN = {
@@ -36,7 +36,7 @@ def scheduler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeScheduler:
     (tmp_path / "roster.csv").write_text("username,name\nada,Ada\nbob,Bob\neve,Eve\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     found = FakeScheduler()
-    monkeypatch.setattr("grader.classroom.local.LocalScheduler", found)
+    monkeypatch.setattr("grader.course.classroom.local.LocalScheduler", found)
     return found
 
 

@@ -14,9 +14,9 @@ from typing import Any
 
 import pytest
 
-from grader.classroom.local import WAITING_PER_JOB, LocalScheduler, Task
-from grader.classroom.store import Conditions, ResultStatus, State, dump
-from grader.core.grading_options import GradingOptions
+from grader.course.classroom.local import WAITING_PER_JOB, LocalScheduler, Task
+from grader.course.classroom.store import Conditions, ResultStatus, State, dump
+from grader.grading.model.grading_options import GradingOptions
 
 CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", GradingOptions())
 DONE = json.loads(dump(ResultStatus(State.GRADED, "k", "d", "l", score=1.0, max_score=2.0)))
@@ -241,8 +241,8 @@ def test_submissions_that_could_reach_each_other_go_one_at_a_time(
     """Where the sandbox leaves them one network; without a sandbox it is the user's wish."""
     isolation = SimpleNamespace(name=tier, shares_network=shares)
     choice = SimpleNamespace(isolation=isolation, containment=())
-    monkeypatch.setattr("grader.classroom.local.find_ros", lambda: None)
-    monkeypatch.setattr("grader.classroom.local.choose_isolation", lambda wanted, ros: choice)
+    monkeypatch.setattr("grader.course.classroom.local.find_ros", lambda: None)
+    monkeypatch.setattr("grader.course.classroom.local.choose_isolation", lambda wanted, ros: choice)
     here = scheduler(jobs=3)
     warnings = here.prepare(tier)
     together = []

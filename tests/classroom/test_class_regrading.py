@@ -17,22 +17,22 @@ import pytest
 from class_samples import course
 from kept_runs import RUBRICS, velocity_run, velocity_trace
 
-from grader.app.grade import read_exercises
-from grader.app.kept_recordings import PlannedRun, recorded_alike
-from grader.app.request import GradeRequest, reproduction
-from grader.classroom import regrading, worker
-from grader.classroom.class_run import grade_class
-from grader.classroom.local import Attempt, Task
-from grader.classroom.outputs import Graded, render_summary
-from grader.classroom.store import BEFORE, State
-from grader.classroom.watching import Watcher
-from grader.core.exercise import Exercise
-from grader.core.report import Report
-from grader.core.submission import Run
-from grader.execution.evidence.store import open_evidence
-from grader.judging.judge_run import judge_run
-from grader.rubrics.loader import read_rubric
-from grader.submissions.submission import stage_submission
+from grader.course.classroom import regrading, worker
+from grader.course.classroom.class_run import grade_class
+from grader.course.classroom.local import Attempt, Task
+from grader.course.classroom.outputs import Graded, render_summary
+from grader.course.classroom.store import BEFORE, State
+from grader.course.classroom.watching import Watcher
+from grader.grading.app.grade import read_exercises
+from grader.grading.app.kept_recordings import PlannedRun, recorded_alike
+from grader.grading.app.request import GradeRequest, reproduction
+from grader.grading.evidence.store import open_evidence
+from grader.grading.judging.judge_run import judge_run
+from grader.grading.model.exercise import Exercise
+from grader.grading.model.report import Report
+from grader.grading.model.run import Run
+from grader.grading.rubrics.loader import read_rubric
+from grader.grading.submissions.submission import stage_submission
 
 #: Name of a submission -> rate of its publisher.
 RATES = {"ada": 20, "bob": 10, "cleo": 20}

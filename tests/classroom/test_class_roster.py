@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.classroom.intake import HandedInEntry, safe_name
-from grader.classroom.roster import Person, RosterMatch, late_by, late_days, match, read_roster, read_table
-from grader.core.errors import ClassError
+from grader.course.classroom.intake import HandedInEntry, safe_name
+from grader.course.classroom.roster import Person, RosterMatch, late_by, late_days, match, read_roster, read_table
+from grader.runtime.model.errors import ClassError
 
 CANVAS = """Student,ID,SIS User ID,SIS Login ID,Section,Homework (12345)
     Points Possible,,,,,100

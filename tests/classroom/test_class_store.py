@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from grader.classroom.store import ResultStatus, State, Store, dump, load, open_store
-from grader.core.errors import HarnessError
+from grader.course.classroom.store import ResultStatus, State, Store, dump, load, open_store
+from grader.runtime.model.errors import HarnessError
 
 
 def status(state: State = State.GRADED, score: float = 1.0, key: str = "k") -> ResultStatus:

@@ -10,19 +10,19 @@ from typing import Any
 import pytest
 from class_samples import GRADING, FakeScheduler, course, grade, hand_in
 
-from grader.app.request import GradeRequest
-from grader.app.seeds import by_key
-from grader.classroom import worker
-from grader.classroom.local import Task
-from grader.classroom.outputs import Graded
-from grader.classroom.store import Conditions, State
-from grader.core.errors import ClassError, HarnessError, VariantError
-from grader.core.exercise import Drawn
-from grader.core.grading_options import GradingOptions
-from grader.core.report import Report
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.draws import Recorded
-from grader.rubrics.loader import read_rubric
+from grader.course.classroom import worker
+from grader.course.classroom.local import Task
+from grader.course.classroom.outputs import Graded
+from grader.course.classroom.store import Conditions, State
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.seeds import by_key
+from grader.grading.model.exercise import Drawn
+from grader.grading.model.grading_options import GradingOptions
+from grader.grading.model.report import Report
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.draws import Recorded
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.errors import ClassError, HarnessError, VariantError
 
 ROSTER = (
     "name,username,email,id number\nAda,ada,ada@x.edu,17\nBob,bob,bob@x.edu,\nEve,eve,eve@x.edu,18\nEve 2,eve,,19\n"

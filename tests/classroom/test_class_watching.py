@@ -9,8 +9,8 @@ import pytest
 from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TextColumn
 
-from grader.classroom.store import ResultStatus, State
-from grader.classroom.watching import LiveWatcher, Watcher, clock_time, outcome_words
+from grader.course.classroom.store import ResultStatus, State
+from grader.course.classroom.watching import LiveWatcher, Watcher, clock_time, outcome_words
 
 
 class Clock:

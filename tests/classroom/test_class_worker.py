@@ -10,15 +10,15 @@ from typing import Any
 
 import pytest
 
-from grader.app.request import GradeRequest
-from grader.classroom import worker
-from grader.classroom.local import Task
-from grader.classroom.store import REPORT, Conditions, ResultStatus, State
-from grader.core.errors import EnvironmentFault, HarnessError, SubmissionError
-from grader.core.exercise import Feedback, Outcome, Shows
-from grader.core.grading_options import GradingOptions
-from grader.core.report import Environment, ExerciseReport, Report, Reproduction, Verdict
-from grader.core.trace import ClockKind
+from grader.course.classroom import worker
+from grader.course.classroom.local import Task
+from grader.course.classroom.store import REPORT, Conditions, ResultStatus, State
+from grader.grading.app.request import GradeRequest
+from grader.grading.model.exercise import Feedback, Outcome, Shows
+from grader.grading.model.grading_options import GradingOptions
+from grader.grading.model.report import Environment, ExerciseReport, Report, Reproduction, Verdict
+from grader.runtime.model.errors import EnvironmentFault, HarnessError, SubmissionError
+from grader.runtime.model.trace import ClockKind
 
 CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", GradingOptions())
 

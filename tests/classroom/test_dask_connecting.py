@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from grader.classroom.cluster.dispatcher import address_of, connected
 from grader.cli.main import app
-from grader.core.errors import EnvironmentFault
+from grader.course.classroom.cluster.dispatcher import address_of, connected
+from grader.runtime.model.errors import EnvironmentFault
 
 
 def test_without_the_library_nothing_begins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,16 +14,18 @@ from dask_samples import ONE, TWO, FakeClient, graded, task
 from distributed import Client, KilledWorker
 from distributed.scheduler import WorkerState
 
-from grader.classroom.cluster.dispatcher import ClusterScheduler
-from grader.classroom.messages import JobResult
-from grader.classroom.store import ResultStatus, State
-from grader.core.errors import HarnessError
+from grader.course.classroom.cluster.dispatcher import ClusterScheduler
+from grader.course.classroom.messages import JobResult
+from grader.course.classroom.store import ResultStatus, State
+from grader.runtime.model.errors import HarnessError
 
 
 @pytest.fixture(autouse=True)
 def _without_rubrics(monkeypatch: pytest.MonkeyPatch) -> None:
     """What files exercises ask for is no matter here."""
-    monkeypatch.setattr("grader.classroom.cluster.dispatcher.files_wanted", lambda task: ("velocity_publisher.py",))
+    monkeypatch.setattr(
+        "grader.course.classroom.cluster.dispatcher.files_wanted", lambda task: ("velocity_publisher.py",)
+    )
 
 
 NAMES = ("ada", "bob", "cleo", "dan")

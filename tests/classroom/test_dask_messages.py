@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 from dask_samples import CONDITIONS, graded, task
 
-from grader.classroom.local import Attempt, Task, failed_attempt
-from grader.classroom.messages import GradingJob, JobResult, Terms, pack, read_collected, unpack, write_answer
-from grader.classroom.receiving import write_task
-from grader.classroom.sending import job_for, store_result, terms_of
-from grader.classroom.store import State
-from grader.core.errors import HarnessError, RecordingError, RubricError
-from grader.submissions.submission import stage_collected, stage_submission
+from grader.course.classroom.local import Attempt, Task, failed_attempt
+from grader.course.classroom.messages import GradingJob, JobResult, Terms, pack, read_collected, unpack, write_answer
+from grader.course.classroom.receiving import write_task
+from grader.course.classroom.sending import job_for, store_result, terms_of
+from grader.course.classroom.store import State
+from grader.grading.submissions.submission import stage_collected, stage_submission
+from grader.runtime.model.errors import HarnessError, RecordingError, RubricError
 
 
 def sent(one: Task, wanted: tuple[str] = ("velocity_publisher.py",)) -> tuple[Terms, GradingJob]:
@@ -147,7 +147,7 @@ def test_another_rubric_is_no_result(tmp_path: Path) -> None:
 @pytest.mark.parametrize("data", [b"", b"\xc1", b"\x81\xa1a\x01", pickle.dumps({}), pack(JobResult("w", b"[]"))])
 def test_nonsense_is_no_result(tmp_path: Path, data: bytes) -> None:
     """Whatever comes back, it is read as data, never run, and never a mark."""
-    from grader.classroom.sending import answer_in
+    from grader.course.classroom.sending import answer_in
 
     assert store_result(task(tmp_path), answer_in(data, "cluster")).status.state is State.FAILED
 

@@ -10,9 +10,9 @@ from dask_samples import ONE, TWO, FakeClient
 from distributed import Client
 
 from grader import __version__
-from grader.classroom.cluster.dispatcher import WorkerPool
-from grader.classroom.messages import Fitness
-from grader.core.errors import EnvironmentFault, HarnessError
+from grader.course.classroom.cluster.dispatcher import WorkerPool
+from grader.course.classroom.messages import Fitness
+from grader.runtime.model.errors import EnvironmentFault, HarnessError
 
 NO_SANDBOX = Fitness(f"worker {TWO} on lab", "isolation: expected a sandbox, found none", "apt-get install bubblewrap")
 

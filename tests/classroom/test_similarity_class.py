@@ -13,8 +13,8 @@ from class_samples import FakeScheduler, course, grade, hand_in, scores
 from click.testing import CliRunner
 from sample_folders import folder_of
 
-from grader.classroom.outputs import Graded
 from grader.cli.main import app
+from grader.course.classroom.outputs import Graded
 
 
 @pytest.fixture

@@ -12,10 +12,17 @@ import pytest
 from copies import FILE, handed
 from sample_folders import TESTS, folder_of
 
-from grader.core.errors import ClassError
-from grader.similarity import library
-from grader.similarity.finding import COMMON_LEAST, COMMON_MOST, MAX_BYTES, find_similar, read_given, read_programs
-from grader.similarity.library import Handed, Similar
+from grader.course.similarity import library
+from grader.course.similarity.finding import (
+    COMMON_LEAST,
+    COMMON_MOST,
+    MAX_BYTES,
+    find_similar,
+    read_given,
+    read_programs,
+)
+from grader.course.similarity.library import Handed, Similar
+from grader.runtime.model.errors import ClassError
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 #: Programs of people who do not know each other.
@@ -67,7 +74,7 @@ def test_the_process_changes_nothing() -> None:
     program = (
         "import sys; sys.path[:0] = sys.argv[1:]\n"
         "import test_similarity_finding as t, copies\n"
-        "from grader.similarity.pages import render_table\n"
+        "from grader.course.similarity.pages import render_table\n"
         "copied = t.handed('z', copies.logged(t.text_of('odom_csv'), 1))\n"
         "print(render_table(t.find_similar([*t.strangers(), copied], ())))"
     )

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from copies import handed
 
-from grader.similarity import pages
-from grader.similarity.library import ComparedProgram, Handed, Likeness, Pair, SameText, Side, Similar
-from grader.similarity.pages import Line, lines_of, render_overview, render_pair, render_table, report_of
+from grader.course.similarity import pages
+from grader.course.similarity.library import ComparedProgram, Handed, Likeness, Pair, SameText, Side, Similar
+from grader.course.similarity.pages import Line, lines_of, render_overview, render_pair, render_table, report_of
 
 EVIL = "<script>document.title='owned'</script>\u202e\x1b[31m=cmd|'/C calc'!A0\" onmouseover=\"alert(1)"
 

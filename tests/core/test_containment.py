@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Property, described, missing, summarised
+from grader.runtime.model.checkup import (
+    NO_SANDBOX,
+    PROPERTIES,
+    REQUIRED,
+    TIERS,
+    Property,
+    described,
+    missing,
+    summarised,
+)
 
 ALL = tuple(Property(name, holds=True, mechanism=f"mechanism {n}") for n, name in enumerate(PROPERTIES))
 OPEN = (*ALL[:4], Property("net_egress", holds=False, mechanism="no interface but lo", found="eth0"), *ALL[5:])

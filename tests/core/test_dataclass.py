@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import grader.core.dataclass
-from grader.core.dataclass import dataclass
+import grader.runtime.model.dataclass
+from grader.runtime.model.dataclass import dataclass
 
 Decorator = Callable[..., Any]
 
@@ -330,13 +330,13 @@ def test_default_factories_make_a_value_for_each_instance() -> None:
 def test_init_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is compiled for a class that is not used, and `__init__` once for one that is, for those below it too."""
     compiled: list[type] = []
-    compile_it = grader.core.dataclass._compiled_init
+    compile_it = grader.runtime.model.dataclass._compiled_init
 
     def counted(cls: type, *, frozen: bool) -> Any:
         compiled.append(cls)
         return compile_it(cls, frozen=frozen)
 
-    monkeypatch.setattr(grader.core.dataclass, "_compiled_init", counted)
+    monkeypatch.setattr(grader.runtime.model.dataclass, "_compiled_init", counted)
     used, unused = frozen(dataclass), frozen(dataclass)
     below = type("Below", (used,), {})
     assert compiled == []

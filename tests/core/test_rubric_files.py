@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from grader.app.grade import read_exercises
-from grader.app.request import GradeRequest
 from grader.cli.main import app
-from grader.core.rubric_files import rubric_file, rubric_files, rubrics_in
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.loader import read_rubric, side_files
+from grader.grading.app.grade import read_exercises
+from grader.grading.app.request import GradeRequest
+from grader.grading.model.rubric_files import rubric_file, rubric_files, rubrics_in
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.loader import read_rubric, side_files
 
 ROOT = Path(__file__).resolve().parents[2]
 RUBRICS = ROOT / "rubrics"
@@ -96,8 +96,8 @@ def test_notes_are_found_by_each_name_of_their_rubric(course: Path) -> None:
 
 def test_a_class_that_was_graded_by_the_earlier_name_can_be_graded_again(course: Path) -> None:
     """What the last run used counts as there."""
-    from grader.classroom.last_run import LastRun
     from grader.cli.batch import command
+    from grader.course.classroom.last_run import LastRun
 
     gone = LastRun(options={"rubric": ("rubrics/one.yaml",)}, decisions=0)
     assert command._repeated(gone, {}, set()) == {"rubrics": ("rubrics/one.yaml",)}

@@ -10,11 +10,16 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from grader.core.checkup import Property
-from grader.core.exercise import Exercise
-from grader.core.report import Environment, Report, Reproduction
-from grader.core.submission import Run, StudentFile, Submission
-from grader.core.trace import (
+from grader.grading.evidence.store import keep
+from grader.grading.judging.judge_run import judge_run
+from grader.grading.model.exercise import Exercise
+from grader.grading.model.report import Environment, Report, Reproduction
+from grader.grading.model.run import Run
+from grader.grading.reporting.json_report import dumps
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.checkup import Property
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import (
     ClockKind,
     Delivery,
     Endpoint,
@@ -34,11 +39,7 @@ from grader.core.trace import (
     StartWay,
     Trace,
 )
-from grader.execution.evidence.recording_file import encode
-from grader.execution.evidence.store import keep
-from grader.judging.judge_run import judge_run
-from grader.reporting.json_report import dumps
-from grader.rubrics.loader import read_rubric
+from grader.runtime.recording.recording_file import encode
 
 RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"
 TWIST = "geometry_msgs/msg/Twist"

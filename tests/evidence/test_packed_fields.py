@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.core.errors import EvidenceError
-from grader.core.trace import ClockKind, Message, Trace
-from grader.execution.evidence.packed import Fields, fields_of, pack, unpack, unpack_exactly
+from grader.runtime.model.errors import EvidenceError
+from grader.runtime.model.trace import ClockKind, Message, Trace
+from grader.runtime.recording.packed import Fields, fields_of, pack, unpack, unpack_exactly
 
 TWIST = {"linear": {"x": 0.5, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.1}}
 LONG = {"data": "x" * 80}

@@ -17,11 +17,21 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
-from grader.core.errors import EvidenceError
-from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, LogRecord, Mark, Message, Observation, Trace
-from grader.execution.codec import trace_to_json
-from grader.execution.evidence.packed import unpack
-from grader.execution.evidence.recording_file import packed_trace, recording_bytes, trace_of
+from grader.runtime.model.errors import EvidenceError
+from grader.runtime.model.trace import (
+    ClockKind,
+    Delivery,
+    Fault,
+    FaultKind,
+    LogRecord,
+    Mark,
+    Message,
+    Observation,
+    Trace,
+)
+from grader.runtime.recording.codec import trace_to_json
+from grader.runtime.recording.packed import unpack
+from grader.runtime.recording.recording_file import packed_trace, recording_bytes, trace_of
 
 FACTS = {"environment": '{"ros_distro": "jazzy"}', "format": "x", "seed": "7"}
 

@@ -12,12 +12,12 @@ import pytest
 from click.testing import CliRunner, Result
 from kept_runs import RUBRICS, kept_run, velocity_exercise, velocity_run, velocity_trace
 
-from grader.app import rejudge
 from grader.cli import main
-from grader.execution.evidence.store import open_evidence
-from grader.judging.judge_run import judge_run
-from grader.reporting.json_report import dumps
-from grader.rubrics.loader import read_rubric
+from grader.grading.app import rejudge
+from grader.grading.evidence.store import open_evidence
+from grader.grading.judging.judge_run import judge_run
+from grader.grading.reporting.json_report import dumps
+from grader.grading.rubrics.loader import read_rubric
 
 
 def grade(*words: str | Path | int) -> Result:

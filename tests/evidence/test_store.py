@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 from kept_runs import kept_run, velocity_exercise, velocity_run, velocity_trace
 
-from grader.core.errors import EvidenceError
-from grader.core.scenario import Scenario, Span
-from grader.core.trace import Delivery, Message, Request, Response, Trace
-from grader.execution.evidence.manifest import scenario_digest
-from grader.execution.evidence.store import check_place, first_report, found_under, open_evidence, run_of
-from grader.stimuli.messages import MessageStream
-from grader.stimuli.simulation import Simulated
+from grader.grading.evidence.manifest import scenario_digest
+from grader.grading.evidence.store import check_place, first_report, found_under, open_evidence, run_of
+from grader.runtime.model.errors import EvidenceError
+from grader.runtime.model.scenario import Scenario, Span
+from grader.runtime.model.trace import Delivery, Message, Request, Response, Trace
+from grader.runtime.stimuli.messages import MessageStream
+from grader.runtime.stimuli.simulation import Simulated
 
 RECORDING = "velocity_publisher.alone/velocity_publisher.alone_0.mcap"
 OWN = {"evidence.json", "report.json", RECORDING, "velocity_publisher.alone/metadata.yaml"}
@@ -160,7 +160,7 @@ def test_a_recording_that_shows_something_else_is_found(tmp_path: Path) -> None:
     assert run_of(open_evidence(tmp_path / "a"), [velocity_exercise()], verify=True)
     forged = spliced(one, other)
     old, new = (json.loads((tmp_path / "a" / "evidence.json").read_text()) for _ in "ab")
-    from grader.execution.evidence.manifest import sha256
+    from grader.grading.evidence.manifest import sha256
 
     new["exercises"][0]["recordings"][0]["digest"] = sha256(forged)
     assert new != old

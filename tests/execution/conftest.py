@@ -8,7 +8,7 @@ import pytest
 from hostile import staging
 from sandboxes import make_submission
 
-from grader.execution.recording_session import RecordingSession, open_session
+from grader.runtime.session import RecordingSession, open_session
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,8 @@ import socket
 import struct
 import sys
 
-from grader.execution.sandbox.seccomp import NEW_NAMESPACES, NUMBERS, ArgumentRule, assembled
-from grader.execution.sandbox.start import DROP_FROM_BOUNDING_SET, call, checked, load_filter
+from grader.runtime.sandbox.seccomp import NEW_NAMESPACES, NUMBERS, ArgumentRule, assembled
+from grader.runtime.sandbox.start import DROP_FROM_BOUNDING_SET, call, checked, load_filter
 
 REFUSED = ("unshare", "setns", "mount", "umount2", "pivot_root", "move_mount", "open_tree", "fsopen", "clone3", "clone")
 #: What the common engines leave to root, as a mask.

@@ -10,11 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from grader.core.limits import Limits
-from grader.core.trace import Trace
-from grader.execution.plan import Plan
-from grader.execution.recording_session import RecordingSession
-from grader.execution.supervisor import Job
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.trace import Trace
+from grader.runtime.plan import Plan
+from grader.runtime.session import RecordingSession
+from grader.runtime.supervisor.supervisor import Job
 
 MS = 1_000_000
 

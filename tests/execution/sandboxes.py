@@ -18,18 +18,18 @@ from typing import Any
 import pytest
 
 import grader
-from grader.core.errors import EnvironmentFault
-from grader.core.limits import Limits
-from grader.execution import domains
-from grader.execution.codec import to_json
-from grader.execution.ros_installation import RosInstallation
-from grader.execution.sandbox.bubblewrap import Bubblewrap
-from grader.execution.sandbox.environment import runtime_environment, worker_environment
-from grader.execution.sandbox.exposure import closed_folders, view_of, worker_view
-from grader.execution.sandbox.protocol import Command, Isolation, StudentProcess
-from grader.execution.sandbox.tiers import FlatBubblewrap, Landlock, isolation_from_name
+from grader.runtime import domains
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.model.limits import Limits
+from grader.runtime.recording.codec import to_json
+from grader.runtime.ros_installation import RosInstallation
+from grader.runtime.sandbox.bubblewrap import Bubblewrap
+from grader.runtime.sandbox.environment import runtime_environment, worker_environment
+from grader.runtime.sandbox.exposure import closed_folders, view_of, worker_view
+from grader.runtime.sandbox.protocol import Command, Isolation, StudentProcess
+from grader.runtime.sandbox.tiers import FlatBubblewrap, Landlock, isolation_from_name
 
-HOST = Path(grader.__file__).resolve().parent / "student_host"
+HOST = Path(grader.__file__).resolve().parent / "runtime" / "host"
 USER = 1000
 #: Not every tier has a network of its own: neither tests that run side by side nor graders may use the same domain. It
 #: is reserved until this process ends.
@@ -48,10 +48,10 @@ sys.exit(student.returncode)
 # Another one, which has the student's process forked.
 FORKING_RELAY = """
 import json, shutil, socket, sys, threading
-from grader.execution.codec import from_json
-from grader.execution.ros_installation import PythonRuntime
-from grader.execution.sandbox.protocol import PreparedSandbox
-from grader.execution.sandbox.starter import Starter
+from grader.runtime.recording.codec import from_json
+from grader.runtime.ros_installation import PythonRuntime
+from grader.runtime.sandbox.protocol import PreparedSandbox
+from grader.runtime.sandbox.starter import Starter
 told = json.loads(sys.argv[1])
 starter = Starter("", from_json(PythonRuntime, told["runtime"]), told["host"])
 ours, theirs = socket.socketpair()

@@ -7,14 +7,14 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from grader.core.trace import Endpoint, Fault, GraphSnapshot, OutputLine
-from grader.execution.ending import ended_by
-from grader.execution.notes import Places
-from grader.execution.observer import Taken
-from grader.execution.plan import Plan
-from grader.execution.workload import Delay
-from grader.stimuli.numbers import PlannedNumbers
-from grader.student_host.clock import EPOCH_NS
+from grader.runtime.host.clock import EPOCH_NS
+from grader.runtime.model.trace import Endpoint, Fault, GraphSnapshot, OutputLine
+from grader.runtime.plan import Plan
+from grader.runtime.stimuli.numbers import PlannedNumbers
+from grader.runtime.worker.ending import ended_by
+from grader.runtime.worker.notes import Places
+from grader.runtime.worker.observer import Taken
+from grader.runtime.worker.workload import Delay
 
 #: Stands for the submission: this file is in it.
 HERE = Path(__file__).resolve().parent

@@ -22,10 +22,10 @@ from hypothesis import strategies as st
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from grader.core.errors import RecordingError
-from grader.core.quantities import NS_PER_S
-from grader.execution.bag import Least, read_bag
-from grader.stimuli.recorded import Recording, TimedMessage, window
+from grader.runtime.model.errors import RecordingError
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.recording.bag import Least, read_bag
+from grader.runtime.stimuli.recorded import Recording, TimedMessage, window
 
 ROOT = Path(__file__).parents[2]
 OWN = ROOT / "rubrics" / "exercise_2" / "odometry"
@@ -506,5 +506,5 @@ class TestWindow:
 
 def test_rosbags_is_imported_only_when_something_is_read() -> None:
     """Runs that play no odometry do not pay for the library."""
-    code = "import sys, grader.execution.bag; sys.exit('rosbags' in sys.modules)"
+    code = "import sys, grader.runtime.recording.bag; sys.exit('rosbags' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

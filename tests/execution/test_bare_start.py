@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.execution.bare_start import bare_arguments
-from grader.execution.plan import PlannedStart
+from grader.runtime.plan import PlannedStart
+from grader.runtime.worker.bare_start import bare_arguments
 
 NODE = "from rclpy.node import Node\nclass Talker(Node): pass\n"
 SCRIPTS = {

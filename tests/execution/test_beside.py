@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import OutputLine
-from grader.execution.beside import MOST_BYTES, MOST_FILES, files_beside
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import OutputLine
+from grader.runtime.session import RecordingSession
+from grader.runtime.worker.beside import MOST_BYTES, MOST_FILES, files_beside
 
 PROGRAM = """
 import rclpy, os

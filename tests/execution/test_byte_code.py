@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from grader import compiled as compiled_module
-from grader.core.errors import EnvironmentFault
-from grader.execution import byte_code as byte_code_module
-from grader.execution.byte_code import _roots, byte_code, compile_command, compile_own, is_current
-from grader.execution.ros_installation import find_ros
-from grader.execution.sandbox import environment
-from grader.execution.sandbox.environment import PACKAGE
+from grader.runtime import compiled as compiled_module
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.ros_installation import find_ros
+from grader.runtime.sandbox import environment
+from grader.runtime.sandbox.environment import PACKAGE
+from grader.runtime.supervisor import byte_code as byte_code_module
+from grader.runtime.supervisor.byte_code import _roots, byte_code, compile_command, compile_own, is_current
 
 MODE = py_compile.PycInvalidationMode
 
@@ -119,7 +119,7 @@ def test_a_stale_installation_is_told_with_the_command_that_mends_it(
     for module in (byte_code_module, environment):
         monkeypatch.setattr(module, "PACKAGE", copy)
     monkeypatch.setattr(byte_code_module, "_compile", lambda: None)
-    Path(importlib.util.cache_from_source(str(copy / "student_host" / "launcher.py"))).write_bytes(b"")
+    Path(importlib.util.cache_from_source(str(copy / "runtime" / "host" / "launcher.py"))).write_bytes(b"")
     fact = byte_code(ros.runtime)
     assert fact.fits
     assert fact.value.startswith("missing or stale for 1 file:")

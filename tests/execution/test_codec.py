@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.core.errors import HarnessError
-from grader.core.trace import (
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.trace import (
     ClockKind,
     Delivery,
     Endpoint,
@@ -32,8 +32,8 @@ from grader.core.trace import (
     StartWay,
     Trace,
 )
-from grader.execution.codec import observation_to_json, trace_to_json
-from grader.execution.evidence.packed import pack, trace_from_json, unpack
+from grader.runtime.recording.codec import observation_to_json, trace_to_json
+from grader.runtime.recording.packed import pack, trace_from_json, unpack
 
 TIMES = st.integers(min_value=-(2**70), max_value=2**70)
 # Lone surrogates too: a student's bytes may be decoded to anything.

@@ -1,7 +1,7 @@
 """Standard error in ROS's own format: where records begin and end, and what ended a program."""
 
-from grader.core.trace import LogRecord, OutputLine
-from grader.execution.console import Logged, last_traceback, read_console, thread_tracebacks
+from grader.runtime.model.trace import LogRecord, OutputLine
+from grader.runtime.worker.console import Logged, last_traceback, read_console, thread_tracebacks
 
 STAMP = "1767225600.000000042"
 

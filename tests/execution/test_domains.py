@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from grader.core.errors import EnvironmentFault
-from grader.execution import domains as module
-from grader.execution.domains import USABLE, private_domains, shared_domains
+from grader.runtime import domains as module
+from grader.runtime.domains import USABLE, private_domains, shared_domains
+from grader.runtime.model.errors import EnvironmentFault
 
 
 @pytest.fixture(autouse=True)

@@ -15,7 +15,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.core.scenario import (
+from grader.grading.evidence.manifest import scenario_digest
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.scenario import (
     ODOMETRY,
     AnyOrder,
     Between,
@@ -27,18 +30,15 @@ from grader.core.scenario import (
     TimeBetween,
     cases,
 )
-from grader.core.submission import StudentFile, Submission
-from grader.execution.codec import to_json
-from grader.execution.evidence.manifest import scenario_digest
-from grader.execution.plan import Plan, plan_scenario
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.loader import read_rubric
-from grader.stimuli.calls import PlannedCalls
-from grader.stimuli.goals import PlannedGoal
-from grader.stimuli.messages import PlannedMessages
-from grader.stimuli.numbers import NumberStream, PlannedNumbers
-from grader.stimuli.recorded import PlannedRecording, RecordedStream, Recording, TimedMessage
-from grader.stimuli.server import PlannedServer
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.plan import Plan, plan_scenario
+from grader.runtime.recording.codec import to_json
+from grader.runtime.stimuli.calls import PlannedCalls
+from grader.runtime.stimuli.goals import PlannedGoal
+from grader.runtime.stimuli.messages import PlannedMessages
+from grader.runtime.stimuli.numbers import NumberStream, PlannedNumbers
+from grader.runtime.stimuli.recorded import PlannedRecording, RecordedStream, Recording, TimedMessage
+from grader.runtime.stimuli.server import PlannedServer
 
 MS, S = 1_000_000, 1_000_000_000
 SEEDS = st.integers(0, 2**48 - 1)

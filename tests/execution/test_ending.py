@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from grader.core.limits import Limits
-from grader.core.quantities import MIB, NS_PER_S
-from grader.core.trace import Fault, FaultKind
-from grader.execution.ending import ending_fault, graders_fault, limit_behind, reported_fault
-from grader.execution.notes import Places
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import MIB, NS_PER_S
+from grader.runtime.model.trace import Fault, FaultKind
+from grader.runtime.worker.ending import ending_fault, graders_fault, limit_behind, reported_fault
+from grader.runtime.worker.notes import Places
 
 
 class Three(Places):

@@ -7,18 +7,18 @@ from typing import Any
 
 import pytest
 
-from grader.core.trace import Endpoint, Trace
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.trace import Endpoint, Trace
+from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
 from hostile import MS, record
 
-from grader.core.quantities import NS_PER_S
-from grader.stimuli.calls import PlannedCalls
-from grader.stimuli.goals import PlannedGoal
-from grader.stimuli.messages import PlannedMessages
-from grader.stimuli.server import PlannedServer
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.stimuli.calls import PlannedCalls
+from grader.runtime.stimuli.goals import PlannedGoal
+from grader.runtime.stimuli.messages import PlannedMessages
+from grader.runtime.stimuli.server import PlannedServer
 
 pytestmark = pytest.mark.ros
 

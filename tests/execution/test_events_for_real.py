@@ -7,16 +7,16 @@ from typing import Any
 
 import pytest
 
-from grader.core.trace import FaultKind, LogRecord, OutputLine, Trace, unmet_policy
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.trace import FaultKind, LogRecord, OutputLine, Trace, unmet_policy
+from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
 from hostile import record
 
-from grader.core.quantities import NS_PER_S
-from grader.execution.virtual_runner import OUTSIDE
-from grader.reporting.graph import draw_graph
+from grader.grading.reporting.graph import draw_graph
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.worker.virtual_runner import OUTSIDE
 
 pytestmark = pytest.mark.ros
 

@@ -9,24 +9,24 @@ from typing import Any
 
 import pytest
 
-from grader.core.scenario import FieldSpec
+from grader.runtime.model.scenario import FieldSpec
 
 pytest.importorskip("rclpy")
 
 from scripted import plan
 
-from grader.core.errors import HarnessError
-from grader.core.scenario import Between, Choose, Planned, Scenario, Span, Written
-from grader.execution.codec import from_json, to_json
-from grader.execution.evidence.manifest import scenario_digest
-from grader.execution.interfaces import built, interface_class, plain_fields
-from grader.execution.plan import Plan
-from grader.execution.service_peers import check_types
-from grader.stimuli.calls import ServiceCalls
-from grader.stimuli.drawing import Draws, drawn_fields, drawn_number
-from grader.stimuli.goals import ActionGoal
-from grader.stimuli.messages import MessageStream
-from grader.stimuli.server import PlannedServer, ServiceServer
+from grader.grading.evidence.manifest import scenario_digest
+from grader.runtime.message_classes import built, interface_class, plain_fields
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.scenario import Between, Choose, Planned, Scenario, Span, Written
+from grader.runtime.plan import Plan
+from grader.runtime.recording.codec import from_json, to_json
+from grader.runtime.stimuli.calls import ServiceCalls
+from grader.runtime.stimuli.drawing import Draws, drawn_fields, drawn_number
+from grader.runtime.stimuli.goals import ActionGoal
+from grader.runtime.stimuli.messages import MessageStream
+from grader.runtime.stimuli.server import PlannedServer, ServiceServer
+from grader.runtime.worker.service_peers import check_types
 
 TRIGGER, SCAN = "std_srvs/srv/Trigger", "sensor_msgs/msg/LaserScan"
 TOLD: Mapping[str, FieldSpec] = {

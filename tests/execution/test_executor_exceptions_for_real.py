@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import LogRecord, OutputLine, Trace
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import LogRecord, OutputLine, Trace
+from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 

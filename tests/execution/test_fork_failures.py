@@ -11,13 +11,13 @@ import pytest
 from hostile import hostile, record
 from sandboxes import DOMAIN, Sandbox, finish, said, sandbox_or_skip
 
-from grader.core.limits import Limits
-from grader.execution.codec import to_json
-from grader.execution.recording_session import RecordingSession
-from grader.execution.ros_installation import RosInstallation
-from grader.execution.sandbox import start
-from grader.execution.sandbox.bubblewrap import Bubblewrap
-from grader.execution.sandbox.environment import worker_environment
+from grader.runtime.model.limits import Limits
+from grader.runtime.recording.codec import to_json
+from grader.runtime.ros_installation import RosInstallation
+from grader.runtime.sandbox import start
+from grader.runtime.sandbox.bubblewrap import Bubblewrap
+from grader.runtime.sandbox.environment import worker_environment
+from grader.runtime.session import RecordingSession
 
 pytestmark = pytest.mark.ros
 
@@ -80,15 +80,15 @@ FAILING = """
 import json, socket, sys
 from itertools import count
 from pathlib import Path
-from grader.core.limits import Limits
-from grader.execution.codec import from_json
-from grader.execution.ros_installation import PythonRuntime
-from grader.execution.sandbox import start
-from grader.execution.sandbox.protocol import StudentProcess
-from grader.execution.sandbox.tiers import HOST, isolation_from_name
+from grader.runtime.model.limits import Limits
+from grader.runtime.recording.codec import from_json
+from grader.runtime.ros_installation import PythonRuntime
+from grader.runtime.sandbox import start
+from grader.runtime.sandbox.protocol import StudentProcess
+from grader.runtime.sandbox.tiers import HOST, isolation_from_name
 told = json.loads(sys.argv[1])
 start.__file__ = told["module"]
-from grader.execution.sandbox.starter import Starter
+from grader.runtime.sandbox.starter import Starter
 isolation, runtime = isolation_from_name(told["tier"]), from_json(PythonRuntime, told["runtime"])
 arguments = ("-s", "-u", "-c", "import resource; print('ran', resource.getrlimit(resource.RLIMIT_RTTIME)[0])")
 process = StudentProcess(runtime, HOST, Path(told["submission"]), arguments, {"ROS_DOMAIN_ID": told["domain"]}, ())

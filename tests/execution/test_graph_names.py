@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("rclpy", reason="needs rclpy")
 from rclpy.qos import QoSProfile
 
-from grader.execution.observer import Observer
+from grader.runtime.worker.observer import Observer
 
 pytestmark = pytest.mark.ros
 UNKNOWN = "_NODE_NAME_UNKNOWN_"

@@ -18,12 +18,12 @@ import pytest
 from sandboxes import DOMAIN, HOST, Sandbox, close, finish, said, sandbox_or_skip, start
 
 import grader
-from grader.core.errors import HarnessError
-from grader.core.limits import Limits
-from grader.execution.ros_installation import RosInstallation
-from grader.execution.sandbox.bubblewrap import Bubblewrap
-from grader.execution.sandbox.environment import account_files
-from grader.execution.sandbox.protocol import StudentProcess
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.limits import Limits
+from grader.runtime.ros_installation import RosInstallation
+from grader.runtime.sandbox.bubblewrap import Bubblewrap
+from grader.runtime.sandbox.environment import account_files
+from grader.runtime.sandbox.protocol import StudentProcess
 
 pytestmark = pytest.mark.sandbox
 
@@ -655,9 +655,9 @@ def test_a_worker_opens_nothing_of_the_instructor(sandbox: Sandbox, tmp_path: Pa
     beside.chmod(0o644)
     command = sandbox.worker((sys.executable, "-I", "-S", "-c", LOOK_AROUND))
     readable, writable = (set(map(Path, found)) for found in said(finish(command)))
-    package = HOST.parent
+    package = HOST.parents[1]
     seen = {path.relative_to(package).parts[0] for path in readable if package in path.parents}
-    assert seen == {"__init__.py", "api.py", "core", "simulation", "stimuli", "student_host", "execution"}
+    assert seen == {"__init__.py", "api.py", "runtime"}
     needed = (*ros.runtime.read_paths, ros.runtime.executable, package, sandbox.submission, Path("/dev"), SEEN_AT)
     roots = {path.resolve() for path in needed} | set(needed)
     accounts = {Path("/etc", name) for name in account_files(0, 0, Path("/"))}  # the grader's own

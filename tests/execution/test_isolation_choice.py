@@ -15,17 +15,17 @@ import pytest
 from sandboxes import USER, find_sandbox, opened_start, unreachable
 
 import grader
-from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Property, TierReport, missing
-from grader.core.errors import EnvironmentFault
-from grader.execution.ros_installation import RosInstallation, find_ros
-from grader.execution.sandbox import choose, memory, selftest, tiers
-from grader.execution.sandbox import properties as remedies
-from grader.execution.sandbox.bubblewrap import Bubblewrap
-from grader.execution.sandbox.choose import choose_isolation, inspect_tier, inspect_tiers, sandbox_memory
-from grader.execution.sandbox.memory import Memory
-from grader.execution.sandbox.properties import NO_EXCHANGE
-from grader.execution.sandbox.tiers import ISOLATING, Plain, isolation_from_name
-from grader.execution.temp_dirs import OWN
+from grader.runtime.model.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Property, TierReport, missing
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.ros_installation import RosInstallation, find_ros
+from grader.runtime.sandbox import choose, memory, selftest, tiers
+from grader.runtime.sandbox import properties as remedies
+from grader.runtime.sandbox.bubblewrap import Bubblewrap
+from grader.runtime.sandbox.choose import choose_isolation, inspect_tier, inspect_tiers, sandbox_memory
+from grader.runtime.sandbox.memory import Memory
+from grader.runtime.sandbox.properties import NO_EXCHANGE
+from grader.runtime.sandbox.tiers import ISOLATING, Plain, isolation_from_name
+from grader.runtime.temp_dirs import OWN
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "from grader.cli.main import main; main()"
@@ -157,7 +157,7 @@ def test_without_bubblewrap_auto_names_the_command_that_installs_it(
     ros: RosInstallation, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Where the network is open, Landlock alone does not do."""
-    monkeypatch.setattr("grader.execution.sandbox.bubblewrap.SYSTEM_PROGRAMS", str(tmp_path))
+    monkeypatch.setattr("grader.runtime.sandbox.bubblewrap.SYSTEM_PROGRAMS", str(tmp_path))
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(selftest, "inspect", lambda *_: report("landlock", without("net_egress"), usable=False))
     with pytest.raises(EnvironmentFault, match="lacks bubblewrap, which keeps your program from harming it") as refused:
@@ -238,7 +238,9 @@ def test_a_network_that_stays_open_is_noticed(ros: RosInstallation, tmp_path: Pa
 def test_a_view_that_shows_too_much_is_noticed(ros: RosInstallation) -> None:
     """The probe looks for files of the grader itself."""
     package = Path(grader.__file__).resolve().parent
-    shown = replace(ros, runtime=replace(ros.runtime, read_paths=(*ros.runtime.read_paths, package / "core")))
+    shown = replace(
+        ros, runtime=replace(ros.runtime, read_paths=(*ros.runtime.read_paths, package / "runtime" / "model"))
+    )
     seen = selftest.inspect(_bubblewrap(), shown)
     assert [found.name for found in seen.properties if not found.holds] == ["fs_read"]
     assert (seen.usable, "fs_read NOT CONTAINED" in seen.why) == (False, True)

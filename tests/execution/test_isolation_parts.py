@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.execution.sandbox import seccomp
-from grader.execution.sandbox.exposure import parents_of, view_of
+from grader.runtime.sandbox import seccomp
+from grader.runtime.sandbox.exposure import parents_of, view_of
 
 HEADERS = {
     "x86_64": Path("/usr/include/x86_64-linux-gnu/asm/unistd_64.h"),

@@ -7,7 +7,7 @@ import pytest
 
 START = """
 import sys
-from grader.execution import late_numpy
+from grader.runtime.worker import late_numpy
 late_numpy.install()
 from geometry_msgs.msg import PoseWithCovariance, Twist
 from rclpy.serialization import deserialize_message, serialize_message

@@ -8,16 +8,16 @@ from typing import Any
 
 import pytest
 
-from grader.core.trace import Trace
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.trace import Trace
+from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
 from hostile import hostile, record
 
-from grader.core.limits import Limits
-from grader.core.quantities import KIB, MIB, NS_PER_S
-from grader.core.trace import FaultKind
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import KIB, MIB, NS_PER_S
+from grader.runtime.model.trace import FaultKind
 
 pytestmark = pytest.mark.ros
 

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.trace import Trace
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.trace import Trace
+from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
 from hostile import hostile, record
 
-from grader.execution.student_process import LOG_FORMAT
+from grader.runtime.worker.student_process import LOG_FORMAT
 
 pytestmark = pytest.mark.ros
 

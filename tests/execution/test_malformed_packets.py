@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from hostile import hostile, record
 
-from grader.core.trace import Trace
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.trace import Trace
+from grader.runtime.session import RecordingSession
 
 pytestmark = pytest.mark.ros
 

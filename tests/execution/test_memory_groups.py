@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from hostile import hostile, record, staging
 
-from grader.core.limits import Limits
-from grader.core.quantities import MIB
-from grader.execution.memory_groups import PREFIX, MemoryGroup, _places, make_group
-from grader.execution.recording_session import open_session
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import MIB
+from grader.runtime.session import open_session
+from grader.runtime.supervisor.memory_groups import PREFIX, MemoryGroup, _places, make_group
 
 V1 = "35 31 0:32 {root} {at} rw - cgroup cgroup rw,memory\n36 31 0:33 / {at}/cpu rw - cgroup cgroup rw,cpu\n"
 V2 = "40 31 0:40 / {at} rw - cgroup2 cgroup2 rw\n"

@@ -14,18 +14,25 @@ from pathlib import Path
 import pytest
 from grading import grade_until_decided
 
-from grader.app.observe import ObserveRequest, observe
-from grader.app.request import GradeRequest
-from grader.core.errors import HarnessError
-from grader.core.exercise import Outcome
-from grader.core.quantities import NS_PER_S
-from grader.core.releases import RELEASES
-from grader.core.report import Report
-from grader.core.trace import ClockKind, Fault, FaultKind, Start, StartWay, Trace
-from grader.execution.codec import trace_to_json
-from grader.execution.evidence.packed import pack, trace_from_json, unpack
-from grader.execution.newer_python import NEW_MODULES, NEW_NAMES, came_with, newer_name, version_for, with_newer
-from grader.execution.newer_syntax import needed
+from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.request import GradeRequest
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Report
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.releases import RELEASES
+from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Start, StartWay, Trace
+from grader.runtime.recording.codec import trace_to_json
+from grader.runtime.recording.packed import pack, trace_from_json, unpack
+from grader.runtime.supervisor.newer_python import (
+    NEW_MODULES,
+    NEW_NAMES,
+    came_with,
+    newer_name,
+    version_for,
+    with_newer,
+)
+from grader.runtime.supervisor.newer_syntax import needed
 
 HERE = sys.version_info[:2]
 CASES = Path(__file__).resolve().parents[3] / "shared" / "cases" / "fidelity"

@@ -10,8 +10,8 @@ from typing import cast
 
 import pytest
 
-from grader.execution.output_watch import OutputWatch
-from grader.execution.student_process import NodeProcess
+from grader.runtime.worker.output_watch import OutputWatch
+from grader.runtime.worker.student_process import NodeProcess
 
 
 @dataclass

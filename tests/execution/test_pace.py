@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from grader.core.quantities import NS_PER_MS, NS_PER_S
-from grader.core.trace import ClockKind, LogRecord, Message, Trace
-from grader.execution.pace import SLOWER, keeps_pace
+from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
+from grader.runtime.model.trace import ClockKind, LogRecord, Message, Trace
+from grader.runtime.supervisor.pace import SLOWER, keeps_pace
 
 STOP_NS = 10 * NS_PER_S
 

@@ -8,17 +8,17 @@ from typing import Any
 
 import pytest
 
-from grader.core.trace import ClockKind, Trace
-from grader.execution.recording_session import AUTO, CHARGED_NOTE, DRIFTS, VIRTUAL, RecordingSession
+from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.session import AUTO, CHARGED_NOTE, DRIFTS, VIRTUAL, RecordingSession
 
 pytest.importorskip("rclpy")
 
 from hostile import planned
 from test_workload_for_real import library_call
 
-from grader.core.quantities import NS_PER_S
-from grader.execution.supervisor import Job
-from grader.execution.virtual_runner import BUSY, OUTSIDE
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.supervisor.supervisor import Job
+from grader.runtime.worker.virtual_runner import BUSY, OUTSIDE
 
 pytestmark = pytest.mark.ros
 

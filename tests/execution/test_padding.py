@@ -15,7 +15,7 @@ from std_msgs.msg import Empty, Header, String
 from test_msgs import message_fixtures, msg
 from test_msgs.action import Fibonacci
 
-from grader.execution.padding import without_padding
+from grader.runtime.padding import without_padding
 
 # The first message imports lark, which imports a deprecated module.
 pytestmark = pytest.mark.filterwarnings("ignore:module .sre_:DeprecationWarning")

@@ -7,9 +7,9 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from grader.execution import machine
-from grader.execution.machine import BRIEF_S, LOSSES, MOST_BUSY, SETTLE_S, Patience
-from grader.student_host import originals
+from grader.runtime import machine
+from grader.runtime.host import originals
+from grader.runtime.machine import BRIEF_S, LOSSES, MOST_BUSY, SETTLE_S, Patience
 
 
 @pytest.fixture

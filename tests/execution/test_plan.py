@@ -12,13 +12,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.core.scenario import ODOMETRY, Between, JustAbove, JustBelow, Scenario, Span, Stimulus
-from grader.core.submission import StudentFile, Submission
-from grader.execution.codec import from_json, to_json
-from grader.execution.plan import Plan, derive, plan_scenario
-from grader.stimuli.numbers import NumberStream, PlannedNumbers
-from grader.stimuli.recorded import PlannedRecording, RecordedStream, Recording, TimedMessage
-from grader.student_host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
+from grader.runtime.host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
+from grader.runtime.model.scenario import ODOMETRY, Between, JustAbove, JustBelow, Scenario, Span, Stimulus
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.plan import Plan, derive, plan_scenario
+from grader.runtime.recording.codec import from_json, to_json
+from grader.runtime.stimuli.numbers import NumberStream, PlannedNumbers
+from grader.runtime.stimuli.recorded import PlannedRecording, RecordedStream, Recording, TimedMessage
 
 MS = 1_000_000
 SUBMISSION = Submission(

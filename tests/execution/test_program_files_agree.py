@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from grader.core.quantities import NS_PER_S
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 

@@ -15,18 +15,18 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from grader.app.bags import observed, read_given, read_recordings, recordings_digest
-from grader.app.grade import read_exercises
-from grader.app.request import GradeRequest, command_words, request_of, request_to_json
-from grader.authoring.checking import check_rubric
-from grader.classroom.sending import checks_of
-from grader.core.errors import RecordingError, RubricError
-from grader.core.quantities import NS_PER_S
-from grader.core.scenario import ODOMETRY
-from grader.execution.bag import read_bag
-from grader.execution.evidence.manifest import scenario_digest
-from grader.rubrics.loader import read_rubric
-from grader.stimuli.recorded import RecordedStream
+from grader.course.authoring.checking import check_rubric
+from grader.course.classroom.sending import checks_of
+from grader.grading.app.bags import observed, read_given, read_recordings, recordings_digest
+from grader.grading.app.grade import read_exercises
+from grader.grading.app.request import GradeRequest, command_words, request_of, request_to_json
+from grader.grading.evidence.manifest import scenario_digest
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.errors import RecordingError, RubricError
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.scenario import ODOMETRY
+from grader.runtime.recording.bag import read_bag
+from grader.runtime.stimuli.recorded import RecordedStream
 
 GRADE = Path(sys.executable).with_name("grade")
 SCAN, POSE = "sensor_msgs/msg/LaserScan", "geometry_msgs/msg/PoseStamped"

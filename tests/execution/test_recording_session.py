@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from grader.core.trace import ClockKind, Message, Trace
-from grader.execution.plan import Plan
-from grader.execution.real_time_budget import RealTimeBudget
-from grader.execution.recording_session import AUTO, CHARGED_NOTE, DRIFTS, UNCLEAR, VIRTUAL, WALL, RecordingSession
-from grader.execution.supervisor import Job
+from grader.runtime.model.trace import ClockKind, Message, Trace
+from grader.runtime.plan import Plan
+from grader.runtime.session import AUTO, CHARGED_NOTE, DRIFTS, UNCLEAR, VIRTUAL, WALL, RecordingSession
+from grader.runtime.supervisor.real_time_budget import RealTimeBudget
+from grader.runtime.supervisor.supervisor import Job
 
 
 class Recorder:

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.trace import Fault, FaultKind, OutputLine, Trace
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.trace import Fault, FaultKind, OutputLine, Trace
+from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
 from hostile import record
 
-from grader.core.quantities import NS_PER_S
+from grader.runtime.model.quantities import NS_PER_S
 
 pytestmark = pytest.mark.ros
 

@@ -11,13 +11,13 @@ from typing import cast
 
 import pytest
 
-from grader.core.limits import Limits
-from grader.core.quantities import MIB, NS_PER_S
-from grader.core.trace import ClockKind, Trace
-from grader.execution import resource_monitor as module
-from grader.execution.resource_monitor import Budget, ResourceMonitor
-from grader.execution.student_process import NodeProcess
-from grader.execution.usage import Usage
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import MIB, NS_PER_S
+from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.usage import Usage
+from grader.runtime.worker import resource_monitor as module
+from grader.runtime.worker.resource_monitor import Budget, ResourceMonitor
+from grader.runtime.worker.student_process import NodeProcess
 
 TRACE = Trace("alone", ClockKind.VIRTUAL, 5, ())
 

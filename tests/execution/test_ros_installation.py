@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.errors import EnvironmentFault
-from grader.execution import ros_installation
-from grader.execution.ros_installation import RosInstallation, find_ros
-from grader.execution.sandbox.environment import runtime_environment
+from grader.runtime import ros_installation
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.ros_installation import RosInstallation, find_ros
+from grader.runtime.sandbox.environment import runtime_environment
 
 HERE = f"python{sys.version_info.major}.{sys.version_info.minor}"
 MESSAGES = ("geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs")
@@ -57,7 +57,7 @@ def test_an_interpreter_may_be_started_by_a_relative_path(wheels: RosInstallatio
     """As `../.venv/bin/python`: the paths of a sandbox are the same."""
     folder = Path(sys.executable).parent
     name = f"../{folder.name}/python"
-    code = "from grader.execution.ros_installation import find_ros; print(find_ros({}))"
+    code = "from grader.runtime.ros_installation import find_ros; print(find_ros({}))"
     done = subprocess.run([name, "-c", code], capture_output=True, text=True, check=True, env={}, cwd=folder)
     assert done.stdout.strip() == str(wheels)
 
@@ -219,7 +219,7 @@ def test_without_any_ros_the_command_that_installs_it_is_told(monkeypatch: pytes
 def test_finding_ros_imports_none_of_it() -> None:
     """The supervisor must not load rclpy: its libraries need variables that only children have."""
     code = (
-        "import sys; from grader.execution.ros_installation import find_ros\n"
+        "import sys; from grader.runtime.ros_installation import find_ros\n"
         "try: find_ros()\nexcept Exception as error: assert type(error).__name__ == 'EnvironmentFault'\n"
         "print([name for name in sys.modules if name.split('.')[0] in ('rclpy', 'std_msgs')])"
     )

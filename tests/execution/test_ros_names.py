@@ -17,13 +17,13 @@ from hostile import hostile, record
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from test_trusted_side import LINE
 
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import Trace
-from grader.execution.discovery import is_claim
-from grader.execution.interfaces import interface_class, message_class
-from grader.execution.observer import PARTICIPANTS
-from grader.execution.recording_session import RecordingSession
-from grader.execution.ros_names import LONGEST, LONGEST_NODE, asked, is_name, is_node_name, listed
+from grader.runtime.message_classes import interface_class, message_class
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import Trace
+from grader.runtime.session import RecordingSession
+from grader.runtime.worker.discovery import is_claim
+from grader.runtime.worker.observer import PARTICIPANTS
+from grader.runtime.worker.ros_names import LONGEST, LONGEST_NODE, asked, is_name, is_node_name, listed
 
 REFUSED = [
     "",

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from sandboxes import close, find_sandbox, make_submission, start
 
-from grader.core.errors import EnvironmentFault
-from grader.execution.ros_installation import find_ros
-from grader.execution.usage import families, scratch_names
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.ros_installation import find_ros
+from grader.runtime.usage import families, scratch_names
 
 pytestmark = pytest.mark.sandbox
 

@@ -13,14 +13,14 @@ pytest.importorskip("rclpy")
 from scripted import plan
 from std_srvs.srv import Trigger
 
-from grader.core.limits import Limits
-from grader.core.trace import Mark, Request, Response
-from grader.execution.ending import is_free_exit, is_normal_stop
-from grader.execution.service_ends import Arrived, ServiceEnds
-from grader.execution.service_peers import ServicePeers
-from grader.execution.trace_recorder import TraceRecorder
-from grader.stimuli.calls import Ask, PlannedCall, PlannedCalls
-from grader.stimuli.server import PlannedServer, Respond
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.trace import Mark, Request, Response
+from grader.runtime.stimuli.calls import Ask, PlannedCall, PlannedCalls
+from grader.runtime.stimuli.server import PlannedServer, Respond
+from grader.runtime.worker.ending import is_free_exit, is_normal_stop
+from grader.runtime.worker.service_ends import Arrived, ServiceEnds
+from grader.runtime.worker.service_peers import ServicePeers
+from grader.runtime.worker.trace_recorder import TraceRecorder
 
 #: ROS loads a type's support when it is first used, and imports what Python would rather see gone.
 pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")

@@ -9,23 +9,23 @@ from typing import Any
 
 import pytest
 
-from grader.core.scenario import FieldSpec
-from grader.core.trace import Trace
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.scenario import FieldSpec
+from grader.runtime.model.trace import Trace
+from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
-from grader.core.quantities import NS_PER_MS, NS_PER_S
-from grader.core.scenario import Scenario, Span
-from grader.core.trace import ClockKind, Fault, LogRecord, Mark, Request, Response
-from grader.execution.codec import trace_to_json
-from grader.execution.plan import plan_scenario
-from grader.execution.supervisor import Job
-from grader.stimuli.calls import ServiceCalls
-from grader.stimuli.goals import ActionGoal
-from grader.stimuli.messages import MessageStream
-from grader.stimuli.server import ServiceServer
-from grader.submissions.submission import stage_submission
+from grader.grading.submissions.submission import stage_submission
+from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
+from grader.runtime.model.scenario import Scenario, Span
+from grader.runtime.model.trace import ClockKind, Fault, LogRecord, Mark, Request, Response
+from grader.runtime.plan import plan_scenario
+from grader.runtime.recording.codec import trace_to_json
+from grader.runtime.stimuli.calls import ServiceCalls
+from grader.runtime.stimuli.goals import ActionGoal
+from grader.runtime.stimuli.messages import MessageStream
+from grader.runtime.stimuli.server import ServiceServer
+from grader.runtime.supervisor.supervisor import Job
 
 pytestmark = pytest.mark.ros
 

@@ -7,9 +7,9 @@ import textwrap
 import pytest
 from sandboxes import Sandbox, said, sandbox_or_skip
 
-from grader.core.limits import Limits
-from grader.execution.ros_installation import RosInstallation
-from grader.execution.sandbox.protocol import LOCKED_BYTES, PENDING_SIGNALS
+from grader.runtime.model.limits import Limits
+from grader.runtime.ros_installation import RosInstallation
+from grader.runtime.sandbox.protocol import LOCKED_BYTES, PENDING_SIGNALS
 
 pytestmark = pytest.mark.sandbox
 

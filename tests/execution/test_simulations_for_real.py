@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from grading import grade_until_decided
 
-from grader.app.request import GradeRequest
-from grader.app.start import grade
-from grader.core.exercise import Outcome
-from grader.core.report import Report, Verdict
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.start import grade
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Report, Verdict
 
 pytestmark = pytest.mark.ros
 
@@ -38,7 +38,7 @@ WORLD = """\
 import random
 from dataclasses import dataclass, field
 
-from grader.simulation import Simulation
+from grader.runtime.simulation import Simulation
 
 
 @dataclass

@@ -12,12 +12,12 @@ from typing import Any
 import pytest
 from hostile import hostile, record
 
-from grader.core.limits import Limits
-from grader.core.quantities import KIB, MIB, NS_PER_S
-from grader.core.trace import FaultKind, Trace
-from grader.execution.recording_session import RecordingSession
-from grader.execution.resource_monitor import IN_SOCKETS_BYTES
-from grader.execution.socket_memory import SOCKET_BYTES, SocketMemory, descriptors, objects, socket_bytes
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import KIB, MIB, NS_PER_S
+from grader.runtime.model.trace import FaultKind, Trace
+from grader.runtime.session import RecordingSession
+from grader.runtime.worker.resource_monitor import IN_SOCKETS_BYTES
+from grader.runtime.worker.socket_memory import SOCKET_BYTES, SocketMemory, descriptors, objects, socket_bytes
 
 KINDS = {
     "local": ((socket.AF_UNIX, 0),),

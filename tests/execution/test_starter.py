@@ -17,16 +17,16 @@ import pytest
 from hostile import hostile, record, staging
 from sandboxes import DOMAIN, Sandbox, finish, said, sandbox_or_skip
 
-from grader.core.errors import EnvironmentFault
-from grader.core.trace import FaultKind, Trace
-from grader.execution.codec import to_json
-from grader.execution.recording_session import RecordingSession, open_session
-from grader.execution.ros_installation import RosInstallation
-from grader.execution.sandbox.bubblewrap import Bubblewrap
-from grader.execution.sandbox.environment import worker_environment
-from grader.execution.sandbox.tiers import PLAIN_NAME
-from grader.execution.usage import families
-from grader.student_host.originals import wait_until
+from grader.runtime.host.originals import wait_until
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.model.trace import FaultKind, Trace
+from grader.runtime.recording.codec import to_json
+from grader.runtime.ros_installation import RosInstallation
+from grader.runtime.sandbox.bubblewrap import Bubblewrap
+from grader.runtime.sandbox.environment import worker_environment
+from grader.runtime.sandbox.tiers import PLAIN_NAME
+from grader.runtime.session import RecordingSession, open_session
+from grader.runtime.usage import families
 
 pytestmark = pytest.mark.ros
 
@@ -82,12 +82,12 @@ for begin in range(0, len(found), 1000):  # the grader cuts long lines
 BOTH = """
 import json, socket, subprocess, sys
 from pathlib import Path
-from grader.core.limits import Limits
-from grader.execution.codec import from_json
-from grader.execution.ros_installation import PythonRuntime
-from grader.execution.sandbox.protocol import StudentProcess
-from grader.execution.sandbox.tiers import HOST, isolation_from_name
-from grader.execution.sandbox.starter import Starter
+from grader.runtime.model.limits import Limits
+from grader.runtime.recording.codec import from_json
+from grader.runtime.ros_installation import PythonRuntime
+from grader.runtime.sandbox.protocol import StudentProcess
+from grader.runtime.sandbox.tiers import HOST, isolation_from_name
+from grader.runtime.sandbox.starter import Starter
 told = json.loads(sys.argv[1])
 isolation, runtime = isolation_from_name(told["tier"]), from_json(PythonRuntime, told["runtime"])
 arguments = ("-s", "-u", "-c", told["code"])

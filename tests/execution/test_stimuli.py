@@ -8,10 +8,10 @@ pytest.importorskip("rclpy")
 
 from scripted import FLOAT, MS, numbers, plan
 
-from grader.execution.interfaces import number_message, numeric_field
-from grader.stimuli.events import Appear, Disappear
-from grader.stimuli.numbers import PublishNumber
-from grader.stimuli.recorded import PlannedRecording, PublishRecorded
+from grader.runtime.message_classes import number_message, numeric_field
+from grader.runtime.stimuli.events import Appear, Disappear
+from grader.runtime.stimuli.numbers import PublishNumber
+from grader.runtime.stimuli.recorded import PlannedRecording, PublishRecorded
 
 
 def test_numbers_follow_each_other_in_their_period() -> None:

@@ -14,13 +14,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.core.limits import Limits
-from grader.core.trace import FaultKind, LogRecord, OutputLine, Start, StartWay
-from grader.execution import student_process as module
-from grader.execution.console import TEXT_CHARACTERS
-from grader.execution.notes import Places
-from grader.execution.sandbox.protocol import Command
-from grader.execution.student_process import NodeProcess
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.trace import FaultKind, LogRecord, OutputLine, Start, StartWay
+from grader.runtime.sandbox.protocol import Command
+from grader.runtime.worker import student_process as module
+from grader.runtime.worker.console import TEXT_CHARACTERS
+from grader.runtime.worker.notes import Places
+from grader.runtime.worker.student_process import NodeProcess
 
 ROOT = "/submission"
 TOKEN = "0123456789abcdef" * 2

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.execution.sandbox import exposure
+from grader.runtime.sandbox import exposure
 
 TAKES_ALL_BUT_ONE = """
 import fcntl, os, sys

@@ -14,16 +14,16 @@ from typing import Any, cast
 
 import pytest
 
-from grader.core.errors import EnvironmentFault
-from grader.core.limits import Limits
-from grader.core.trace import ClockKind, Trace
-from grader.execution import supervisor as module
-from grader.execution.plan import Plan
-from grader.execution.real_time_budget import RealTimeBudget
-from grader.execution.ros_installation import PythonRuntime
-from grader.execution.sandbox.exposure import View
-from grader.execution.sandbox.protocol import Command, Isolation
-from grader.execution.supervisor import Job, Recorder
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.plan import Plan
+from grader.runtime.ros_installation import PythonRuntime
+from grader.runtime.sandbox.exposure import View
+from grader.runtime.sandbox.protocol import Command, Isolation
+from grader.runtime.supervisor import supervisor as module
+from grader.runtime.supervisor.real_time_budget import RealTimeBudget
+from grader.runtime.supervisor.supervisor import Job, Recorder
 
 RUNTIME = PythonRuntime(Path(sys.executable), (), (), (), {})
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.execution import temp_dirs
-from grader.execution.temp_dirs import FRESH_S, PREFIX, make_room, scratch_folder, sweep
+from grader.runtime import temp_dirs
+from grader.runtime.temp_dirs import FRESH_S, PREFIX, make_room, scratch_folder, sweep
 
 
 @pytest.fixture(autouse=True)
@@ -53,7 +53,7 @@ def test_a_run_that_was_killed_leaves_its_folder_to_the_next(place: Path) -> Non
     """The lock goes with the process, however it ends."""
     code = (
         "import sys, tempfile; tempfile.tempdir = sys.argv[1]\n"
-        "from grader.execution.temp_dirs import scratch_folder\n"
+        "from grader.runtime.temp_dirs import scratch_folder\n"
         "with scratch_folder() as folder:\n"
         "    (folder / 'x').write_text('x'); print(folder, flush=True); sys.stdin.read()\n"
     )

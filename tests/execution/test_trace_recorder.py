@@ -9,12 +9,12 @@ pytest.importorskip("rclpy")
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.core.limits import Limits
-from grader.core.quantities import MIB
-from grader.core.trace import Endpoint, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer
-from grader.execution import trace_recorder as module
-from grader.execution.observer import Taken
-from grader.execution.trace_recorder import TraceRecorder
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import MIB
+from grader.runtime.model.trace import Endpoint, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer
+from grader.runtime.worker import trace_recorder as module
+from grader.runtime.worker.observer import Taken
+from grader.runtime.worker.trace_recorder import TraceRecorder
 
 REST = "the rest was ignored"
 

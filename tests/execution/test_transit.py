@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from grader.execution.plan import PlannedConnection
-from grader.execution.transit import Transit
+from grader.runtime.plan import PlannedConnection
+from grader.runtime.worker.transit import Transit
 
 MS = 1_000_000
 

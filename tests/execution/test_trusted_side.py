@@ -13,19 +13,19 @@ from typing import Any
 
 import pytest
 
-from grader.core.trace import Trace
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.trace import Trace
+from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
 from hostile import MS, hostile, record, staging
 
-from grader.core.limits import Limits
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import FaultKind
-from grader.execution.recording_session import open_session
-from grader.execution.usage import usage
-from grader.stimuli.numbers import PlannedNumbers
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import FaultKind
+from grader.runtime.session import open_session
+from grader.runtime.stimuli.numbers import PlannedNumbers
+from grader.runtime.usage import usage
 
 pytestmark = pytest.mark.ros
 
@@ -398,7 +398,7 @@ def workers_of(pid: int) -> list[int]:
             words = (path / "cmdline").read_bytes().split(b"\0")
         except (OSError, IndexError):  # it has ended, before or after its files were opened
             continue
-        if b"grader.execution.worker_main" in words and parent != 1:
+        if b"grader.runtime.worker.worker_main" in words and parent != 1:
             found.append(int(path.name))
     return [p for p in found if pid in ancestors(p)]
 

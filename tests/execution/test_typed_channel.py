@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
 from hostile import hostile, record
 
-from grader.core.trace import FaultKind, Start, StartWay
+from grader.runtime.model.trace import FaultKind, Start, StartWay
 
 pytestmark = pytest.mark.ros
 

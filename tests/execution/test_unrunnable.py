@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from hostile import record
 
-from grader.core.trace import OutputLine
-from grader.execution.plan import Plan
-from grader.execution.recording_session import RecordingSession
-from grader.execution.unrunnable import trace_without_run
+from grader.runtime.model.trace import OutputLine
+from grader.runtime.plan import Plan
+from grader.runtime.session import RecordingSession
+from grader.runtime.supervisor.unrunnable import trace_without_run
 
 BROKEN = {
     "no_colon": "import rclpy\n\ndef main()\n    pass\n",

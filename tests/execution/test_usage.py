@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from grader.core.quantities import MIB, NS_PER_S
-from grader.execution.usage import families, last_pid, threads_starved_ns, usage
+from grader.runtime.model.quantities import MIB, NS_PER_S
+from grader.runtime.usage import families, last_pid, threads_starved_ns, usage
 
 WAIT = "import sys; sys.stdout.write('x'); sys.stdout.flush(); sys.stdin.read()"
 

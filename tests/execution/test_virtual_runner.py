@@ -27,17 +27,28 @@ from scripted import (
     wait,
 )
 
-from grader.core.limits import Limits
-from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer, OutputLine
-from grader.execution import discovery, machine, trace_recorder
-from grader.execution import virtual_runner as module
-from grader.execution.observer import Observer, Taken
-from grader.execution.student_process import NodeProcess
-from grader.execution.virtual_runner import VirtualRunner
-from grader.execution.workload import HOPELESS_NS
-from grader.stimuli.recorded import PlannedRecording
-from grader.student_host import clock as host_clock
-from grader.student_host.clock import EPOCH_NS
+from grader.runtime import machine
+from grader.runtime.host import clock as host_clock
+from grader.runtime.host.clock import EPOCH_NS
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.trace import (
+    ClockKind,
+    Delivery,
+    Fault,
+    FaultKind,
+    GraphSnapshot,
+    Mark,
+    Message,
+    Offer,
+    OutputLine,
+)
+from grader.runtime.stimuli.recorded import PlannedRecording
+from grader.runtime.worker import discovery, trace_recorder
+from grader.runtime.worker import virtual_runner as module
+from grader.runtime.worker.observer import Observer, Taken
+from grader.runtime.worker.student_process import NodeProcess
+from grader.runtime.worker.virtual_runner import VirtualRunner
+from grader.runtime.worker.workload import HOPELESS_NS
 
 
 @pytest.fixture(autouse=True)

@@ -11,15 +11,15 @@ pytest.importorskip("rclpy")
 
 from scripted import FLOAT, INT, MS, Behaviour, Program, ScriptedObserver, ScriptedStudent, World, claim, numbers, plan
 
-from grader.core.limits import Limits
-from grader.core.trace import ClockKind, FaultKind
-from grader.execution import wall_runner as module
-from grader.execution.observer import Observer
-from grader.execution.plan import PlannedConnection
-from grader.execution.student_process import NodeProcess
-from grader.execution.wall_runner import WallRunner
-from grader.stimuli.messages import PlannedMessages
-from grader.stimuli.recorded import PlannedRecording
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.trace import ClockKind, FaultKind
+from grader.runtime.plan import PlannedConnection
+from grader.runtime.stimuli.messages import PlannedMessages
+from grader.runtime.stimuli.recorded import PlannedRecording
+from grader.runtime.worker import wall_runner as module
+from grader.runtime.worker.observer import Observer
+from grader.runtime.worker.student_process import NodeProcess
+from grader.runtime.worker.wall_runner import WallRunner
 
 SILENT = {"kind": "silent"}
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.execution import weaknesses as module
-from grader.execution.weaknesses import (
+from grader.runtime import weaknesses as module
+from grader.runtime.weaknesses import (
     BUBBLEWRAP,
     FAST_DDS,
     FIXES,

@@ -13,13 +13,13 @@ import pytest
 from sandboxes import HOST, Sandbox, close, find_sandbox, said, sandbox_or_skip, start
 
 import grader
-from grader.core.errors import HarnessError
-from grader.core.limits import Limits
-from grader.execution.ros_installation import RosInstallation
-from grader.execution.sandbox import seccomp as seccomp_flat
-from grader.execution.sandbox.protocol import StudentProcess
-from grader.execution.sandbox.start import OUTGROWN, SPARE
-from grader.execution.sandbox.tiers import Landlock
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.limits import Limits
+from grader.runtime.ros_installation import RosInstallation
+from grader.runtime.sandbox import seccomp as seccomp_flat
+from grader.runtime.sandbox.protocol import StudentProcess
+from grader.runtime.sandbox.start import OUTGROWN, SPARE
+from grader.runtime.sandbox.tiers import Landlock
 
 pytestmark = pytest.mark.sandbox
 
@@ -55,7 +55,7 @@ def test_a_student_opens_no_file_but_its_own_and_what_python_needs(sandbox: Sand
     hidden = [
         canary,
         "/etc/resolv.conf",
-        PACKAGE / "judging" / "judge.py",
+        PACKAGE / "grading" / "judging" / "judge.py",
         PACKAGE / "cli.py",
         "/proc/1/cmdline",
         "/proc/stat",
@@ -182,7 +182,7 @@ def test_where_landlock_has_no_say_over_signals_the_filter_has(
     ros: RosInstallation, submission: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Older kernels: a process reaches itself and its group, and nobody else."""
-    monkeypatch.setattr("grader.execution.sandbox.tiers.WITH_SIGNALS", 99)
+    monkeypatch.setattr("grader.runtime.sandbox.tiers.WITH_SIGNALS", 99)
     found = find_sandbox("landlock", ros, submission)
     if isinstance(found, str):
         pytest.skip(found)
@@ -313,7 +313,7 @@ def test_on_a_shared_network_a_domain_must_be_given(ros: RosInstallation, submis
 
 def test_the_wider_filter_refuses_what_the_other_does() -> None:
     """It adds calls and rules, and takes none away."""
-    from grader.execution.sandbox import seccomp
+    from grader.runtime.sandbox import seccomp
 
     assert set(seccomp.NUMBERS) < set(seccomp_flat.FLAT_NUMBERS)
     kept = {rule.call for rule in seccomp_flat.FLAT_RULES}

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from grader.execution import workload as module
-from grader.execution.workload import ARRIVAL_NS, LATE_AT_LEAST, LATE_SHARE, OUTRUN, Delay, Workload
+from grader.runtime.worker import workload as module
+from grader.runtime.worker.workload import ARRIVAL_NS, LATE_AT_LEAST, LATE_SHARE, OUTRUN, Delay, Workload
 
 MS = 1_000_000
 

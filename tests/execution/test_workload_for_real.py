@@ -8,15 +8,15 @@ from typing import Any
 
 import pytest
 
-from grader.core.trace import Trace
-from grader.execution.recording_session import RecordingSession
+from grader.runtime.model.trace import Trace
+from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
 from hostile import hostile, record
 
-from grader.core.quantities import NS_PER_S
-from grader.execution.virtual_runner import BUSY, OUTSIDE
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.worker.virtual_runner import BUSY, OUTSIDE
 
 pytestmark = pytest.mark.ros
 

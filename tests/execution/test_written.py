@@ -13,15 +13,15 @@ import pytest
 from hostile import hostile, record, staging
 from mcap.reader import make_reader
 
-from grader.core.errors import EnvironmentFault
-from grader.core.limits import Limits
-from grader.core.quantities import MIB
-from grader.core.trace import ClockKind, Trace, WrittenFile
-from grader.execution.beside import MOST_OF_SUBMISSION, whole_submission
-from grader.execution.evidence.recording_file import recording_bytes, trace_of
-from grader.execution.recording_session import RecordingSession, open_session
-from grader.execution.student_process import written_files
-from grader.student_host.written import ALL_BYTES, FILE_BYTES, FILES
+from grader.runtime.host.written import ALL_BYTES, FILE_BYTES, FILES
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import MIB
+from grader.runtime.model.trace import ClockKind, Trace, WrittenFile
+from grader.runtime.recording.recording_file import recording_bytes, trace_of
+from grader.runtime.session import RecordingSession, open_session
+from grader.runtime.worker.beside import MOST_OF_SUBMISSION, whole_submission
+from grader.runtime.worker.student_process import written_files
 
 S = 1_000_000_000
 Run = Callable[..., Trace]

@@ -7,8 +7,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import Fault, LogRecord, Message, OutputLine, Trace
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import Fault, LogRecord, Message, OutputLine, Trace
 
 #: Of the processes, this one is compared; the other one stands beside it.
 PROCESS = "a.py"

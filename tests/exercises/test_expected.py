@@ -9,8 +9,8 @@ from typing import Any
 from archive import builtin_exercises
 from sample_folders import GROUPS, SHAPES, collection_of, collections, expected, expected_in, folder_of
 
-from grader.core.exercise import Outcome
-from grader.rubrics.builtin import builtin_rubrics
+from grader.grading.model.exercise import Outcome
+from grader.grading.rubrics.builtin import builtin_rubrics
 
 NOT_PYTHON = {
     "broken/syntax_error",

@@ -13,9 +13,9 @@ import pytest
 from archive import judged, read_archive
 from sample_folders import ARCHIVE, EXERCISES, expected_in
 
-from grader.core.rubric_files import rubric_file, rubrics_in
-from grader.reporting.json_report import dumps
-from grader.rubrics.loader import read_rubric
+from grader.grading.model.rubric_files import rubric_file, rubrics_in
+from grader.grading.reporting.json_report import dumps
+from grader.grading.rubrics.loader import read_rubric
 
 ROOT = EXERCISES.parents[1]
 NAMES = sorted(path.name for path in EXERCISES.glob("[!_]*/"))
@@ -93,7 +93,9 @@ def test_what_an_exercise_brings_imports_the_public_door_alone(file: Path) -> No
         assert not [name for name in found if name.startswith("grader")]
 
 
-@pytest.mark.parametrize("line", ["import grader.core.trace", "from grader.judging import values", "from . import a"])
+@pytest.mark.parametrize(
+    "line", ["import grader.runtime.model.trace", "from grader.grading.judging import values", "from . import a"]
+)
 def test_another_import_is_found(line: str) -> None:
     """The rule can fail."""
     assert packages_in(ast.parse(line)) - set(sys.stdlib_module_names) != {"grader.api"}

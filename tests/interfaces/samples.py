@@ -9,7 +9,7 @@ from typing import Any
 
 from rosidl_parser import definition
 
-from grader.interfaces.runtime.codec import class_of, fields_of
+from grader.runtime.interfaces.runtime.codec import class_of, fields_of
 
 SHARE = Path(sys.prefix) / "share"
 LETTERS = string.ascii_letters + "äß€漢😀 "

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.interfaces.definitions import (
+from grader.runtime.interfaces.definitions import (
     MAXIMUM_DEFINITIONS,
     Definition,
     DefinitionError,

@@ -16,7 +16,7 @@ from samples import filled, installed_packages, message_classes
 from std_msgs.msg import Float64MultiArray
 from test_msgs import msg
 
-from grader.interfaces.runtime.codec import MalformedMessageError, class_of, codec_of, fields_of
+from grader.runtime.interfaces.runtime.codec import MalformedMessageError, class_of, codec_of, fields_of
 
 # The parser of ROS's generators, which generated classes load, uses a deprecated module.
 pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")

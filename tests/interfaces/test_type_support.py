@@ -10,9 +10,15 @@ import pytest
 import test_msgs
 from samples import SHARE, installed_packages, share_without
 
-from grader.execution.domains import shared_domains
-from grader.interfaces.build import BuiltInterfaces, build
-from grader.interfaces.definitions import Definition, DefinitionError, InterfacePackage, find_packages, shipped_packages
+from grader.runtime.domains import shared_domains
+from grader.runtime.interfaces.build import BuiltInterfaces, build
+from grader.runtime.interfaces.definitions import (
+    Definition,
+    DefinitionError,
+    InterfacePackage,
+    find_packages,
+    shipped_packages,
+)
 
 HERE = Path(__file__).parent
 PYTHON_PACKAGES = Path(test_msgs.__file__).parents[1]
@@ -260,8 +266,8 @@ def test_processes_that_build_the_same_at_once_agree(tmp_path: Path) -> None:
     (tmp_path / "mine" / "msg" / "Foo.msg").write_text("int32 a\n")
     text = f"""
 from pathlib import Path
-from grader.interfaces.build import build
-from grader.interfaces.definitions import find_packages
+from grader.runtime.interfaces.build import build
+from grader.runtime.interfaces.definitions import find_packages
 print(build(find_packages(Path({str(tmp_path / "mine")!r})), Path({str(tmp_path / "cache")!r}), [Path({str(SHARE)!r})]))
 """
     env = {**os.environ, "PYTHONPATH": str(HERE.parents[1])}

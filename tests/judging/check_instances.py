@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from tracing import ODOMETRY, TRIGGER, TWIST
 
-from grader.core.exercise import Check
-from grader.core.quantities import NS_PER_S
-from grader.judging.checks.graph import GraphEdge
-from grader.judging.checks.timing import ReactionCase
-from grader.judging.values import FieldRule
-from grader.rubrics.exercise_checks import known_checks
+from grader.grading.judging.checks.graph import GraphEdge
+from grader.grading.judging.checks.timing import ReactionCase
+from grader.grading.judging.values import FieldRule
+from grader.grading.model.exercise import Check
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.runtime.model.quantities import NS_PER_S
 
 CHECKS = known_checks()
 

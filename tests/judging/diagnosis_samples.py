@@ -23,13 +23,13 @@ from tracing import (
     velocity,
 )
 
-from grader.core.exercise import Exercise
-from grader.core.report import ExerciseReport, Verdict
-from grader.core.submission import StudentFile, Submission
-from grader.core.trace import Delivery, FaultKind, LogRecord, Trace
-from grader.judging.judge_run import judge_exercise
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.loader import read_rubric
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.model.exercise import Exercise
+from grader.grading.model.report import ExerciseReport, Verdict
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import Delivery, FaultKind, LogRecord, Trace
 
 HERE = Path(__file__).parent / "diagnosis"
 FLOAT64 = "std_msgs/msg/Float64"

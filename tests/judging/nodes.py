@@ -9,7 +9,7 @@ from typing import Any
 
 from tracing import FAN_VALUES, FLOAT32, TRIGGER, Recording, held_at, scripted
 
-from grader.core.trace import ClockKind
+from grader.runtime.model.trace import ClockKind
 
 # --- a controller of a fan ---
 

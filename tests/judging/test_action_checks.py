@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 from tracing import Recording
 
-from grader.core.errors import HarnessError
-from grader.core.quantities import NS_PER_S
-from grader.judging.checks.actions import ActionFeedback, ActionResult
-from grader.judging.findings import FAULT_KEY
-from grader.judging.values import FieldRule
+from grader.grading.judging.checks.actions import ActionFeedback, ActionResult
+from grader.grading.judging.findings import FAULT_KEY
+from grader.grading.judging.values import FieldRule
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_S
 
 NAME, TYPE = "/fibonacci", "test_msgs/action/Fibonacci"
 NUMBERS = [0, 1, 1, 2, 3, 5]

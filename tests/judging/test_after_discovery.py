@@ -4,14 +4,14 @@ from typing import Any
 
 import pytest
 
-from grader.core.exercise import ProblemKind
-from grader.core.trace import Trace
-from grader.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone, RandomInRange
-from grader.judging.checks.rate import TopicRate
-from grader.judging.checks.topics import FieldValues, Publishes, Transform
-from grader.judging.judge_run import unheard
-from grader.judging.summary import summarise
-from grader.reporting.observed import render_summary
+from grader.grading.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone, RandomInRange
+from grader.grading.judging.checks.rate import TopicRate
+from grader.grading.judging.checks.topics import FieldValues, Publishes, Transform
+from grader.grading.judging.judge_run import unheard
+from grader.grading.judging.summary import summarise
+from grader.grading.model.exercise import ProblemKind
+from grader.grading.reporting.observed import render_summary
+from grader.runtime.model.trace import Trace
 from grader.testing import TraceBuilder
 
 FLOAT, TF = "std_msgs/msg/Float32", "tf2_msgs/msg/TFMessage"

@@ -8,9 +8,9 @@ from collections.abc import Callable
 
 import pytest
 
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import ClockKind, FaultKind
-from grader.judging.agreement import Aspect, differences, sentence
+from grader.grading.judging.agreement import Aspect, differences, sentence
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import ClockKind, FaultKind
 from grader.testing import TraceBuilder
 
 TWIST, FLOAT = "geometry_msgs/msg/Twist", "std_msgs/msg/Float32"

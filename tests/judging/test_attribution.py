@@ -11,7 +11,7 @@ from fractions import Fraction
 import pytest
 from tracing import FLOAT32, FLOAT64, Recording, held_at, scripted
 
-from grader.judging.checks.received import LogsReceived, LogsValues
+from grader.grading.judging.checks.received import LogsReceived, LogsValues
 
 SPEEDS = (100.0, 0.0, 63.271, 17.448, 100.0)
 SPEED = LogsReceived("temperature_sensor.py", "/fan_speed")

@@ -11,19 +11,19 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.exercise import Check, Criterion, Exercise, Finding, of_beginning
-from grader.core.scenario import Scenario, Span
-from grader.core.submission import StudentFile, Submission
-from grader.core.trace import ClockKind, Request, Response, Trace
-from grader.judging.agreement import Aspect
-from grader.judging.beginnings import LENGTHS_NS, BeginningJudge, Comparison
-from grader.judging.checks.fields import FieldEqual, FieldFunction, RandomInRange
-from grader.judging.checks.logs import UsesLogger
-from grader.judging.checks.programs import CleanShutdown
-from grader.judging.checks.rate import TopicRate
-from grader.judging.checks.services import ServiceResponse
-from grader.judging.values import FieldRule
-from grader.rubrics.exercise_checks import known_checks
+from grader.grading.judging.agreement import Aspect
+from grader.grading.judging.beginnings import LENGTHS_NS, BeginningJudge, Comparison
+from grader.grading.judging.checks.fields import FieldEqual, FieldFunction, RandomInRange
+from grader.grading.judging.checks.logs import UsesLogger
+from grader.grading.judging.checks.programs import CleanShutdown
+from grader.grading.judging.checks.rate import TopicRate
+from grader.grading.judging.checks.services import ServiceResponse
+from grader.grading.judging.values import FieldRule
+from grader.grading.model.exercise import Check, Criterion, Exercise, Finding, of_beginning
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.runtime.model.scenario import Scenario, Span
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import ClockKind, Request, Response, Trace
 from grader.testing import TraceBuilder
 
 S = 1_000_000_000

@@ -21,19 +21,19 @@ from tracing import (
     velocity,
 )
 
-from grader.core.chart import Chart, Figure, GraphFigure, Look, Playback, Tone
-from grader.core.exercise import Exercise
-from grader.core.submission import StudentFile, Submission
-from grader.core.trace import FaultKind, Mark, Request, Response, Trace
-from grader.judging.charts import MOST_POINTS, MOST_TEXTS, kept_indices
-from grader.judging.checks import CHECKS
-from grader.judging.checks.rate import TopicRate
-from grader.judging.figures import expectation, figures_of, illustrated
-from grader.judging.judge_run import judge_exercise
-from grader.judging.recorded_values import MOST_SAMPLES, recorded_values
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.exercise_checks import known_checks
-from grader.rubrics.loader import read_rubric
+from grader.grading.judging.charts import MOST_POINTS, MOST_TEXTS, kept_indices
+from grader.grading.judging.checks import CHECKS
+from grader.grading.judging.checks.rate import TopicRate
+from grader.grading.judging.figures import expectation, figures_of, illustrated
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.judging.recorded_values import MOST_SAMPLES, recorded_values
+from grader.grading.model.chart import Chart, Figure, GraphFigure, Look, Playback, Tone
+from grader.grading.model.exercise import Exercise
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import FaultKind, Mark, Request, Response, Trace
 
 EXERCISES = {path.parent.name: read_rubric(path) for path in builtin_rubrics().values()}
 ONE, TWO, THREE = (EXERCISES[f"exercise_{n}"] for n in (1, 2, 3))

@@ -31,10 +31,14 @@ from tracing import FLOAT32, ODOMETRY, TWIST, Recording, position_logs, twist, v
 from wordings import RIGHT
 from wordings import WRONG as WRONG_POSITIONS
 
-from grader.core.errors import HarnessError
-from grader.core.exercise import Check, ask
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import (
+from grader.grading.judging.charts import MOST_CASES
+from grader.grading.judging.plots import chart_of
+from grader.grading.model.exercise import Check, ask
+from grader.grading.reporting.html.render import Columns, figure_values
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import (
     ClockKind,
     Delivery,
     Endpoint,
@@ -50,10 +54,6 @@ from grader.core.trace import (
     ServiceEnd,
     Trace,
 )
-from grader.judging.charts import MOST_CASES
-from grader.judging.plots import chart_of
-from grader.reporting.html.render import Columns, figure_values
-from grader.rubrics.exercise_checks import known_checks
 
 TRACES = {
     "velocity": velocity().log(0.0, "started"),

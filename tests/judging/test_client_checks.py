@@ -8,11 +8,11 @@ import pytest
 from nodes import BATTERY, CLIENT, asking, battery, chapter
 from tracing import TRIGGER, Recording
 
-from grader.core.errors import HarnessError
-from grader.core.quantities import NS_PER_MS, NS_PER_S
-from grader.core.trace import ClockKind
-from grader.judging.checks.clients import CallsOfClient, WaitsForService
-from grader.judging.findings import FAULT_KEY
+from grader.grading.judging.checks.clients import CallsOfClient, WaitsForService
+from grader.grading.judging.findings import FAULT_KEY
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
+from grader.runtime.model.trace import ClockKind
 
 CALLS = CallsOfClient(BATTERY, 5, period=NS_PER_S, tolerance=300 * NS_PER_MS)
 WAITS = WaitsForService(CLIENT, BATTERY)

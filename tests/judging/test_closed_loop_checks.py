@@ -8,12 +8,12 @@ from collections.abc import Callable
 import pytest
 from tracing import ODOMETRY, Recording
 
-from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Trace
-from grader.judging.checks.closed_loop import ReachesGoal, StaysInRange
-from grader.judging.plots import chart_of
+from grader.grading.judging.checks.closed_loop import ReachesGoal, StaysInRange
+from grader.grading.judging.plots import chart_of
+from grader.grading.model.exercise import Finding
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Mark, Trace
 
 SCAN = "sensor_msgs/msg/LaserScan"
 FIELDS = {"pose.pose.position.x": "x", "pose.pose.position.y": "y"}

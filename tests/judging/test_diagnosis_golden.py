@@ -24,14 +24,14 @@ from diagnosis_samples import (
 )
 from sample_folders import folders_in
 
-from grader.core.exercise import Outcome
-from grader.core.report import ExerciseReport, Verdict
-from grader.core.trace import Start, StartWay, Trace
-from grader.judging import judge_run
-from grader.judging.diagnosis import CAUSE_KEY, RULES
-from grader.judging.diagnosis.rules import FIRST, Case, Rule, in_order
-from grader.rubrics.builtin import builtin_exercises
-from grader.submissions.sources import source_text
+from grader.grading.judging import judge_run
+from grader.grading.judging.diagnosis import CAUSE_KEY, RULES
+from grader.grading.judging.diagnosis.rules import FIRST, Case, Rule, in_order
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import ExerciseReport, Verdict
+from grader.grading.rubrics.builtin import builtin_exercises
+from grader.grading.submissions.sources import source_text
+from grader.runtime.model.trace import Start, StartWay, Trace
 
 HERE = Path(__file__).parent
 #: The rules of the grader, and of the exercises that come with it.
@@ -152,7 +152,7 @@ def test_a_rule_that_fails_is_logged_and_passed_over(
 
     row = CRASHES[0]
     usual = lost(explained(row, crash_traces(row)))
-    monkeypatch.setattr("grader.judging.diagnosis.RULES", (Rule("fails", fails, fault=None), *RULES))
+    monkeypatch.setattr("grader.grading.judging.diagnosis.RULES", (Rule("fails", fails, fault=None), *RULES))
     assert lost(explained(row, crash_traces(row))) == usual
     assert caplog.messages[0] == f"the rule fails failed on the criterion {usual[0].id}"
 

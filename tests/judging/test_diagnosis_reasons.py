@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tracing import FAN_VALUES, Recording, scripted
 
-from grader.core.trace import FaultKind
-from grader.judging.checks.logs import UsesLogger
-from grader.rubrics.exercise_checks import known_checks
+from grader.grading.judging.checks.logs import UsesLogger
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.runtime.model.trace import FaultKind
 
 ON = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above")
 

@@ -14,15 +14,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from work import calls_in
 
-from grader.core.limits import MAX_SOURCE_BYTES
-from grader.core.submission import StudentFile, Submission
-from grader.core.trace import FaultKind, Trace
-from grader.judging import diagnosis
-from grader.judging.diagnosis import placed
-from grader.judging.diagnosis.rules import Case, Clue
-from grader.judging.diagnosis.wiring import constant, goes_to, made
-from grader.judging.source import LONGEST_SOURCE, chain, last_line, read
-from grader.submissions.sources import read_sources
+from grader.grading.judging import diagnosis
+from grader.grading.judging.diagnosis import placed
+from grader.grading.judging.diagnosis.rules import Case, Clue
+from grader.grading.judging.diagnosis.wiring import constant, goes_to, made
+from grader.grading.judging.source import LONGEST_SOURCE, chain, last_line, read
+from grader.grading.submissions.sources import read_sources
+from grader.runtime.model.limits import MAX_SOURCE_BYTES
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import FaultKind, Trace
 
 FILE = "velocity_publisher.py"
 DEEP = 3_000

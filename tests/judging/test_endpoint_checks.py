@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 from tracing import FLOAT32, FLOAT64, Recording
 
-from grader.core.errors import HarnessError
-from grader.core.exercise import Location, Problem, ProblemKind
-from grader.core.quantities import NS_PER_MS, NS_PER_S
-from grader.core.trace import FaultKind
-from grader.judging.checks.graph import BidirectionalGraph, GraphEdge, GraphEdges, NodeName, Qos, TopicNames
-from grader.judging.checks.programs import CleanShutdown, NoFault
-from grader.judging.diagnosis import RULES
-from grader.judging.findings import FAULT_KEY
+from grader.grading.judging.checks.graph import BidirectionalGraph, GraphEdge, GraphEdges, NodeName, Qos, TopicNames
+from grader.grading.judging.checks.programs import CleanShutdown, NoFault
+from grader.grading.judging.diagnosis import RULES
+from grader.grading.judging.findings import FAULT_KEY
+from grader.grading.model.exercise import Location, Problem, ProblemKind
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
+from grader.runtime.model.trace import FaultKind
 from grader.testing import explain
 
 

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from tracing import Recording
 
-from grader.core.quantities import NS_PER_S
-from grader.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone
-from grader.judging.checks.logs import LogsMatching
-from grader.judging.checks.topics import FieldValues
-from grader.judging.findings import FAULT_KEY
-from grader.judging.values import FieldRule
+from grader.grading.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone
+from grader.grading.judging.checks.logs import LogsMatching
+from grader.grading.judging.checks.topics import FieldValues
+from grader.grading.judging.findings import FAULT_KEY
+from grader.grading.judging.values import FieldRule
+from grader.runtime.model.quantities import NS_PER_S
 
 
 def sending(values: list[Any]) -> Recording:

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from grader.judging.series import FormulaError, curve
+from grader.grading.judging.series import FormulaError, curve
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable
 import pytest
 from tracing import FLOAT64, Recording, twist
 
-from grader.core.trace import ClockKind
-from grader.judging.checks.fields import FieldFunction
-from grader.judging.findings import FAULT_KEY
+from grader.grading.judging.checks.fields import FieldFunction
+from grader.grading.judging.findings import FAULT_KEY
+from grader.runtime.model.trace import ClockKind
 
 CHECK = FieldFunction("/joint_commands", "sin(0.1 * n)", tolerance=1e-6)
 DEGREES = 180 / math.pi

@@ -6,7 +6,7 @@ import pytest
 from nodes import graph
 from tracing import FLOAT64, Recording
 
-from grader.judging.checks.graph import BidirectionalGraph
+from grader.grading.judging.checks.graph import BidirectionalGraph
 
 CHECK = BidirectionalGraph("/temperature", "/fan_speed")
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from tracing import Recording
 
-from grader.core.errors import HarnessError
-from grader.core.quantities import NS_PER_MS
-from grader.core.trace import ClockKind
-from grader.judging.checks.heard import LogsResponse, LogsTexts
+from grader.grading.judging.checks.heard import LogsResponse, LogsTexts
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_MS
+from grader.runtime.model.trace import ClockKind
 
 TEXT, SUM = "std_msgs/msg/String", "example_interfaces/srv/AddTwoInts"
 TEXTS = LogsTexts("node.py", "/topic", within=200 * NS_PER_MS)

@@ -11,15 +11,15 @@ from typing import Any
 import pytest
 from tracing import ODOMETRY, TWIST, Recording, driving, position_logs, velocity
 
-from grader.core.exercise import Check, Criterion, Exercise, Finding, Location, Outcome
-from grader.core.report import ExerciseReport, Verdict
-from grader.core.scenario import Scenario, Span
-from grader.core.submission import StudentFile, Submission
-from grader.core.trace import ClockKind, FaultKind, Trace
-from grader.judging.checks import CHECKS
-from grader.judging.installation import lacking_package
-from grader.judging.judge_run import judge_exercise
-from grader.rubrics.exercise_checks import known_checks
+from grader.grading.judging.checks import CHECKS
+from grader.grading.judging.installation import lacking_package
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.model.exercise import Check, Criterion, Exercise, Finding, Location, Outcome
+from grader.grading.model.report import ExerciseReport, Verdict
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.runtime.model.scenario import Scenario, Span
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import ClockKind, FaultKind, Trace
 from grader.testing import TraceBuilder
 
 FILE = "velocity_publisher.py"

@@ -7,7 +7,7 @@ from tracing import ODOM_TIMES, Recording, position_logs
 from wordings import RIGHT, WRONG, Writer
 from work import calls_in
 
-from grader.rubrics.exercise_checks import known_checks
+from grader.grading.rubrics.exercise_checks import known_checks
 
 PERIOD = known_checks()["log_period"]("odom_subscriber.py", "/odom", 1_000_000_000)
 POSITION = known_checks()["logs_position"]("odom_subscriber.py", "/odom")

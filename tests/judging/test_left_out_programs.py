@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from grader.core.exercise import Check
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import (
+from grader.grading.judging.checks.graph import NodeName
+from grader.grading.judging.checks.rate import TopicRate
+from grader.grading.judging.checks.topics import Publishes, Subscribes
+from grader.grading.judging.launched import excuses
+from grader.grading.model.exercise import Check
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import (
     ClockKind,
     Delivery,
     Endpoint,
@@ -17,10 +21,6 @@ from grader.core.trace import (
     ServiceEnd,
     Trace,
 )
-from grader.judging.checks.graph import NodeName
-from grader.judging.checks.rate import TopicRate
-from grader.judging.checks.topics import Publishes, Subscribes
-from grader.judging.launched import excuses
 
 TWIST, TRIGGER = "geometry_msgs/msg/Twist", "std_srvs/srv/Trigger"
 PUBLISHES: Check = Publishes(topic="/cmd_vel", type=TWIST)

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from tracing import Recording
 
-from grader.core.errors import HarnessError
-from grader.judging.checks.actions import LifecycleStates
-from grader.judging.findings import FAULT_KEY
+from grader.grading.judging.checks.actions import LifecycleStates
+from grader.grading.judging.findings import FAULT_KEY
+from grader.runtime.model.errors import HarnessError
 
 CHANGE, GET = "lifecycle_msgs/srv/ChangeState", "lifecycle_msgs/srv/GetState"
 STATES = ("unconfigured", "inactive", "active", "inactive", "finalized")

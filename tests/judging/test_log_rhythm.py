@@ -9,9 +9,9 @@ from fractions import Fraction
 import pytest
 from tracing import FLOAT64, Recording
 
-from grader.core.trace import ClockKind
-from grader.judging.checks.logs import LogsEvery
-from grader.judging.findings import FAULT_KEY
+from grader.grading.judging.checks.logs import LogsEvery
+from grader.grading.judging.findings import FAULT_KEY
+from grader.runtime.model.trace import ClockKind
 
 CHECK = LogsEvery("simple_publisher.py", "/joint_commands", 10)
 Writes = Callable[[int, float], str]

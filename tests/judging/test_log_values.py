@@ -9,10 +9,10 @@ from fractions import Fraction
 import pytest
 from tracing import FLOAT64, Recording
 
-from grader.core.errors import HarnessError
-from grader.core.trace import ClockKind
-from grader.judging.checks.received import LogsValues
-from grader.judging.findings import FAULT_KEY
+from grader.grading.judging.checks.received import LogsValues
+from grader.grading.judging.findings import FAULT_KEY
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.trace import ClockKind
 
 DEGREES = 180 / math.pi
 CHECK = LogsValues("simple_subscriber.py", "/joint_commands", unit_factors=(1.0, DEGREES))

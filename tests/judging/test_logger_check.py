@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 from tracing import Recording
 
-from grader.judging.checks.logs import UsesLogger
+from grader.grading.judging.checks.logs import UsesLogger
 
 CHECK = UsesLogger("node.py")
 

@@ -21,12 +21,12 @@ from grader.api import (
     printed_lines,
     student_records,
 )
-from grader.core.exercise import Check, Criterion, Exercise
-from grader.core.report import Verdict
-from grader.core.scenario import Scenario, Span
-from grader.core.submission import StudentFile, Submission
-from grader.judging.checks.waiting import WaitsGracefully
-from grader.judging.judge_run import judge_exercise
+from grader.grading.judging.checks.waiting import WaitsGracefully
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.model.exercise import Check, Criterion, Exercise
+from grader.grading.model.report import Verdict
+from grader.runtime.model.scenario import Scenario, Span
+from grader.runtime.model.submission import StudentFile, Submission
 
 FILE = "listener.py"
 TYPE = "std_msgs/msg/Float32"

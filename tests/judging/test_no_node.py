@@ -6,8 +6,8 @@ from fractions import Fraction
 
 from tracing import TWIST, Recording
 
-from grader.core.trace import FaultKind
-from grader.judging.checks.logs import LogsMatching, UsesLogger
+from grader.grading.judging.checks.logs import LogsMatching, UsesLogger
+from grader.runtime.model.trace import FaultKind
 
 CHECK = UsesLogger("node.py")
 MATCHING = LogsMatching("node.py", "speed")

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from tracing import Recording
 
-from grader.core.errors import HarnessError
-from grader.judging.checks.programs import ParameterDeclared, ParameterTakesEffect
-from grader.judging.findings import FAULT_KEY
+from grader.grading.judging.checks.programs import ParameterDeclared, ParameterTakesEffect
+from grader.grading.judging.findings import FAULT_KEY
+from grader.runtime.model.errors import HarnessError
 
 GET, SET = "rcl_interfaces/srv/GetParameters", "rcl_interfaces/srv/SetParameters"
 DECLARED = ParameterDeclared("speed", value=0.5)

@@ -10,17 +10,17 @@ from typing import Any
 import pytest
 from tracing import Recording
 
-from grader.core.chart import Chart, Look, Panel, Playback, Tone
-from grader.core.exercise import Check, Criterion, Exercise, Finding
-from grader.core.scenario import Scenario, Span
-from grader.core.trace import Trace
-from grader.judging.charts import MOST_POINTS
-from grader.judging.checks import CHECKS
-from grader.judging.checks.timing import ReactionCase
-from grader.judging.figures import figures_of
-from grader.judging.findings import met
-from grader.judging.plots import Plot, chart_of, value_panels
-from grader.judging.values import FieldRule
+from grader.grading.judging.charts import MOST_POINTS
+from grader.grading.judging.checks import CHECKS
+from grader.grading.judging.checks.timing import ReactionCase
+from grader.grading.judging.figures import figures_of
+from grader.grading.judging.findings import met
+from grader.grading.judging.plots import Plot, chart_of, value_panels
+from grader.grading.judging.values import FieldRule
+from grader.grading.model.chart import Chart, Look, Panel, Playback, Tone
+from grader.grading.model.exercise import Check, Criterion, Exercise, Finding
+from grader.runtime.model.scenario import Scenario, Span
+from grader.runtime.model.trace import Trace
 
 OTHER = "course_msgs/msg/State"
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.judging.texts import clean, printed_numbers, template_of, with_decimal_points
+from grader.grading.judging.texts import clean, printed_numbers, template_of, with_decimal_points
 
 
 def values(text: str) -> list[float]:

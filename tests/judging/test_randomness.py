@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from grader.judging.series import pattern_of
+from grader.grading.judging.series import pattern_of
 
 
 def _walk(rng: random.Random, step: Callable[[], float]) -> Iterator[float]:

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tracing import TWIST, Recording, twist, velocity
 
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import ClockKind, Trace
-from grader.judging.checks.rate import TopicRate
+from grader.grading.judging.checks.rate import TopicRate
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import ClockKind, Trace
 
 RATE = TopicRate("/cmd_vel", 20.0, 1.0, 10 * NS_PER_S, 2.0)
 HALF = Fraction(1, 2)

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from tracing import Recording
 
-from grader.core.errors import HarnessError
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import ClockKind
-from grader.judging.checks.timing import Reaction, ReactionCase
-from grader.judging.findings import FAULT_KEY
-from grader.judging.values import FieldRule
+from grader.grading.judging.checks.timing import Reaction, ReactionCase
+from grader.grading.judging.findings import FAULT_KEY
+from grader.grading.judging.values import FieldRule
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import ClockKind
 
 TEXT, GOAL = "std_msgs/msg/String", "geometry_msgs/msg/PoseStamped"
 PLACES = {"kitchen": (2.0, 1.5), "office": (-1.0, 3.25)}

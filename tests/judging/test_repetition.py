@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.core.trace import (
+from grader.grading.judging.repetition import events, first_difference
+from grader.grading.model.verification import Cause, Difference, Kind
+from grader.runtime.model.trace import (
     ClockKind,
     Delivery,
     Endpoint,
@@ -26,11 +28,7 @@ from grader.core.trace import (
     StartWay,
     Trace,
 )
-from grader.core.trace import (
-    Tested as Outcome,
-)
-from grader.core.verification import Cause, Difference, Kind
-from grader.judging.repetition import events, first_difference
+from grader.runtime.model.trace import Tested as Outcome
 
 TWIST = "geometry_msgs/msg/Twist"
 SOURCE = """\

@@ -11,11 +11,11 @@ import pytest
 from nodes import SPEEDS, drawn, hearing, sensed
 from tracing import Recording, held_at, scripted
 
-from grader.core.errors import HarnessError
-from grader.core.exercise import Problem, ProblemKind
-from grader.core.quantities import NS_PER_S
-from grader.judging.checks.fields import RandomInRange
-from grader.judging.checks.received import LogsReceived
+from grader.grading.judging.checks.fields import RandomInRange
+from grader.grading.judging.checks.received import LogsReceived
+from grader.grading.model.exercise import Problem, ProblemKind
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_S
 
 RANGE = RandomInRange("/temperature", 20, 30, unit="°C")
 LOGS = LogsReceived("temperature_sensor.py", "/fan_speed")

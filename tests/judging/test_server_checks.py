@@ -10,17 +10,12 @@ import pytest
 from nodes import BATTERY, answering, asked, levels, status
 from tracing import TRIGGER, Recording
 
-from grader.core.errors import HarnessError
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import ClockKind
-from grader.judging.checks.services import (
-    ServiceAnswersAll,
-    ServiceAvailable,
-    ServiceFunction,
-    ServiceResponse,
-)
-from grader.judging.findings import FAULT_KEY
-from grader.judging.values import FieldRule
+from grader.grading.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceFunction, ServiceResponse
+from grader.grading.judging.findings import FAULT_KEY
+from grader.grading.judging.values import FieldRule
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import ClockKind
 
 FORM = FieldRule(pattern=r"Battery: [0-9]+\.[0-9]% remaining", example="Battery: 84.5% remaining")
 AVAILABLE = ServiceAvailable(BATTERY, TRIGGER)

@@ -10,12 +10,12 @@ import pytest
 from check_instances import INSTANCES
 from tracing import TRIGGER, Recording
 
-from grader.core.exercise import Criterion, Exercise, Outcome, ProblemKind
-from grader.core.quantities import NS_PER_S
-from grader.core.report import Verdict
-from grader.core.scenario import Scenario, Span
-from grader.core.submission import StudentFile, Submission
-from grader.judging.judge_run import judge_exercise
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.model.exercise import Criterion, Exercise, Outcome, ProblemKind
+from grader.grading.model.report import Verdict
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.scenario import Scenario, Span
+from grader.runtime.model.submission import StudentFile, Submission
 
 FILE, SERVICE = "node.py", "/battery/get_status"
 CREATED = {"service": "create_service(Trigger, NAME, self.tell", "client": "create_client(Trigger, NAME"}

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from diagnosis_samples import RIGHT, exercise_of, rows, rubric_of, spoilt
 
-from grader.app.grade import grade_in
-from grader.app.request import GradeRequest
-from grader.core.exercise import Outcome
-from grader.core.report import Report, Verdict
-from grader.execution.recording_session import RecordingSession, open_session
-from grader.judging.diagnosis import CAUSE_KEY
+from grader.grading.app.grade import grade_in
+from grader.grading.app.request import GradeRequest
+from grader.grading.judging.diagnosis import CAUSE_KEY
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Report, Verdict
+from grader.runtime.session import RecordingSession, open_session
 
 SLIPS = rows("slips.yaml")
 TABLES = [*SLIPS, *rows("crashes.yaml"), *rows("behaviours.yaml")]

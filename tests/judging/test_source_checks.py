@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from tracing import Recording
 
-from grader.core.errors import HarnessError
-from grader.core.exercise import Criterion, Exercise, Location, Outcome
-from grader.core.quantities import NS_PER_S
-from grader.core.scenario import Scenario, Span
-from grader.core.submission import StudentFile, Submission
-from grader.core.trace import FaultKind
-from grader.judging.checks.programs import SourceAvoids, SourceUses
-from grader.judging.findings import FAULT_KEY
-from grader.judging.judge_run import judge_exercise
+from grader.grading.judging.checks.programs import SourceAvoids, SourceUses
+from grader.grading.judging.findings import FAULT_KEY
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.model.exercise import Criterion, Exercise, Location, Outcome
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.scenario import Scenario, Span
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.model.trace import FaultKind
 
 NODE = "rclpy.node.Node"
 USES = SourceUses("node.py", (NODE,), ("create_timer", "rclpy.spin"))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from grader.core.trace import ClockKind, Fault, FaultKind, Start, StartWay, Trace
-from grader.judging.findings import fault_sentence
-from grader.judging.judge_run import started
+from grader.grading.judging.findings import fault_sentence
+from grader.grading.judging.judge_run import started
+from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Start, StartWay, Trace
 
 
 @pytest.mark.parametrize(

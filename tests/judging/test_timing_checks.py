@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from tracing import Recording
 
-from grader.core.errors import HarnessError
-from grader.core.quantities import NS_PER_MS, NS_PER_S
-from grader.core.trace import ClockKind
-from grader.judging.checks.timing import Latency, Period, Silence
-from grader.judging.findings import FAULT_KEY
+from grader.grading.judging.checks.timing import Latency, Period, Silence
+from grader.grading.judging.findings import FAULT_KEY
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
+from grader.runtime.model.trace import ClockKind
 
 GAPS = Period("/a", least=90 * NS_PER_MS, largest=200 * NS_PER_MS, average=100 * NS_PER_MS)
 SOON = Latency("/in", "/out", 300 * NS_PER_MS)

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tracing import FLOAT32, ODOMETRY, TWIST, Recording, twist, velocity
 
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import FaultKind
-from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
+from grader.grading.judging.checks.topics import FieldValues, Publishes, Subscribes
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import FaultKind
 
 PUBLISHES = Publishes("/cmd_vel", TWIST)
 SUBSCRIBES = Subscribes("/odom", ODOMETRY)

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from tracing import Recording
 
-from grader.judging.checks.topics import Transform
-from grader.judging.findings import FAULT_KEY
+from grader.grading.judging.checks.topics import Transform
+from grader.grading.judging.findings import FAULT_KEY
 
 TF = "tf2_msgs/msg/TFMessage"
 HALF = math.sqrt(0.5)

@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 from tracing import TWIST, Recording
 
-from grader.core.exercise import Finding
-from grader.execution.interfaces import number_message, numeric_field
-from grader.judging.checks.fields import RandomInRange
-from grader.judging.checks.received import LogsReceived
-from grader.judging.values import number_of, number_path, published
-from grader.rubrics.exercise_checks import known_checks
+from grader.grading.judging.checks.fields import RandomInRange
+from grader.grading.judging.checks.received import LogsReceived
+from grader.grading.judging.values import number_of, number_path, published
+from grader.grading.model.exercise import Finding
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.runtime.message_classes import number_message, numeric_field
 
 ThresholdResponse, AnswersTogether = (known_checks()[name] for name in ("threshold_response", "answers_together"))
 

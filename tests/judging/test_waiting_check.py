@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from tracing import driving, position_logs
 
-from grader.core.errors import HarnessError
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import FaultKind
-from grader.judging.checks.waiting import WaitsGracefully
+from grader.grading.judging.checks.waiting import WaitsGracefully
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import FaultKind
 
 WAITS = WaitsGracefully("odom_subscriber.py", "/odom", 5 * NS_PER_S)
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from grader.core.quantities import nanoseconds
-from grader.core.trace import (
+from grader.runtime.model.quantities import nanoseconds
+from grader.runtime.model.trace import (
     ClockKind,
     Delivery,
     Endpoint,
@@ -25,7 +25,7 @@ from grader.core.trace import (
     ServiceEnd,
     Trace,
 )
-from grader.execution.ending import exited
+from grader.runtime.worker.ending import exited
 
 TWIST = "geometry_msgs/msg/Twist"
 ODOMETRY = "nav_msgs/msg/Odometry"

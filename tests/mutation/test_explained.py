@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.errors import RubricError
-from grader.core.rubric_files import notes_on, rubric_of
-from grader.mutation.explained import Explained, read_explained
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.loader import read_rubric
+from grader.course.mutation.explained import Explained, read_explained
+from grader.grading.model.rubric_files import notes_on, rubric_of
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.errors import RubricError
 
 EXERCISE = read_rubric(builtin_rubrics()["velocity_publisher"])
 GOOD = """\

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from grader.mutation.operators import OPERATORS, mutants_of
-from grader.mutation.operators.program import Candidate
-from grader.mutation.results import one_line_change
+from grader.course.mutation.operators import OPERATORS, mutants_of
+from grader.course.mutation.operators.program import Candidate
+from grader.course.mutation.results import one_line_change
 
 #: A program with a publisher, a subscription and a timer.
 NODE = '''\

@@ -11,13 +11,13 @@ from typing import Any
 import jsonschema
 import pytest
 
-import grader.mutation
-from grader.core.exercise import Outcome
-from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change, unified_change
-from grader.mutation.showing import render_results, results_to_json
+import grader.course.mutation
+from grader.course.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change, unified_change
+from grader.course.mutation.showing import render_results, results_to_json
+from grader.grading.model.exercise import Outcome
 
 MET, PARTLY, NOT_MET, BLOCKED, UNDECIDED = Outcome
-SCHEMA = json.loads((Path(grader.mutation.__file__).parent / "selftest.schema.json").read_text(encoding="utf-8"))
+SCHEMA = json.loads((Path(grader.course.mutation.__file__).parent / "selftest.schema.json").read_text(encoding="utf-8"))
 
 
 def trial_result(rate: Outcome = MET, speed: Outcome = MET) -> TrialResult:

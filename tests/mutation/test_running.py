@@ -12,12 +12,12 @@ import pytest
 from click.testing import CliRunner
 
 from grader.cli.main import app
-from grader.core.errors import RubricError
-from grader.mutation.operators.program import Candidate
-from grader.mutation.running import SelftestOptions, _sampled, _sources, selftest
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.loader import read_rubric
-from grader.submissions.submission import stage_submission
+from grader.course.mutation.operators.program import Candidate
+from grader.course.mutation.running import SelftestOptions, _sampled, _sources, selftest
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.loader import read_rubric
+from grader.grading.submissions.submission import stage_submission
+from grader.runtime.model.errors import RubricError
 
 #: Mutants of each of our rubrics in this test; `grade selftest rubrics/*/` by hand runs them all. Of a rubric with
 #: many scenarios fewer are tried, for each is recorded in most of them.

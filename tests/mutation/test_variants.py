@@ -6,9 +6,9 @@ import ast
 
 import pytest
 
-from grader.mutation.operators.program import Program
-from grader.mutation.operators.variants import VARIANTS, variants_of
-from grader.mutation.results import one_line_change
+from grader.course.mutation.operators.program import Program
+from grader.course.mutation.operators.variants import VARIANTS, variants_of
+from grader.course.mutation.results import one_line_change
 
 NODE = """\
 import rclpy

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.errors import GraderError
-from grader.core.exercise import Outcome
-from grader.mutation.explained import Explained, read_explained
-from grader.mutation.results import SelftestResult, Trial, TrialResult
-from grader.mutation.writing import noted, pattern_of
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.loader import read_rubric
+from grader.course.mutation.explained import Explained, read_explained
+from grader.course.mutation.results import SelftestResult, Trial, TrialResult
+from grader.course.mutation.writing import noted, pattern_of
+from grader.grading.model.exercise import Outcome
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.errors import GraderError
 
 EXERCISE = read_rubric(builtin_rubrics()["velocity_publisher"])
 OUTCOMES = {criterion.id: Outcome.MET for criterion in EXERCISE.criteria}

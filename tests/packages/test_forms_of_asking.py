@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from grading import grade_until_decided
 
-from grader.app.observe import ObserveRequest, observe
-from grader.app.programs import find_targets, stage
-from grader.app.request import GradeRequest
-from grader.core.errors import SubmissionError
-from grader.core.quantities import NS_PER_S
-from grader.execution.executables import find_executable
-from grader.submissions.projects import read_projects
-from grader.submissions.submission import stage_submission
+from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.programs import find_targets, stage
+from grader.grading.app.request import GradeRequest
+from grader.grading.submissions.projects import read_projects
+from grader.grading.submissions.submission import stage_submission
+from grader.runtime.model.errors import SubmissionError
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.programs.executables import find_executable
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "cases" / "fidelity"
 NODE = """#!/usr/bin/env python3
@@ -313,7 +313,7 @@ def test_files_that_are_named_together_are_the_ones_that_run(tmp_path: Path, sha
 
 def test_files_of_different_places_run_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where their common folder holds too much, each is staged with its own package."""
-    monkeypatch.setattr("grader.submissions.staging.MAX_ENTRIES", 40)
+    monkeypatch.setattr("grader.grading.submissions.staging.MAX_ENTRIES", 40)
     write({f"full/{n}.txt": "" for n in range(50)}, tmp_path / "all")
     one = write(python("drive", "talker"), tmp_path / "all" / "one") / "src/drive/drive/talker.py"
     two = write({"talker.py": NODE.format(name="t", text="loose")}, tmp_path / "all" / "two") / "talker.py"

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.submission import StudentFile
-from grader.execution.executables import find_executable
-from grader.submissions.projects import read_projects
-from grader.submissions.submission import stage_submission
+from grader.grading.submissions.projects import read_projects
+from grader.grading.submissions.submission import stage_submission
+from grader.runtime.model.submission import StudentFile
+from grader.runtime.programs.executables import find_executable
 
 WORKSPACE = Path(__file__).resolve().parent / "workspace"
 NODES = "src/robot/robot/nodes.py"

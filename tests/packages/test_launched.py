@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from grading import grade_until_decided
 
-from grader.app.request import GradeRequest
-from grader.core.exercise import Outcome
-from grader.core.report import ExerciseReport
+from grader.grading.app.request import GradeRequest
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import ExerciseReport
 
 pytestmark = pytest.mark.ros
 

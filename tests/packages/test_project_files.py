@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.projects import Project
-from grader.execution import contained
-from grader.execution.executables import executables, find_executable
-from grader.execution.ros_installation import RosInstallation
-from grader.execution.shares import install_shares
-from grader.submissions import projects
-from grader.submissions.projects import read_projects
+from grader.grading.submissions import projects
+from grader.grading.submissions.projects import read_projects
+from grader.runtime.model.projects import Project
+from grader.runtime.programs.executables import executables, find_executable
+from grader.runtime.programs.shares import install_shares
+from grader.runtime.ros_installation import RosInstallation
+from grader.runtime.supervisor import contained
 
 COSTLY = "setup.py: not read, because that would take too much memory or time"
 INVALID = "setup.py: not valid, so what is declared there is not used"
@@ -209,7 +209,7 @@ def test_a_trusted_process_stays_small_whatever_the_files_are(tmp_path: Path) ->
     code = r"""
 import re, resource, sys
 from pathlib import Path
-from grader.submissions.projects import read_projects
+from grader.grading.submissions.projects import read_projects
 for root in sys.argv[1:]:
     read_projects(Path(root))
 # getrusage(2) tells of this process what the test's own had when it forked

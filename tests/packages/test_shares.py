@@ -9,10 +9,10 @@ import pytest
 from grading import grade_until_decided
 from ruamel.yaml import YAML
 
-from grader.app.request import GradeRequest
-from grader.execution.ros_installation import RosInstallation
-from grader.execution.shares import install_shares
-from grader.submissions.projects import read_projects
+from grader.grading.app.request import GradeRequest
+from grader.grading.submissions.projects import read_projects
+from grader.runtime.programs.shares import install_shares
+from grader.runtime.ros_installation import RosInstallation
 
 HERE = Path(__file__).resolve().parent
 WORKSPACE = HERE / "workspace"

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from grading import grade_until_decided
 
-from grader.app.request import GradeRequest
-from grader.core.report import Outcome, Report
-from grader.rubrics.loader import read_rubric
+from grader.grading.app.request import GradeRequest
+from grader.grading.model.report import Outcome, Report
+from grader.grading.rubrics.loader import read_rubric
 
 HERE = Path(__file__).resolve().parent
 RUBRIC = HERE / "rubrics" / "started.yaml"

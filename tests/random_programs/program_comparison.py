@@ -12,10 +12,10 @@ from program_description import Program, Spinning
 from program_model import Expected, expected_of
 from program_text import file_of
 
-from grader.core.trace import Fault, LogRecord, Message, OutputLine, Trace
-from grader.execution.plan import Plan
-from grader.execution.recording_session import RecordingSession
-from grader.execution.supervisor import Job
+from grader.runtime.model.trace import Fault, LogRecord, Message, OutputLine, Trace
+from grader.runtime.plan import Plan
+from grader.runtime.session import RecordingSession
+from grader.runtime.supervisor.supervisor import Job
 
 NS_PER_MS = 1_000_000
 #: By how much a time on the wall clock may be wrong, beyond the late start of its process.

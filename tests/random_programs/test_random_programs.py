@@ -16,7 +16,7 @@ from program_comparison import compared, differences_of_each
 from program_description import Program
 from program_strategy import drawn
 
-from grader.execution.recording_session import RecordingSession, open_session
+from grader.runtime.session import RecordingSession, open_session
 
 pytestmark = pytest.mark.ros
 

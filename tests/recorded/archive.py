@@ -12,17 +12,17 @@ from typing import Any
 
 from sample_folders import ARCHIVE, collections
 
-from grader.app.request import command_words, request_of
-from grader.core.chart import Chart, Panel, Series
-from grader.core.exercise import Exercise
-from grader.core.report import Report
-from grader.execution.evidence import manifest as kept
-from grader.execution.evidence.packed import unpack
-from grader.execution.evidence.recording_file import packed_trace
-from grader.execution.evidence.store import run_from
-from grader.judging.judge_run import judge_run
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.loader import read_rubric
+from grader.grading.app.request import command_words, request_of
+from grader.grading.evidence import manifest as kept
+from grader.grading.evidence.store import run_from
+from grader.grading.judging.judge_run import judge_run
+from grader.grading.model.chart import Chart, Panel, Series
+from grader.grading.model.exercise import Exercise
+from grader.grading.model.report import Report
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.recording.packed import unpack
+from grader.runtime.recording.recording_file import packed_trace
 
 #: The seed of all recordings and golden texts.
 SEED = 1

@@ -20,7 +20,7 @@ from archive import SEED, Recorded, charted, judged, recorded_in, recorded_of, t
 from ruamel.yaml import YAML
 from sample_folders import ARCHIVE, CHARTS, GOLDEN, collection_of, collections, expected, expected_in, table
 
-from grader.reporting.json_report import dumps
+from grader.grading.reporting.json_report import dumps
 
 GRADE = str(Path(sys.executable).with_name("grade"))
 

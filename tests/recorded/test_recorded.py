@@ -8,8 +8,8 @@ import pytest
 from archive import charted, judged, outcomes, outdated, read_archive, recordings, told, write_archive
 from sample_folders import expected, golden, golden_charts
 
-from grader.reporting.html.render import render_html
-from grader.reporting.json_report import dumps
+from grader.grading.reporting.html.render import render_html
+from grader.grading.reporting.json_report import dumps
 
 AGAIN = "python tests/recorded/record.py"
 

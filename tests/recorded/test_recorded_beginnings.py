@@ -10,13 +10,13 @@ from dataclasses import replace
 from archive import Recorded, builtin_exercises, recordings
 from sample_folders import expected
 
-from grader.core.quantities import NS_PER_MS
-from grader.core.trace import ClockKind, LogRecord, Message, Observation, OutputLine, Request, Response, Trace
-from grader.execution.evidence import manifest as kept
-from grader.execution.evidence.packed import unpack
-from grader.execution.evidence.store import run_from
-from grader.judging.agreement import start_of
-from grader.judging.beginnings import CUTS_NS, BeginningJudge, Comparison, cut
+from grader.grading.evidence import manifest as kept
+from grader.grading.evidence.store import run_from
+from grader.grading.judging.agreement import start_of
+from grader.grading.judging.beginnings import CUTS_NS, BeginningJudge, Comparison, cut
+from grader.runtime.model.quantities import NS_PER_MS
+from grader.runtime.model.trace import ClockKind, LogRecord, Message, Observation, OutputLine, Request, Response, Trace
+from grader.runtime.recording.packed import unpack
 
 #: How late what a node does is noticed at most, and how long messages are lost at the start.
 LATE_NS, LOST_NS = 25 * NS_PER_MS, 300 * NS_PER_MS

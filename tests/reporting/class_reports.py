@@ -11,10 +11,10 @@ from typing import Any
 from report_samples import exercise as sample
 from report_samples import report
 
-from grader.core.exercise import Criterion, Exercise, Location, Outcome
-from grader.core.report import ExerciseReport, Report, ReportedFault, Verdict
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.loader import read_rubric
+from grader.grading.model.exercise import Criterion, Exercise, Location, Outcome
+from grader.grading.model.report import ExerciseReport, Report, ReportedFault, Verdict
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.loader import read_rubric
 
 #: Criterion -> (likelihood in percent, diagnosis, reason, hint); {a} and {b} are drawn.
 MISTAKES = {

@@ -5,11 +5,11 @@ from fractions import Fraction
 from importlib.resources import files
 from typing import Any
 
-from grader.core.checkup import PROPERTIES, Property
-from grader.core.exercise import Location, Outcome
-from grader.core.report import Environment, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
-from grader.core.trace import ClockKind, Endpoint, GraphSnapshot
-from grader.reporting.platforms.classroom50 import HandedIn
+from grader.grading.model.exercise import Location, Outcome
+from grader.grading.model.report import Environment, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
+from grader.grading.reporting.platforms.classroom50 import HandedIn
+from grader.runtime.model.checkup import PROPERTIES, Property
+from grader.runtime.model.trace import ClockKind, Endpoint, GraphSnapshot
 
 VIRTUAL = ClockKind.VIRTUAL
 ENVIRONMENT = Environment(
@@ -321,5 +321,7 @@ SAMPLES = {
 
 def report_schema() -> dict[str, Any]:
     """Return the JSON Schema of reports that the package holds."""
-    schema: dict[str, Any] = json.loads((files("grader.reporting") / "report.schema.json").read_text(encoding="utf-8"))
+    schema: dict[str, Any] = json.loads(
+        (files("grader.grading.reporting") / "report.schema.json").read_text(encoding="utf-8")
+    )
     return schema

@@ -14,14 +14,14 @@ from added_packages import files_of, grade, installed, made_importable, register
 from click.testing import CliRunner, Result
 from report_samples import hostile, middling
 
-from grader.app.doctor import _added
 from grader.cli.completion import complete_output
 from grader.cli.main import app
-from grader.core.entry_points import FORMATS as GROUP
-from grader.core.errors import EnvironmentFault
-from grader.reporting.audience import ANYBODY
-from grader.reporting.delivery import Output, deliver, early_delivery, prepared
-from grader.reporting.formats import FORMATS, PageLayout, added_formats, format_of, rendered
+from grader.grading.app.doctor import _added
+from grader.grading.model.entry_points import FORMATS as GROUP
+from grader.grading.reporting.audience import ANYBODY
+from grader.grading.reporting.delivery import Output, deliver, early_delivery, prepared
+from grader.grading.reporting.formats import FORMATS, PageLayout, added_formats, format_of, rendered
+from grader.runtime.model.errors import EnvironmentFault
 
 LAYOUT = PageLayout(100, colour=False)
 GOOD = """

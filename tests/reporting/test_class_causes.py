@@ -11,15 +11,15 @@ import pytest
 from report_samples import report as whole
 from tracing import TWIST, Recording, twist
 
-from grader.core.exercise import Check, Criterion, Exercise
-from grader.core.quantities import Hertz
-from grader.core.scenario import Scenario, Span
-from grader.core.submission import StudentFile, Submission
-from grader.judging.checks.logs import UsesLogger
-from grader.judging.checks.rate import TopicRate
-from grader.judging.judge_run import judge_exercise
-from grader.reporting.class_page.causes import CauseKind, causes, kind_of
-from grader.reporting.json_report import report_to_json
+from grader.grading.judging.checks.logs import UsesLogger
+from grader.grading.judging.checks.rate import TopicRate
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.model.exercise import Check, Criterion, Exercise
+from grader.grading.reporting.class_page.causes import CauseKind, causes, kind_of
+from grader.grading.reporting.json_report import report_to_json
+from grader.runtime.model.quantities import Hertz
+from grader.runtime.model.scenario import Scenario, Span
+from grader.runtime.model.submission import StudentFile, Submission
 
 FILE = "node.py"
 

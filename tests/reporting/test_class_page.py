@@ -16,7 +16,7 @@ from urllib.parse import unquote
 import class_reports
 import pytest
 
-from grader.reporting.class_page.contents import (
+from grader.grading.reporting.class_page.contents import (
     ClassPage,
     Listing,
     PageEntry,
@@ -26,10 +26,10 @@ from grader.reporting.class_page.contents import (
     distribution,
     exercise_counts,
 )
-from grader.reporting.class_page.render import class_assets, page_link, render_class, result_link
-from grader.reporting.html.class_links import ClassLinks, with_class_links
-from grader.reporting.html.render import render_html
-from grader.reporting.json_report import report_to_json
+from grader.grading.reporting.class_page.render import class_assets, page_link, render_class, result_link
+from grader.grading.reporting.html.class_links import ClassLinks, with_class_links
+from grader.grading.reporting.html.render import render_html
+from grader.grading.reporting.json_report import report_to_json
 
 HOSTILE = (
     "</script><script>alert(1)</script>",

@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 from report_samples import criterion, endpoint, exercise, hostile, report
 
-from grader.core.chart import Chart, Excerpt, GraphFigure, Panel, Series, Stage
-from grader.core.exercise import Audience, Feedback, Location, Outcome, Problem, ProblemKind, Shows
-from grader.core.report import Report, ReportedFault, Reproduction
-from grader.core.trace import ClockKind, GraphSnapshot
-from grader.reporting.audience import Readers, for_student, told, withholds
-from grader.reporting.formats import FORMATS, PageLayout, rendered
-from grader.reporting.platforms.classroom50 import COMMIT_DATETIME, VARIABLES
+from grader.grading.model.chart import Chart, Excerpt, GraphFigure, Panel, Series, Stage
+from grader.grading.model.exercise import Audience, Feedback, Location, Outcome, Problem, ProblemKind, Shows
+from grader.grading.model.report import Report, ReportedFault, Reproduction
+from grader.grading.reporting.audience import Readers, for_student, told, withholds
+from grader.grading.reporting.formats import FORMATS, PageLayout, rendered
+from grader.grading.reporting.platforms.classroom50 import COMMIT_DATETIME, VARIABLES
+from grader.runtime.model.trace import ClockKind, GraphSnapshot
 
 #: The formats that students read without a word, and those that instructors read, as a page tells both.
 PUBLISHED = [

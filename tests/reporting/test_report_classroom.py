@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_samples import SAMPLES, exercise, hostile, middling, perfect, report, undecided
 
-from grader.core.exercise import Outcome
-from grader.core.report import Report, Verdict
-from grader.reporting.platforms.classroom import MOST_ROWS, render_classroom
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Report, Verdict
+from grader.grading.reporting.platforms.classroom import MOST_ROWS, render_classroom
 
 
 def result(sample: Report) -> dict[str, Any]:

@@ -11,9 +11,9 @@ import jsonschema
 import pytest
 from report_samples import HANDED_IN, SAMPLES, criterion, exercise, middling, report, undecided
 
-from grader.core.exercise import Outcome
-from grader.core.report import Report, Verdict
-from grader.reporting.platforms.classroom50 import render_classroom50
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Report, Verdict
+from grader.grading.reporting.platforms.classroom50 import render_classroom50
 
 SCHEMA = Path(__file__).resolve().parents[3] / "shared" / "formats" / "classroom50-result-v1.schema.json"
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from report_samples import hostile, middling, partial
 
-from grader.core.errors import GraderError
-from grader.reporting import delivery
-from grader.reporting.delivery import Output, deliver, early_delivery, prepared
-from grader.reporting.formats import FORMATS
-from grader.reporting.platforms.classroom50 import VARIABLES
+from grader.grading.reporting import delivery
+from grader.grading.reporting.delivery import Output, deliver, early_delivery, prepared
+from grader.grading.reporting.formats import FORMATS
+from grader.grading.reporting.platforms.classroom50 import VARIABLES
+from grader.runtime.model.errors import GraderError
 
 HANDED_IN = {
     **dict.fromkeys(VARIABLES.values(), "x"),

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.files import write_whole
-from grader.reporting.delivery import check_writable
+from grader.grading.reporting.delivery import check_writable
+from grader.runtime.files import write_whole
 
 
 def test_a_new_file_has_the_usual_mode(tmp_path: Path) -> None:

@@ -7,9 +7,9 @@ import unicodedata
 
 import pytest
 
-from grader.core.checkup import PROPERTIES, Checkup, Exchange, Fact, Property, TierReport
-from grader.core.limits import Limits
-from grader.reporting.doctor import checkup_to_json, render_checkup
+from grader.grading.reporting.doctor import checkup_to_json, render_checkup
+from grader.runtime.model.checkup import PROPERTIES, Checkup, Exchange, Fact, Property, TierReport
+from grader.runtime.model.limits import Limits
 
 WORKS = Exchange("bubblewrap", 10, 10, 1.25)
 HOLDS = TierReport(

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.reporting.escape import ELLIPSIS, LIMIT, encoded, shown, valid_unicode
+from grader.grading.reporting.escape import ELLIPSIS, LIMIT, encoded, shown, valid_unicode
 
 ANYTHING = st.text(alphabet=st.characters(), max_size=200)  # surrogates included
 

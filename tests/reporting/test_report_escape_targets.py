@@ -20,7 +20,7 @@ from cmarkgfm.cmark import Options
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from grader.reporting.escape import (
+from grader.grading.reporting.escape import (
     ELLIPSIS,
     csv_cell,
     json_value,

@@ -9,10 +9,16 @@ import pytest
 from report_samples import criterion, exercise, report
 from test_report_html import MARKUP, Page
 
-from grader.core.exercise import Audience, Location, Outcome
-from grader.core.report import Report
-from grader.reporting.html.final_mark import CriterionMark, FinalMark, ScoreShown, render_refusal, with_final_mark
-from grader.reporting.html.render import render_html, score_shown
+from grader.grading.model.exercise import Audience, Location, Outcome
+from grader.grading.model.report import Report
+from grader.grading.reporting.html.final_mark import (
+    CriterionMark,
+    FinalMark,
+    ScoreShown,
+    render_refusal,
+    with_final_mark,
+)
+from grader.grading.reporting.html.render import render_html, score_shown
 
 POINTS = "pump/rate"
 

@@ -14,19 +14,19 @@ from pathlib import Path
 import pytest
 from report_samples import HANDED_IN, SAMPLES, hostile, middling, partial, perfect, undecided
 
-from grader.core.exercise import Audience
-from grader.core.report import Report
-from grader.reporting.formats import FORMATS, PageLayout
-from grader.reporting.html.render import render_html
-from grader.reporting.json_report import dumps
-from grader.reporting.junit import render_junit
-from grader.reporting.markdown import render_markdown
-from grader.reporting.platforms.classroom import render_classroom
-from grader.reporting.platforms.classroom50 import render_classroom50
-from grader.reporting.platforms.github import render_github
-from grader.reporting.platforms.gradescope import render_gradescope
-from grader.reporting.platforms.prairielearn import render_prairielearn
-from grader.reporting.text import render_text
+from grader.grading.model.exercise import Audience
+from grader.grading.model.report import Report
+from grader.grading.reporting.formats import FORMATS, PageLayout
+from grader.grading.reporting.html.render import render_html
+from grader.grading.reporting.json_report import dumps
+from grader.grading.reporting.junit import render_junit
+from grader.grading.reporting.markdown import render_markdown
+from grader.grading.reporting.platforms.classroom import render_classroom
+from grader.grading.reporting.platforms.classroom50 import render_classroom50
+from grader.grading.reporting.platforms.github import render_github
+from grader.grading.reporting.platforms.gradescope import render_gradescope
+from grader.grading.reporting.platforms.prairielearn import render_prairielearn
+from grader.grading.reporting.text import render_text
 
 GOLDEN = Path(__file__).parent / "golden"
 RENDERERS: dict[str, Callable[[Report], str]] = {

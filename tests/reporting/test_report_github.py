@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_samples import NASTY, SAMPLES, criterion, exercise, middling, report, undecided
 
-from grader.core.exercise import Location, Outcome
-from grader.core.report import Report
-from grader.reporting.platforms.github import MOST_OF_A_KIND, render_github
+from grader.grading.model.exercise import Location, Outcome
+from grader.grading.model.report import Report
+from grader.grading.reporting.platforms.github import MOST_OF_A_KIND, render_github
 
 DATA = {"%0D": "\r", "%0A": "\n", "%25": "%"}
 PROPERTY = {**DATA, "%3A": ":", "%2C": ","}

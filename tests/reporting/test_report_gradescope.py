@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from report_samples import SAMPLES, middling, partial, undecided
 
-from grader.core.report import Report
-from grader.reporting.platforms.gradescope import render_gradescope
+from grader.grading.model.report import Report
+from grader.grading.reporting.platforms.gradescope import render_gradescope
 
 TOP = {
     "score": (int, float),

@@ -26,7 +26,7 @@ from report_samples import (
     velocity,
 )
 
-from grader.core.chart import (
+from grader.grading.model.chart import (
     Case,
     Chart,
     Column,
@@ -40,9 +40,9 @@ from grader.core.chart import (
     Stage,
     TopicValues,
 )
-from grader.core.report import Report, Reproduction
-from grader.reporting.html.assets import bundle
-from grader.reporting.html.render import render_html
+from grader.grading.model.report import Report, Reproduction
+from grader.grading.reporting.html.assets import bundle
+from grader.grading.reporting.html.render import render_html
 
 MARKUP = (
     '"><img src=x onerror=alert(1)>',

@@ -26,9 +26,9 @@ from report_samples import (
     undecided,
 )
 
-from grader.core.exercise import Outcome, Problem, ProblemKind
-from grader.core.trace import Start, StartWay
-from grader.reporting.json_report import dumps, report_to_json
+from grader.grading.model.exercise import Outcome, Problem, ProblemKind
+from grader.grading.reporting.json_report import dumps, report_to_json
+from grader.runtime.model.trace import Start, StartWay
 
 
 def validator() -> Draft202012Validator:

@@ -13,9 +13,9 @@ from junitparser import Error, Failure, JUnitXml, Skipped
 from junitparser.junitparser import TestCase
 from report_samples import SAMPLES, criterion, exercise, middling, report, undecided
 
-from grader.core.exercise import Location, Outcome
-from grader.core.report import Report
-from grader.reporting.junit import render_junit
+from grader.grading.model.exercise import Location, Outcome
+from grader.grading.model.report import Report
+from grader.grading.reporting.junit import render_junit
 
 KINDS = {
     Outcome.MET: (),

@@ -25,11 +25,11 @@ from report_samples import (
     undecided,
 )
 
-from grader.core.exercise import Outcome
-from grader.core.report import ReportedFault
-from grader.core.trace import GraphSnapshot, ServiceEnd
-from grader.reporting.graph import draw_mermaid
-from grader.reporting.markdown import DETAILS, MOST_BYTES, render_markdown
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import ReportedFault
+from grader.grading.reporting.graph import draw_mermaid
+from grader.grading.reporting.markdown import DETAILS, MOST_BYTES, render_markdown
+from grader.runtime.model.trace import GraphSnapshot, ServiceEnd
 
 # What GitHub renders besides the common mark: tables and bare links.
 GITHUB = MarkdownIt("commonmark", {"linkify": False}).enable("table").enable("strikethrough")

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from report_samples import SAMPLES, criterion, exercise, hostile, middling, report, undecided
 
-from grader.core.exercise import Outcome
-from grader.core.report import Report
-from grader.reporting.platforms.prairielearn import MOST_BYTES, render_prairielearn
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Report
+from grader.grading.reporting.platforms.prairielearn import MOST_BYTES, render_prairielearn
 
 
 def result(sample: Report, **options: int) -> dict[str, Any]:

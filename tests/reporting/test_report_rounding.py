@@ -8,7 +8,7 @@ from fractions import Fraction
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.reporting.wording import whole_points
+from grader.grading.reporting.wording import whole_points
 
 POINTS = st.fractions(min_value=Fraction(1, 8), max_value=20, max_denominator=8)
 ROWS = st.lists(st.tuples(POINTS, st.fractions(min_value=0, max_value=1, max_denominator=6)), max_size=20)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.reporting.escape import command_line, quoted
+from grader.grading.reporting.escape import command_line, quoted
 
 WORDS = st.lists(st.text(alphabet=st.characters(blacklist_categories=["Cs"], min_codepoint=1), max_size=20), min_size=1)
 

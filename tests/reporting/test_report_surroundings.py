@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.errors import GraderError
-from grader.reporting.formats import repository_folder
-from grader.reporting.platforms.classroom50 import VARIABLES, handed_in
+from grader.grading.reporting.formats import repository_folder
+from grader.grading.reporting.platforms.classroom50 import VARIABLES, handed_in
+from grader.runtime.model.errors import GraderError
 
 CLASSROOM = {
     **{name: f"the {field}" for field, name in VARIABLES.items()},

@@ -33,14 +33,21 @@ from report_samples import (
 )
 from rich.cells import cell_len
 
-from grader.core.chart import Excerpt
-from grader.core.exercise import Audience, Location, Outcome
-from grader.core.quantities import NS_PER_S
-from grader.core.report import SUBMISSION_SUSPECTED, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
-from grader.core.trace import GraphSnapshot, ServiceEnd
-from grader.reporting.escape import shown
-from grader.reporting.graph import draw_graph, draw_mermaid
-from grader.reporting.text import render_text
+from grader.grading.model.chart import Excerpt
+from grader.grading.model.exercise import Audience, Location, Outcome
+from grader.grading.model.report import (
+    SUBMISSION_SUSPECTED,
+    ExerciseReport,
+    Report,
+    ReportedFault,
+    Reproduction,
+    Verdict,
+)
+from grader.grading.reporting.escape import shown
+from grader.grading.reporting.graph import draw_graph, draw_mermaid
+from grader.grading.reporting.text import render_text
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import GraphSnapshot, ServiceEnd
 
 GOLDEN = Path(__file__).parent / "golden"
 ANSI = re.compile(r"\x1b\[[0-9;]*m")

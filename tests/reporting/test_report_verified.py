@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from grader.core.trace import Endpoint, GraphSnapshot, LogRecord, Message
-from grader.core.verification import Cause, Difference, Fact, Kind, LeftOut, Place, State, Tried, Verification
-from grader.reporting.verified import advice, described, render_verification, verification_to_json
+from grader.grading.model.verification import Cause, Difference, Fact, Kind, LeftOut, Place, State, Tried, Verification
+from grader.grading.reporting.verified import advice, described, render_verification, verification_to_json
+from grader.runtime.model.trace import Endpoint, GraphSnapshot, LogRecord, Message
 
 PLACE = Place("ada", "velocity_publisher", "alone")
 FIRST = LogRecord(3_200_000_000, "a.py", "INFO", "talker", "used 3", "a.py", 16)

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_samples import criterion, exercise, report
 
-from grader.core.exercise import Feedback, Outcome, Problem, ProblemKind, Shows
-from grader.reporting.audience import for_student, numberless
+from grader.grading.model.exercise import Feedback, Outcome, Problem, ProblemKind, Shows
+from grader.grading.reporting.audience import for_student, numberless
 
 
 @pytest.mark.parametrize(

@@ -24,10 +24,10 @@ from rclpy.time import Time
 from sensor_msgs.msg import Image, PointField
 from std_msgs.msg import Header
 
-from grader.app.observe import ObserveRequest, observe
-from grader.app.ros_packages import LENDABLE, LENT, lent_to
-from grader.core.quantities import NS_PER_S
-from grader.judging.installation import NOT_LENT
+from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.ros_packages import LENDABLE, LENT, lent_to
+from grader.grading.judging.installation import NOT_LENT
+from grader.runtime.model.quantities import NS_PER_S
 
 
 @pytest.fixture(autouse=True, scope="module")

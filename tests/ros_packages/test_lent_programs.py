@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.observe import ObserveRequest, observe
-from grader.core.quantities import NS_PER_S
+from grader.grading.app.observe import ObserveRequest, observe
+from grader.runtime.model.quantities import NS_PER_S
 
 pytestmark = pytest.mark.ros
 

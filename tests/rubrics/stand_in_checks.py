@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from grader.core.quantities import DurationNs, Hertz
+from grader.runtime.model.quantities import DurationNs, Hertz
 
 
 @dataclass(frozen=True, slots=True)

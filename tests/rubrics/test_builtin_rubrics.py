@@ -13,16 +13,16 @@ import jsonschema
 import pytest
 from ruamel.yaml import YAML
 
-from grader.core.exercise import Exercise
-from grader.core.quantities import NS_PER_S
-from grader.core.rubric_files import rubrics_in
-from grader.core.scenario import shortest
-from grader.judging.checks import CHECKS
-from grader.rubrics.builtin import builtin_headers, builtin_rubrics
-from grader.rubrics.exercise_checks import known_checks
-from grader.rubrics.loader import read_rubric
-from grader.rubrics.schema import rubric_schema, schema_text
-from grader.stimuli.recorded import RecordedStream
+from grader.grading.judging.checks import CHECKS
+from grader.grading.model.exercise import Exercise
+from grader.grading.model.rubric_files import rubrics_in
+from grader.grading.rubrics.builtin import builtin_headers, builtin_rubrics
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.grading.rubrics.loader import read_rubric
+from grader.grading.rubrics.schema import rubric_schema, schema_text
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.scenario import shortest
+from grader.runtime.stimuli.recorded import RecordedStream
 
 RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"
 
@@ -123,7 +123,7 @@ def test_every_scripted_number_is_held_for_its_whole_time() -> None:
 
 
 def test_the_shipped_schema_is_up_to_date() -> None:
-    """`python -m grader.rubrics.schema > rubrics/rubric.schema.json` was run after the last change."""
+    """`python -m grader.grading.rubrics.schema > rubrics/rubric.schema.json` was run after the last change."""
     assert (RUBRICS / "rubric.schema.json").read_text(encoding="utf-8") == schema_text()
 
 
@@ -197,7 +197,7 @@ def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path: Path, monk
         changed = text.replace('number: "1"', f'number: "{number}"').replace("id: velocity_publisher", f"id: {name}")
         (rubrics / name).mkdir()
         (rubrics / name / "rubric.yaml").write_text(changed, encoding="utf-8")
-    monkeypatch.setattr("grader.core.shipped.PACKAGE", tmp_path / "grader")
+    monkeypatch.setattr("grader.runtime.shipped.PACKAGE", tmp_path / "grader")
     assert builtin_rubrics() == {name: rubrics / name / "rubric.yaml" for name in "cab"}
     assert list(builtin_rubrics()) == ["c", "a", "b"]
 

@@ -7,17 +7,17 @@ from typing import Any
 
 import pytest
 
-from grader.core.errors import RubricError
-from grader.core.quantities import NS_PER_MS
-from grader.judging.checks.actions import ActionResult
-from grader.judging.checks.fields import FieldFunction
-from grader.judging.checks.graph import GraphEdge, GraphEdges, TopicNames
-from grader.judging.checks.received import LogsValues
-from grader.judging.checks.services import ServiceResponse
-from grader.judging.checks.timing import Reaction, ReactionCase, Silence
-from grader.judging.checks.topics import Transform
-from grader.judging.values import FieldRule
-from grader.rubrics.loader import read_rubric
+from grader.grading.judging.checks.actions import ActionResult
+from grader.grading.judging.checks.fields import FieldFunction
+from grader.grading.judging.checks.graph import GraphEdge, GraphEdges, TopicNames
+from grader.grading.judging.checks.received import LogsValues
+from grader.grading.judging.checks.services import ServiceResponse
+from grader.grading.judging.checks.timing import Reaction, ReactionCase, Silence
+from grader.grading.judging.checks.topics import Transform
+from grader.grading.judging.values import FieldRule
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.errors import RubricError
+from grader.runtime.model.quantities import NS_PER_MS
 
 RUBRIC = """schema: grader/rubric/v1
 exercise: {id: one, number: "9", title: One}

@@ -14,18 +14,18 @@ import pytest
 from archive import judged, recorded_of
 from sample_folders import EXERCISES
 
-from grader.core.exercise import Exercise
-from grader.core.shipped import shipped
-from grader.core.submission import StudentFile, Submission
-from grader.execution.evidence.packed import unpack
-from grader.judging.checks import CHECKS
-from grader.judging.diagnosis.rules import Rule
-from grader.judging.judge_run import judge_exercise
-from grader.reporting.json_report import dumps
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.exercise_checks import hints_of, known_checks
-from grader.rubrics.loader import read_rubric, side_files
-from grader.rubrics.own_checks import digest_of
+from grader.grading.judging.checks import CHECKS
+from grader.grading.judging.diagnosis.rules import Rule
+from grader.grading.judging.judge_run import judge_exercise
+from grader.grading.model.exercise import Exercise
+from grader.grading.reporting.json_report import dumps
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.exercise_checks import hints_of, known_checks
+from grader.grading.rubrics.loader import read_rubric, side_files
+from grader.grading.rubrics.own_checks import digest_of
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.recording.packed import unpack
+from grader.runtime.shipped import shipped
 
 SHARED = {name: kind for name, kind in known_checks().items() if name not in CHECKS}
 FAN = builtin_rubrics()["two_node_communication"]

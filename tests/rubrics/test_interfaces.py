@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from grader.app.grade import read_exercises
-from grader.app.request import GradeRequest
 from grader.cli import main
-from grader.core.errors import RubricError
-from grader.execution.ros_installation import find_ros
-from grader.rubrics.builtin import builtin_rubrics
-from grader.rubrics.interfaces import Interfaces
-from grader.rubrics.loader import read_rubric
+from grader.grading.app.grade import read_exercises
+from grader.grading.app.request import GradeRequest
+from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.interfaces import Interfaces
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.errors import RubricError
+from grader.runtime.ros_installation import find_ros
 
 GOOD = """\
 schema: grader/rubric/v1

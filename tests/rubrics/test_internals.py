@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from sample_folders import folders_in
 
-from grader.submissions.sources import LONG, UNREADABLE, reaching, read_reaches
+from grader.grading.submissions.sources import LONG, UNREADABLE, reaching, read_reaches
 
 ROOT = Path(__file__).resolve().parents[2]
 SUSPICIOUS = {

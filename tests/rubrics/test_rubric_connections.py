@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.errors import RubricError
-from grader.core.scenario import Connection, TimeBetween
-from grader.core.submission import StudentFile, Submission
-from grader.execution.plan import PlannedConnection, plan_scenario
-from grader.rubrics.loader import read_rubric
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.errors import RubricError
+from grader.runtime.model.scenario import Connection, TimeBetween
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.plan import PlannedConnection, plan_scenario
 
 MS = 1_000_000
 RUBRIC = """\

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from grader.core.errors import RubricError
-from grader.core.scenario import AnyOrder, Between, CountBetween, InOrder, Scenario, SomeOf, TimeBetween
-from grader.rubrics.loader import read_rubric
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.errors import RubricError
+from grader.runtime.model.scenario import AnyOrder, Between, CountBetween, InOrder, Scenario, SomeOf, TimeBetween
 
 MS, S = 1_000_000, 1_000_000_000
 HEAD = """\

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from stand_in_checks import CHECKS
 
-from grader.core.exercise import OPEN, ORDER, Feedback, Shows, strictest
-from grader.rubrics.loader import read_rubric
+from grader.grading.model.exercise import OPEN, ORDER, Feedback, Shows, strictest
+from grader.grading.rubrics.loader import read_rubric
 
 RUBRIC = """\
 schema: grader/rubric/v1

@@ -13,13 +13,13 @@ import pytest
 from ruamel.yaml import YAML
 from stand_in_checks import CHECKS, Everything, FieldValues, Point, Publishes, TopicRate, UsesLogger
 
-from grader.core.errors import RubricError
-from grader.core.exercise import Criterion, Exercise
-from grader.core.limits import MAX_RUBRIC_BYTES
-from grader.core.scenario import ODOMETRY, Between, JustAbove, JustBelow, Scenario, Span
-from grader.rubrics.loader import MAX_MISTAKES, RubricMistakes, read_rubric
-from grader.stimuli.numbers import NumberStream
-from grader.stimuli.recorded import RecordedStream
+from grader.grading.model.exercise import Criterion, Exercise
+from grader.grading.rubrics.loader import MAX_MISTAKES, RubricMistakes, read_rubric
+from grader.runtime.model.errors import RubricError
+from grader.runtime.model.limits import MAX_RUBRIC_BYTES
+from grader.runtime.model.scenario import ODOMETRY, Between, JustAbove, JustBelow, Scenario, Span
+from grader.runtime.stimuli.numbers import NumberStream
+from grader.runtime.stimuli.recorded import RecordedStream
 
 GOOD = """\
 schema: grader/rubric/v1

@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stand_in_checks import CHECKS
 
-from grader.core.errors import RubricError
-from grader.core.exercise import Exercise
-from grader.core.limits import Limits
-from grader.core.quantities import KIB, MIB, NS_PER_S, Unit
-from grader.rubrics.loader import read_rubric
-from grader.rubrics.units import QuantityError, format_quantity, parse_quantity
+from grader.grading.model.exercise import Exercise
+from grader.grading.rubrics.loader import read_rubric
+from grader.grading.rubrics.units import QuantityError, format_quantity, parse_quantity
+from grader.runtime.model.errors import RubricError
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import KIB, MIB, NS_PER_S, Unit
 
 BYTES = Unit("B")
 RUBRIC = """\

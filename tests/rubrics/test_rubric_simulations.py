@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.interface_packages import known_interfaces
-from grader.core.errors import RubricError
-from grader.core.scenario import Between, Choose, FieldSpec, Scenario
-from grader.packaging import Chosen, classroom50
-from grader.rubrics.loader import read_rubric, side_files
-from grader.rubrics.schema import rubric_schema
-from grader.stimuli.simulation import Simulated
+from grader.course.packaging import Chosen, classroom50
+from grader.grading.app.interface_packages import known_interfaces
+from grader.grading.rubrics.loader import read_rubric, side_files
+from grader.grading.rubrics.schema import rubric_schema
+from grader.runtime.model.errors import RubricError
+from grader.runtime.model.scenario import Between, Choose, FieldSpec, Scenario
+from grader.runtime.stimuli.simulation import Simulated
 
 RUBRIC = """\
 schema: grader/rubric/v1
@@ -37,7 +37,7 @@ criteria:
 WORLD = """\
 from dataclasses import dataclass, field
 
-from grader.simulation import Simulation
+from grader.runtime.simulation import Simulation
 
 
 @dataclass

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from grader.core.errors import RubricError
-from grader.core.scenario import Between, Choose, Scenario, Written
-from grader.rubrics.loader import read_rubric
-from grader.stimuli.calls import ServiceCalls
-from grader.stimuli.goals import ActionGoal
-from grader.stimuli.messages import MessageStream
-from grader.stimuli.server import ServiceServer
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.model.errors import RubricError
+from grader.runtime.model.scenario import Between, Choose, Scenario, Written
+from grader.runtime.stimuli.calls import ServiceCalls
+from grader.runtime.stimuli.goals import ActionGoal
+from grader.runtime.stimuli.messages import MessageStream
+from grader.runtime.stimuli.server import ServiceServer
 
 MS, S = 1_000_000, 1_000_000_000
 HEAD = """\

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.test_files import collect_tests
-from grader.authoring.checking import check_rubric
-from grader.core.errors import RubricError
-from grader.core.exercise import Exercise
-from grader.execution.evidence.manifest import scenario_digest
-from grader.packaging import Chosen, gradescope
-from grader.rubrics.loader import read_rubric, side_files
+from grader.course.authoring.checking import check_rubric
+from grader.course.packaging import Chosen, gradescope
+from grader.grading.app.test_files import collect_tests
+from grader.grading.evidence.manifest import scenario_digest
+from grader.grading.model.exercise import Exercise
+from grader.grading.rubrics.loader import read_rubric, side_files
+from grader.runtime.model.errors import RubricError
 
 RUBRIC = """\
 schema: grader/rubric/v1

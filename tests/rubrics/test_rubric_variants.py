@@ -12,12 +12,12 @@ import pytest
 from ruamel.yaml import YAML
 from stand_in_checks import CHECKS
 
-from grader.core.errors import RubricError
-from grader.core.exercise import Drawn, Exercise, Variant
-from grader.rubrics.draws import First, Options, Recorded
-from grader.rubrics.loader import read_rubric
-from grader.rubrics.schema import rubric_schema
-from grader.stimuli.numbers import NumberStream
+from grader.grading.model.exercise import Drawn, Exercise, Variant
+from grader.grading.rubrics.draws import First, Options, Recorded
+from grader.grading.rubrics.loader import read_rubric
+from grader.grading.rubrics.schema import rubric_schema
+from grader.runtime.model.errors import RubricError
+from grader.runtime.stimuli.numbers import NumberStream
 
 RUBRIC = """\
 schema: grader/rubric/v1

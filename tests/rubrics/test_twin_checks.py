@@ -9,10 +9,10 @@ import pytest
 from archive import judged, recorded_of
 from sample_folders import EXERCISES
 
-from grader.core.exercise import Exercise
-from grader.core.report import Report, Verdict
-from grader.core.shipped import shipped
-from grader.rubrics.loader import read_rubric
+from grader.grading.model.exercise import Exercise
+from grader.grading.model.report import Report, Verdict
+from grader.grading.rubrics.loader import read_rubric
+from grader.runtime.shipped import shipped
 
 TWINS = {
     "exercise_1": [

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.core.quantities import Unit
-from grader.rubrics.units import QuantityError, format_quantity, parse_quantity, quantity_pattern
+from grader.grading.rubrics.units import QuantityError, format_quantity, parse_quantity, quantity_pattern
+from grader.runtime.model.quantities import Unit
 
 SECONDS = Unit("s")
 HERTZ = Unit("Hz")

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.core.quantities import NS_PER_S, nanoseconds
-from grader.simulation import DifferentialDrive, Moment, Output, Simulation, Turtle, Unicycle
+from grader.runtime.model.quantities import NS_PER_S, nanoseconds
+from grader.runtime.simulation import DifferentialDrive, Moment, Output, Simulation, Turtle, Unicycle
 
 
 def at(t_s: float) -> Moment:

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.errors import HarnessError
-from grader.simulation import DifferentialDrive, loading
-from grader.simulation.loading import guarded, made
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.simulation import DifferentialDrive, loading
+from grader.runtime.simulation.loading import guarded, made
 
 FILE = b"""\
 from dataclasses import dataclass
-from grader.simulation import Simulation
+from grader.runtime.simulation import Simulation
 
 @dataclass
 class Slow(Simulation):
@@ -65,10 +65,10 @@ def test_a_call_without_end_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_worker_needs_nothing_but_the_standard_library_for_it() -> None:
-    """It sees no other part of the grader than core, execution and this one."""
+    """It sees no other part of the grader than the runtime."""
     folder = Path(loading.__file__).parent
     lines = [line for file in folder.glob("*.py") for line in file.read_text(encoding="utf-8").splitlines()]
     modules = [line.split()[1].split(".") for line in lines if line.startswith(("from ", "import "))]
-    imported = {".".join(parts[: 2 if parts[0] == "grader" else 1]) for parts in modules}
+    imported = {".".join(parts[: 3 if parts[0] == "grader" else 1]) for parts in modules}
     standard = {"__future__", "collections", "dataclasses", "math", "random", "signal", "threading", "types", "typing"}
-    assert imported <= standard | {"grader.core", "grader.simulation"}
+    assert imported <= standard | {"grader.runtime.model", "grader.runtime.simulation"}

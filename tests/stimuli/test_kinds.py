@@ -12,28 +12,29 @@ from pathlib import Path
 import pytest
 
 import grader
-from grader.stimuli import KINDS, PLANNED
+from grader.runtime.stimuli import KINDS, PLANNED
 
 PACKAGE = Path(grader.__file__).resolve().parent
 #: Modules that are about a single kind: recordings that are read from bags, simulations that run, and other keys of a
 #: rubric that are short for a kind.
 ABOUT = {
     "RecordedStream": {
-        "app/bags.py",
-        "app/observe.py",
-        "authoring/checking.py",
-        "execution/evidence/manifest.py",
-        "execution/plan.py",
-        "rubrics/drawing.py",
-        "rubrics/model.py",
+        "grading/app/bags.py",
+        "grading/app/observe.py",
+        "course/authoring/checking.py",
+        "grading/evidence/manifest.py",
+        "grading/model/exercise.py",
+        "runtime/plan.py",
+        "grading/rubrics/drawing.py",
+        "grading/rubrics/model.py",
     },
-    "ServiceCalls": {"rubrics/drawing.py", "rubrics/model.py"},
+    "ServiceCalls": {"grading/rubrics/drawing.py", "grading/rubrics/model.py"},
     "Simulated": {
-        "authoring/checking.py",
-        "authoring/starting.py",
-        "rubrics/check_parameters.py",
-        "rubrics/model.py",
-        "rubrics/simulations.py",
+        "course/authoring/checking.py",
+        "course/authoring/starting.py",
+        "grading/rubrics/check_parameters.py",
+        "grading/rubrics/model.py",
+        "grading/rubrics/simulations.py",
     },
 }
 
@@ -47,11 +48,11 @@ from collections.abc import Iterator
 from dataclasses import field
 from typing import Annotated, ClassVar
 
-from grader.core.dataclass import dataclass
-from grader.core.quantities import Kind, MessageType, Topic
-from grader.core.scenario import Content, Event, FieldsItem, Planned, Stimulus, Time
-from grader.stimuli.drawing import Draws, Fields, drawn_fields, drawn_time, in_drawn_order, planned_as
-from grader.stimuli.messages import Advertise, PlannedMessages, PublishFields
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.quantities import Kind, MessageType, Topic
+from grader.runtime.model.scenario import Content, Event, FieldsItem, Planned, Stimulus, Time
+from grader.runtime.stimuli.drawing import Draws, Fields, drawn_fields, drawn_time, in_drawn_order, planned_as
+from grader.runtime.stimuli.messages import Advertise, PlannedMessages, PublishFields
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +133,7 @@ def test_no_kind_is_named_outside_its_folder() -> None:
     named: dict[str, set[str]] = {}
     for path in PACKAGE.rglob("*.py"):
         place = path.relative_to(PACKAGE).as_posix()
-        if place.startswith("stimuli/"):
+        if place.startswith("runtime/stimuli/"):
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Name) and node.id in kinds:
@@ -151,11 +152,12 @@ def test_a_kind_is_one_module_and_its_row(tmp_path: Path) -> None:
     copy = tmp_path / "copy" / "grader"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(PACKAGE.parent / "rubrics", tmp_path / "copy" / "rubrics")
-    (copy / "stimuli" / "burst.py").write_text(BURST.lstrip(), encoding="utf-8")
-    table = copy / "stimuli" / "__init__.py"
+    (copy / "runtime" / "stimuli" / "burst.py").write_text(BURST.lstrip(), encoding="utf-8")
+    table = copy / "runtime" / "stimuli" / "__init__.py"
     text = table.read_text(encoding="utf-8")
     text = text.replace(
-        "from grader.stimuli.calls", "from grader.stimuli.burst import Burst\nfrom grader.stimuli.calls"
+        "from grader.runtime.stimuli.calls",
+        "from grader.runtime.stimuli.burst import Burst\nfrom grader.runtime.stimuli.calls",
     )
     table.write_text(text.replace("    Simulated,\n)", "    Simulated,\n    Burst,\n)"), encoding="utf-8")
     (tmp_path / "rubric.yaml").write_text(RUBRIC, encoding="utf-8")

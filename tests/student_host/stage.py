@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-HOST = Path(__file__).resolve().parents[2] / "grader/student_host"
+HOST = Path(__file__).resolve().parents[2] / "grader/runtime/host"
 sys.path.insert(0, str(HOST))
 import launcher  # type: ignore[import-not-found]  # noqa: E402
 import time_machine  # noqa: E402, F401 - it takes long: once for all repetitions

@@ -11,8 +11,8 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
-from grader.student_host.packages import layout_of
-from grader.submissions.projects import read_projects
+from grader.grading.submissions.projects import read_projects
+from grader.runtime.host.packages import layout_of
 
 STAGE = Path(__file__).with_name("stage.py")
 SEED, OTHER_SEED = "ab" * 32, "cd" * 32

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("rclpy", reason="needs rclpy")
 pytestmark = pytest.mark.ros
 
-HOST = str(Path(__file__).resolve().parents[2] / "grader/student_host")
+HOST = str(Path(__file__).resolve().parents[2] / "grader/runtime/host")
 
 
 class Handle:

@@ -515,12 +515,12 @@ def test_what_hides_nothing_is_not_mentioned(run: Callable[..., Any], name: str)
 
 def test_the_host_imports_no_part_of_rclpy_by_surprise() -> None:
     """Beside hidden modules, the parts that it changes are imported as the program would import them."""
-    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / "grader/student_host").glob("*.py")]
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / "grader/runtime/host").glob("*.py")]
     nodes = [node for tree in trees for node in ast.walk(tree)]
     names = {a.name for n in nodes if isinstance(n, ast.Import) for a in n.names}
     names |= {n.module for n in nodes if isinstance(n, ast.ImportFrom) and n.level == 0 and n.module}
     parts = {name for name in names if name.startswith("rclpy.") and name != "rclpy.impl"}
-    shadows = ast.parse((ROOT / "grader/student_host/shadows.py").read_text(encoding="utf-8"))
+    shadows = ast.parse((ROOT / "grader/runtime/host/shadows.py").read_text(encoding="utf-8"))
     known = {node.value for node in ast.walk(shadows) if isinstance(node, ast.Constant)}
     assert parts
     assert parts <= known

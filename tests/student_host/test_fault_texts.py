@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-FAULTS = Path(__file__).resolve().parents[2] / "grader/student_host/faults.py"
+FAULTS = Path(__file__).resolve().parents[2] / "grader/runtime/host/faults.py"
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,9 @@ from unittest.mock import patch
 
 import pytest
 
-from grader.execution.notes import left_out_sentence, left_out_words
-from grader.student_host.faults import Describer
-from grader.student_host.launch_files import describe
+from grader.runtime.host.faults import Describer
+from grader.runtime.host.launch_files import describe
+from grader.runtime.worker.notes import left_out_sentence, left_out_words
 
 IMPORTS = """
 from ament_index_python.packages import get_package_share_directory

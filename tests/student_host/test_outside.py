@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-OUTSIDE = Path(__file__).resolve().parents[2] / "grader/student_host/outside.py"
+OUTSIDE = Path(__file__).resolve().parents[2] / "grader/runtime/host/outside.py"
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ def test_a_message_can_be_used_without_the_generator() -> None:
     """Neither of the generator's parsers is imported."""
     program = """
         import sys
-        from grader.student_host.quick_imports import import_without_needless
+        from grader.runtime.host.quick_imports import import_without_needless
         import_without_needless("rosidl_generator_py")
         from std_msgs.msg import Float32
         Float32.__import_type_support__()
@@ -32,7 +32,7 @@ def test_time_machine_imports_no_tests() -> None:
     """It has a plugin for pytest, which is a fifth of a second of processor time where it is installed."""
     program = """
         import sys
-        from grader.student_host.quick_imports import import_without_needless
+        from grader.runtime.host.quick_imports import import_without_needless
         time_machine = import_without_needless("time_machine")
         with time_machine.travel(0, tick=False):
             import time
@@ -44,7 +44,7 @@ def test_time_machine_imports_no_tests() -> None:
 def test_what_was_left_out_can_still_be_imported() -> None:
     """A program may want to generate classes itself, or to test itself."""
     program = """
-        from grader.student_host.quick_imports import NEEDLESS, import_without_needless
+        from grader.runtime.host.quick_imports import NEEDLESS, import_without_needless
         for package in (*NEEDLESS, *NEEDLESS):
             import_without_needless(package)
         from rosidl_generator_py.generate_py_impl import generate_py

@@ -163,12 +163,12 @@ def test_the_tables_hold_what_the_host_uses(file: str) -> None:
     known = {name for table in (PYTHON, CPP) for names in table.values() for name in names} | set(ASSIGNED)
     # how Python spells `__clock` from outside; the other two are documented
     known |= {"_Clock__clock", "_exit", "_getframe"}
-    assert set(names_used(ROOT / f"grader/student_host/{file}.py")) <= known
+    assert set(names_used(ROOT / f"grader/runtime/host/{file}.py")) <= known
 
 
 def test_the_tables_hold_what_the_host_takes_and_sends() -> None:
     """The host wraps the methods of actions by name."""
-    actions = importlib.import_module("grader.student_host.actions")
+    actions = importlib.import_module("grader.runtime.host.actions")
     for table in (actions.TAKES, actions.SENDS):
         assert table["service"].keys() <= set(CPP["ActionServer"])
         assert table["client"].keys() <= set(CPP["ActionClient"])

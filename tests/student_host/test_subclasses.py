@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from hostile import record, staging
 
-from grader.core.trace import GraphSnapshot, Trace
-from grader.execution.recording_session import RecordingSession, open_session
+from grader.runtime.model.trace import GraphSnapshot, Trace
+from grader.runtime.session import RecordingSession, open_session
 
 pytestmark = pytest.mark.ros
 

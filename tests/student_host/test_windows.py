@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.observe import ObserveRequest, observe
-from grader.core.quantities import NS_PER_S
-from grader.core.report import Summary
-from grader.core.trace import ClockKind
+from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.model.report import Summary
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import ClockKind
 
 pytestmark = pytest.mark.ros
 

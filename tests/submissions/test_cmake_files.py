@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from grader.core.projects import Project
-from grader.execution.executables import executables, find_executable
-from grader.submissions.cmake_files import Contents, contents_of
-from grader.submissions.projects import read_projects
-from grader.submissions.setup_files import LimitError
+from grader.grading.submissions.cmake_files import Contents, contents_of
+from grader.grading.submissions.projects import read_projects
+from grader.grading.submissions.setup_files import LimitError
+from grader.runtime.model.projects import Project
+from grader.runtime.programs.executables import executables, find_executable
 
 NAMES = ("CMakeLists.txt", "package.xml", "scripts/a.py", "scripts/b.py", "scripts/notes.txt", "talk/__init__.py")
 HEAD = "cmake_minimum_required(VERSION 3.8)\nproject(talk)\n"

@@ -14,9 +14,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from grader.core.errors import HarnessError, SubmissionError
-from grader.submissions import staging
-from grader.submissions.submission import stage_submission
+from grader.grading.submissions import staging
+from grader.grading.submissions.submission import stage_submission
+from grader.runtime.model.errors import HarnessError, SubmissionError
 
 WANTED = ("velocity_publisher.py", "odom_subscriber.py", "temperature_sensor.py", "fan_controller.py")
 

@@ -11,7 +11,7 @@ from std_srvs.srv import SetBool
 from test_msgs.action import Fibonacci
 
 from grader.api import Moment, Output, Simulation
-from grader.core.errors import HarnessError, SubmissionError
+from grader.runtime.model.errors import HarnessError, SubmissionError
 from grader.world.errors import ParameterRejected, StepTimeout
 from grader.world.opening import Worlds
 from grader.world.world import World

@@ -13,7 +13,7 @@ from std_srvs.srv import SetBool, Trigger
 from test_msgs.action import Fibonacci
 
 from grader.api import Moment, Output, Simulation, open_world
-from grader.core.trace import ClockKind
+from grader.runtime.model.trace import ClockKind
 from grader.world.errors import ParameterRejected, ProgramFailed, StepTimeout
 from grader.world.opening import Worlds
 from grader.world.world import World

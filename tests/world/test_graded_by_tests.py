@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from grader.api import Outcome, Report, rejudge, report_to_json
-from grader.app.grade import grade_in
-from grader.app.keeping import EvidenceWriter
-from grader.app.request import GradeRequest
-from grader.core.report import Verdict
-from grader.execution.recording_session import RecordingSession, open_session
-from grader.reporting.formats import PageLayout, known
+from grader.grading.app.grade import grade_in
+from grader.grading.app.keeping import EvidenceWriter
+from grader.grading.app.request import GradeRequest
+from grader.grading.model.report import Verdict
+from grader.grading.reporting.formats import PageLayout, known
+from grader.runtime.session import RecordingSession, open_session
 
 pytestmark = pytest.mark.ros
 

@@ -182,8 +182,8 @@ def test_a_wider_scope_and_several_processes(suite: pytest.Pytester) -> None:
 
 WITHOUT_BUBBLEWRAP = """
 import pytest
-from grader.core.errors import EnvironmentFault
-from grader.execution.sandbox import choose
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.sandbox import choose
 
 known = choose.isolation_from_name
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from std_msgs.msg import String
 
-from grader.core.dataclass import dataclass
+from grader.runtime.model.dataclass import dataclass
 from grader.world.opening import Worlds
 
 pytestmark = pytest.mark.ros

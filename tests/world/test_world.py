@@ -14,7 +14,7 @@ from std_msgs.msg import Int32, String
 from std_srvs.srv import SetBool, Trigger
 from test_msgs.action import Fibonacci
 
-from grader.core.errors import HarnessError, SubmissionError
+from grader.runtime.model.errors import HarnessError, SubmissionError
 from grader.world.errors import NoMessage, ProgramFailed, StepTimeout
 from grader.world.opening import Worlds
 from grader.world.world import World

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tracing import Recording, position_logs
 
-from grader.core.errors import HarnessError
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import ClockKind, Trace
-from grader.rubrics.exercise_checks import known_checks
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import ClockKind, Trace
 
 LOG_PERIOD = known_checks()["log_period"]
 PERIOD = LOG_PERIOD("odom_subscriber.py", "/odom", NS_PER_S)

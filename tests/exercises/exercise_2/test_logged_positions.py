@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from tracing import ODOM_TIMES, drive, driving, pose_at, position_logs
 from wordings import RIGHT, WRONG, Writer
 
-from grader.core.quantities import NS_PER_S
-from grader.core.trace import ClockKind, FaultKind
-from grader.rubrics.exercise_checks import known_checks
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import ClockKind, FaultKind
 
 POSITION = known_checks()["logs_position"]("odom_subscriber.py", "/odom")
 PERIOD = known_checks()["log_period"]("odom_subscriber.py", "/odom", NS_PER_S)

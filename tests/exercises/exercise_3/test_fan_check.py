@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from nodes import HONEST_FANS, WRONG_FANS, Rule, each_speed, on_change, right_speed, timed
 from tracing import FAN_VALUES, FLOAT32, Recording, held_at, scripted
 
-from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
-from grader.rubrics.exercise_checks import known_checks
+from grader.grading.model.exercise import Finding
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.runtime.model.errors import HarnessError
 
 ON = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above", unit="°C")
 OFF = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "at_or_below", unit="°C")

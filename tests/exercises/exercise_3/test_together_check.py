@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from nodes import right_speed, sensor, together
 from tracing import FLOAT32, FLOAT64, Recording
 
-from grader.core.trace import ClockKind
-from grader.rubrics.exercise_checks import known_checks
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.runtime.model.trace import ClockKind
 
 CHECK = known_checks()["answers_together"]("/temperature", "/fan_speed", 25, 100, 0)
 

@@ -23,11 +23,11 @@ from nodes import (
 )
 from tracing import TRIGGER, Recording
 
-from grader.core.errors import HarnessError
-from grader.core.exercise import Check
-from grader.core.trace import ClockKind, Request
-from grader.judging.findings import FAULT_KEY
-from grader.rubrics.exercise_checks import known_checks
+from grader.grading.judging.findings import FAULT_KEY
+from grader.grading.model.exercise import Check
+from grader.grading.rubrics.exercise_checks import known_checks
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.trace import ClockKind, Request
 
 WAITS = known_checks()["waits_for_service"](CLIENT, BATTERY)
 REACTS = known_checks()["reacts_to_responses"](CLIENT, BATTERY, 20.0)

@@ -1,1 +1,0 @@
-"""The vocabulary that every other room speaks; it imports nothing above it."""

@@ -1,0 +1,1 @@
+"""Many reports become marks, pages and uploads; and exercises become rubrics."""

@@ -1,0 +1,308 @@
+"""Grades submissions on this machine, in processes that are used again; also the interface of schedulers."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Protocol
+
+import msgspec
+
+from grader.course.classroom import store as kept
+from grader.course.classroom.store import Conditions, ResultStatus, State
+from grader.runtime.model.checkup import NO_SANDBOX, missing
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.ros_installation import find_ros
+from grader.runtime.sandbox.choose import choose_isolation
+from grader.runtime.session import WALL
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One submission to grade."""
+
+    name: str  # name of the entry
+    label: str  # its name in the source
+    submission: Path
+    into: Path  # destination folder for the files of `worker.PARTS`; must not exist yet
+    conditions: Conditions  # what the result depends on besides the submission, the options of the run among it
+    workers: int  # most scenarios recorded in parallel
+    standalone: bool  # whether the HTML report includes its scripts, instead of sharing them with the class
+    deadline_s: float  # real time after which the attempt is killed
+    collected: Path | None = None  # file with the submission as read on another machine; None to read it now
+    recordings: Path | None = None  # evidence whose recordings of unchanged exercises are used; None to record all
+    spot_check: bool = False  # whether it is drawn for a check on the wall clock, which takes long
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """The outcome of a task; its files are in the task's folder."""
+
+    task: Task
+    status: ResultStatus
+
+
+#: Called with a submission's name and a step of it that begins, from any thread.
+OnStep = Callable[[str, str], None]
+
+
+class ClassScheduler(Protocol):
+    """Grades submissions in parallel, on this machine or on others."""
+
+    def prepare(self, isolation: str) -> Sequence[str]:
+        """Return warnings for the instructor; raises EnvironmentFault if nothing can be graded."""
+
+    def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
+        """Yield one attempt for each task as it finishes, in any order.
+
+        Closing the generator aborts the running tasks and leaves no process behind. A failed task yields an attempt in
+        the state FAILED; it never raises.
+        """
+
+
+#: Makes a scheduler for a number of parallel submissions.
+MakeScheduler = Callable[[int], ClassScheduler]
+
+
+#: How many submissions may wait on the wall clock beside each of those that need a processor; each takes memory.
+WAITING_PER_JOB = 3
+#: The hint of a failure.
+AGAIN = "run the same command again"
+#: Longest line read from a process.
+_LINE_BYTES = 1 << 20
+#: Real seconds in which a process has to end that is no longer needed; a busy machine takes a while to end all that it
+#: has started.
+_END_S = 60.0
+WORKER = (sys.executable, "-s", "-m", "grader.course.classroom.worker")
+
+
+class LocalScheduler:
+    """Grades on this machine; relative paths start at the folder, or at the current one if it is None.
+
+    A submission that is recorded on the wall clock because virtual time does not suffice spends its time waiting.
+    Another one is begun beside it, and up to `WAITING_PER_JOB` wait for each of the jobs. That many of those that are
+    drawn for a spot check are graded at a time, from the beginning, so that the class does not end with them. While
+    there are more of them, the processes that this needs are kept, because each takes a second to start.
+    """
+
+    def __init__(self, jobs: int, command: Sequence[str] = WORKER, *, folder: Path | None = None) -> None:
+        self._jobs = jobs
+        self._on_wall_clock = WAITING_PER_JOB * jobs
+        self._command = command
+        self._folder = folder
+        self._lock = threading.Lock()
+        self._running: set[subprocess.Popen[bytes]] = set()
+        self._idle: list[subprocess.Popen[bytes]] = []
+        self._checks = 0  # submissions that are being graded and are drawn for a spot check
+        self._closed = False
+
+    def prepare(self, isolation: str) -> Sequence[str]:
+        """Find ROS and test the sandbox; see `ClassScheduler`."""
+        choice = choose_isolation(isolation, find_ros())
+        name = choice.isolation.name
+        warnings = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
+        if choice.isolation.shares_network and name != NO_SANDBOX:
+            if self._jobs > 1:
+                warnings.append(f"sandbox {name}: submissions share the network, so they are graded one at a time")
+            self._jobs, self._on_wall_clock = 1, 0
+        return warnings
+
+    def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
+        """Yield an attempt for each task; see `ClassScheduler`."""
+        # The kernel kills a worker when the thread that started it ends, so the threads live until all tasks are done.
+        pool = ThreadPoolExecutor(self._jobs + self._on_wall_clock, thread_name_prefix="batch")
+        places, waiting = threading.Semaphore(self._jobs), _Waiting(tasks)
+        try:
+            for future in as_completed([pool.submit(self._next, waiting, on_step, places) for _ in tasks]):
+                yield future.result()
+        finally:
+            self._close()
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    def _next(self, waiting: _Waiting, on_step: OnStep, places: threading.Semaphore) -> Attempt:
+        with _Place(places) as place, self._next_task(waiting) as task:
+            on_step(task.name, "starting")
+            process = self._idle_one()
+            if process is not None:
+                attempt = self._attempt(process, task, on_step, place, waiting)
+                if attempt.status.state is not State.FAILED:
+                    return attempt
+                # What a process keeps for the next submission costs no submission its result.
+                shutil.rmtree(task.into, ignore_errors=True)
+            try:
+                process = self._start()
+            except OSError as error:
+                return failed_attempt(task, f"the grader cannot be started: {error.strerror}")
+            return self._attempt(process, task, on_step, place, waiting)
+
+    @contextmanager
+    def _next_task(self, waiting: _Waiting) -> Iterator[Task]:
+        """Take the task that is graded next, and count it while it is graded."""
+        with self._lock:
+            task = waiting.take(drawn=self._checks < max(1, self._on_wall_clock))
+            self._checks += task.spot_check
+        try:
+            yield task
+        finally:
+            with self._lock:
+                self._checks -= task.spot_check
+
+    def _attempt(
+        self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place, waiting: _Waiting
+    ) -> Attempt:
+        """Grade in a process, and keep it for the next submission unless it failed, or others have taken its place."""
+        overdue, status = threading.Event(), None
+
+        def give_up() -> None:
+            overdue.set()
+            _kill(process)
+
+        timer = threading.Timer(task.deadline_s, give_up)
+        timer.daemon = True
+        timer.start()
+        try:
+            status = self._listen(process, task, on_step, place)
+        finally:
+            timer.cancel()
+            with self._lock:
+                kept = place.taken or bool(waiting.drawn)
+                if kept := kept and status is not None and status.state is not State.FAILED:
+                    self._idle.append(process)
+            if not kept:
+                self._end(process)
+        if status is not None:
+            return Attempt(task, status)
+        if overdue.is_set():
+            return failed_attempt(task, f"the grader was not done after {task.deadline_s:.0f} s")
+        return failed_attempt(task, f"the grader ended without a result (exit code {process.returncode})")
+
+    def _idle_one(self) -> subprocess.Popen[bytes] | None:
+        with self._lock:
+            return self._idle.pop() if self._idle and not self._closed else None
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        root = str(Path(__file__).resolve().parents[3])
+        paths = [root, *filter(None, [os.environ.get("PYTHONPATH", "")])]
+        with self._lock:
+            if self._closed:
+                raise InterruptedError(0, "interrupted")
+            process = subprocess.Popen(
+                self._command,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=None if os.environ.get("GRADER_DEBUG") == "1" else subprocess.DEVNULL,
+                cwd="/",  # Python imports from here first, and the user's directory may contain a student's `json.py`
+                start_new_session=True,
+            )
+            self._running.add(process)
+        return process
+
+    def _listen(
+        self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place
+    ) -> ResultStatus | None:
+        """Read messages from a process until it reports its result; None if it ends without one."""
+        assert process.stdin is not None
+        assert process.stdout is not None
+        folder = self._folder or Path.cwd()
+        request = {"task": msgspec.to_builtins(task, enc_hook=str), "folder": str(folder), "parent": os.getpid()}
+        with suppress(OSError):
+            process.stdin.write(json.dumps(request).encode() + b"\n")
+            process.stdin.flush()
+        while line := process.stdout.readline(_LINE_BYTES):
+            message = _message(line)
+            if "done" in message:
+                return kept.load(json.dumps(message["done"]).encode())
+            if "step" in message:
+                on_step(task.name, str(message["step"]))
+            # With `--clock wall`, all would be recorded
+            if "wall_clock" in message and task.conditions.options.clock != WALL:
+                place.leave()
+        return None
+
+    def _end(self, process: subprocess.Popen[bytes]) -> None:
+        if process.stdin is not None:
+            with suppress(OSError):
+                process.stdin.close()  # it cleans up and ends
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=_END_S)
+        _kill(process)
+        process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
+        with self._lock:
+            self._running.discard(process)
+
+    def _close(self) -> None:
+        with self._lock:
+            self._closed = True
+            idle = list(self._idle)
+            grading = self._running.difference(idle)
+        for process in grading:
+            _kill(process)
+        for process in idle:
+            self._end(process)
+
+
+class _Waiting:
+    """The tasks that nobody has begun, those that are drawn for a spot check apart from the others."""
+
+    def __init__(self, tasks: Sequence[Task]) -> None:
+        self.drawn = deque(task for task in tasks if task.spot_check)
+        self._others = deque(task for task in tasks if not task.spot_check)
+
+    def take(self, *, drawn: bool) -> Task:
+        """Take the next task, of the wanted ones while there are any."""
+        wanted, others = (self.drawn, self._others) if drawn else (self._others, self.drawn)
+        return (wanted or others).popleft()
+
+
+class _Place:
+    """One of the places for submissions that need a processor; it is left once, at the latest at the end."""
+
+    def __init__(self, places: threading.Semaphore) -> None:
+        self._places = places
+        self.taken = False
+
+    def __enter__(self) -> _Place:
+        self._places.acquire()
+        self.taken = True
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.leave()
+
+    def leave(self) -> None:
+        """Leave the place to the next submission."""
+        if self.taken:
+            self.taken = False
+            self._places.release()
+
+
+def _message(line: bytes) -> dict[str, object]:
+    try:
+        message = json.loads(line)
+    except (ValueError, RecursionError):
+        return {}
+    return message if isinstance(message, dict) else {}
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    if process.poll() is None:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def failed_attempt(task: Task, problem: str, hint: str = AGAIN) -> Attempt:
+    """Build a failed attempt, which is never the student's fault."""
+    return Attempt(task, ResultStatus(State.FAILED, "", "", task.label, problem, hint))

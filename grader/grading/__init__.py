@@ -1,0 +1,1 @@
+"""A trace and a rubric become a report."""

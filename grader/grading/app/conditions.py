@@ -1,0 +1,181 @@
+"""The conditions of a recording that must not matter, and which of them this machine and user can make."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
+from pathlib import Path
+
+from grader.grading.model.conditions import (
+    AGAIN,
+    CONDITIONS,
+    EXECUTED,
+    FOLDER,
+    HASHES,
+    LOAD,
+    ORDER,
+    PROCESSORS,
+    SANDBOXES,
+    TOGETHER,
+    USER,
+    USUAL,
+    ZONE,
+)
+from grader.runtime.model.checkup import missing
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.ros_installation import find_ros
+from grader.runtime.sandbox.choose import inspect_tier
+from grader.runtime.sandbox.exposure import some_user
+from grader.runtime.sandbox.tiers import isolation_from_name
+
+#: Busy loops for each processor under `load`: a node then gets a third of one.
+LOOPS = 2
+#: A time zone with an odd offset, and a language of another encoding.
+ELSEWHERE: Mapping[str, str] = {"TZ": "Asia/Kathmandu", "LANG": "de_DE.ISO-8859-1", "LC_ALL": "C"}
+#: The hash seeds of the grader's own processes: that of the first recording, and another one.
+HASH_SEEDS = ("1", "2")
+#: The name of the folder that is the temporary one under `folder`.
+OTHER_FOLDER = "another temporary folder"
+#: How long to try whether another user can start the grader, in seconds.
+TRIAL_S = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """One condition, and how it is made."""
+
+    name: str  # as `--condition` takes it
+    words: str  # what is different under it, as a phrase
+    not_tried: str = ""  # why this machine or user cannot make it, as a phrase; empty if it can
+    reverses: bool = False  # one scenario at a time, the last one first
+    executes: bool = False  # each student's process is executed
+    isolation: str = ""  # another sandbox; empty for that of the first recording
+    processors: tuple[int, ...] = ()  # the processors to run on; empty for all
+    loops: int = 0  # busy loops beside it
+    variables: Mapping[str, str] = field(default_factory=dict)  # of the grader's own environment
+    other_folder: bool = False  # whether its temporary folder is another one
+    user: int | None = None  # the user to run as; None for the same one
+
+
+#: The first recording, which the others are compared with.
+FIRST = Condition("first", "as grading records", variables={"PYTHONHASHSEED": HASH_SEEDS[0]})
+
+
+def conditions(names: Sequence[str], isolation: str) -> list[Condition]:
+    """Return the named conditions, in the order in which they are tried; all usual ones if none is named.
+
+    Those that this machine or user cannot make say why. Testing the sandboxes may take some seconds.
+
+    Args:
+        names: Some of `CONDITIONS`.
+        isolation: The sandbox of the first recording.
+    """
+    wanted = [name for name in CONDITIONS if name in (names or USUAL) and name != isolation]
+    return [_sandbox(name, asked=name in names) if name in SANDBOXES else _MAKERS[name](isolation) for name in wanted]
+
+
+def _load(isolation: str) -> Condition:
+    del isolation
+    loops = LOOPS * len(os.sched_getaffinity(0))
+    return Condition(LOAD, f"beside {loops} busy loops", loops=loops)
+
+
+def _processors(isolation: str) -> Condition:
+    del isolation
+    there = sorted(os.sched_getaffinity(0))
+    lacks = "" if len(there) > 1 else "there is one processor only"
+    return Condition(PROCESSORS, "on one processor", lacks, processors=tuple(there[:1]))
+
+
+def _executed(isolation: str) -> Condition:
+    forks = isolation_from_name(isolation).can_fork
+    lacks = "" if forks else f"in the sandbox {isolation}, each is executed anyway"
+    return Condition(EXECUTED, "each program executed, not forked", lacks, executes=True)
+
+
+def _user(isolation: str) -> Condition:
+    del isolation
+    words = "as another user"
+    if os.geteuid() != 0:
+        return Condition(USER, words, "only root can become another user")
+    user = some_user()
+    return Condition(USER, words, _unreachable(user), isolation="auto", user=user)
+
+
+def _unreachable(user: int) -> str:
+    """Return why another user cannot start the grader, as a phrase; empty if it can."""
+    try:
+        import_all = "import grader.grading.app.recorded_again"
+        done = subprocess.run(
+            [sys.executable, "-c", import_all],
+            user=user,
+            group=user,
+            extra_groups=[],
+            cwd="/",
+            capture_output=True,
+            check=False,
+            timeout=TRIAL_S,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return f"user {user} cannot execute {sys.executable}"
+    return "" if done.returncode == 0 else f"user {user} cannot read what {sys.executable} needs"
+
+
+def _sandbox(name: str, *, asked: bool) -> Condition:
+    """Return the condition of another sandbox; unless asked for, only one that holds completely is tried."""
+    words = f"in the sandbox {name}"
+    try:
+        isolation_from_name(name)
+        report = inspect_tier(name, find_ros())
+    except EnvironmentFault as fault:
+        return Condition(name, words, fault.message.partition(": ")[2], isolation=name)
+    open_ones = [found.name for found in missing(report.properties)]
+    if report.usable or (asked and report.properties):
+        return Condition(name, words, isolation=name)
+    lacks = f"it does not contain {', '.join(open_ones)} here" if open_ones else report.why
+    return Condition(name, words, lacks, isolation=name)
+
+
+def _together(isolation: str) -> Condition:
+    forks = isolation_from_name(isolation).can_fork
+    return Condition(
+        TOGETHER,
+        "in another order, on one processor, elsewhere, with other hashes" + ", executed" * forks,
+        reverses=True,
+        executes=forks,
+        processors=_processors(isolation).processors,
+        variables={**ELSEWHERE, "PYTHONHASHSEED": HASH_SEEDS[1]},
+        other_folder=True,
+    )
+
+
+def _always(condition: Condition) -> Callable[[str], Condition]:
+    """Return what makes a condition that every machine and user can make."""
+    return lambda _: condition
+
+
+#: Makes a condition from the sandbox of the first recording.
+_MAKERS: Mapping[str, Callable[[str], Condition]] = {
+    AGAIN: _always(Condition(AGAIN, "again, with nothing changed")),
+    ORDER: _always(Condition(ORDER, "one scenario at a time, the last one first", reverses=True)),
+    PROCESSORS: _processors,
+    LOAD: _load,
+    EXECUTED: _executed,
+    FOLDER: _always(Condition(FOLDER, "with another temporary folder", other_folder=True)),
+    ZONE: _always(Condition(ZONE, "in another time zone and language", variables=ELSEWHERE)),
+    HASHES: _always(Condition(HASHES, "with other hashes in the grader", variables={"PYTHONHASHSEED": HASH_SEEDS[1]})),
+    USER: _user,
+    TOGETHER: _together,
+}
+
+
+def own_home(user: int, folder: Path) -> Mapping[str, str]:
+    """Make a home for a user in a folder, and return the variables that name it."""
+    home = folder / "home"
+    home.mkdir(mode=0o700)
+    os.chown(home, user, user)
+    return {"HOME": str(home), "XDG_CACHE_HOME": str(home), "XDG_RUNTIME_DIR": str(home), "TMPDIR": "/tmp"}  # noqa: S108

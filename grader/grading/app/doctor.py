@@ -1,0 +1,153 @@
+"""Examines this machine for `grade doctor`."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from grader.grading.app.grade import Progress
+from grader.grading.app.interface_packages import described
+from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.model import entry_points
+from grader.grading.reporting.formats import EVIDENCE, FORMATS, format_of
+from grader.grading.submissions.foreign_archives import install_command, is_installed
+from grader.runtime.machine import software, system, weaknesses
+from grader.runtime.model.checkup import NO_SANDBOX, Checkup, Exchange, Fact, TierReport
+from grader.runtime.model.errors import EnvironmentFault, GraderError
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.ros_installation import RosInstallation, find_ros
+from grader.runtime.sandbox.bubblewrap import ENTERABLE
+from grader.runtime.sandbox.choose import inspect_tiers, sandbox_memory
+from grader.runtime.sandbox.tiers import is_for_others, isolation_from_name
+from grader.runtime.supervisor.byte_code import byte_code
+from grader.runtime.supervisor.memory_groups import group_fact
+
+#: Messages that the trial node sends, one every 0.1 s starting at 0.1 s, and how long it is observed.
+TRIAL_MESSAGES = 10
+#: Half a period more than the last message: the trial ends between two of them.
+TRIAL_NS = NS_PER_S + NS_PER_S // 20
+TRIAL_TOPIC = "/trial"
+TRIAL_NODE = f"""\
+import rclpy
+from std_msgs.msg import String
+
+rclpy.init()
+node = rclpy.create_node("trial")
+publisher = node.create_publisher(String, "{TRIAL_TOPIC}", 10)
+node.create_timer(0.1, lambda: publisher.publish(String(data="hello")))
+rclpy.spin(node)
+"""
+
+
+def examine(progress: Progress) -> Checkup:
+    """Find out what this machine can do; takes a few seconds."""
+    progress("looking for ROS 2")
+    ros, lack = _ros()
+    facts = (*software(ros), *lack, *system(), *weaknesses(ros), _archives(), *_interfaces(ros), *_added())
+    if ros is None:
+        return Checkup(facts, None, (), "", "", Limits())
+    progress("looking at the byte code")
+    facts += (byte_code(ros.runtime), group_fact(), sandbox_memory(ros))
+    progress("trying every sandbox")
+    tiers = inspect_tiers(ros)
+    used = next((tier.name for tier in tiers if tier.usable), "")
+    facts += (_node_start(used or NO_SANDBOX),)
+    progress("exchanging messages")
+    exchange = _exchange(used or NO_SANDBOX, progress)
+    return Checkup(facts, exchange, tiers, used, "" if used else _remedy(tiers), Limits())
+
+
+def _ros() -> tuple[RosInstallation | None, tuple[Fact, ...]]:
+    """Find the ROS installation, or report as a fact why it cannot be used."""
+    try:
+        return find_ros(), ()
+    except EnvironmentFault as fault:
+        return None, (Fact("ROS 2", fault.message.removeprefix("ROS 2: "), fits=False, remedy=fault.hint),)
+
+
+def _node_start(tier: str) -> Fact:
+    """Report how students' nodes are started in a tier."""
+    if isolation_from_name(tier).can_fork:
+        return Fact("start of nodes", "each is forked from a process that has imported ROS")
+    text = "each executes Python and imports ROS, which takes longer: to be forked"
+    return Fact("start of nodes", f"{text} into {tier}, it needs Linux {'.'.join(map(str, ENTERABLE))} or newer")
+
+
+def _archives() -> Fact:
+    """Report which archives students may hand in."""
+    if is_installed():
+        return Fact("archives", "zip and tar, .rar and .7z by libarchive")
+    return Fact("archives", "zip and tar; .rar and .7z need libarchive", remedy=install_command())
+
+
+def _interfaces(ros: RosInstallation | None) -> tuple[Fact, ...]:
+    """Report whether interface packages can be built, and which ones are ready."""
+    if ros is None:
+        return ()
+    try:
+        ready = [package.name for package in described(()) if package.folder]
+    except (GraderError, ImportError) as error:
+        text = error.message if isinstance(error, GraderError) else str(error)
+        hint = (
+            f"install the generators: pip install ros-{ros.distro}-rosidl-generator-py ros-{ros.distro}-rosidl-parser"
+        )
+        return (Fact("interfaces", f"packages cannot be built here: {text}", fits=False, remedy=hint),)
+    text = "built from their definitions, without a compiler"
+    return (Fact("interfaces", f"{text}; ready: {', '.join(ready)}" if ready else text),)
+
+
+def _added() -> tuple[Fact, ...]:
+    """Report what other packages add to the grader, and why some of it cannot be used."""
+    try:
+        formats = [_added_format(*each) for each in entry_points.added(entry_points.FORMATS)]
+        schedulers = [_added_scheduler(*each) for each in entry_points.added(entry_points.SCHEDULERS)]
+    except EnvironmentFault as fault:
+        return (Fact("other packages", fault.message, remedy=fault.hint),)
+    return (*formats, *schedulers)
+
+
+def _added_format(name: str, package: str) -> Fact:
+    if name in (*FORMATS, EVIDENCE):
+        text = f"{name} of {package} is not used: the grader has its own"
+        return Fact("report format", text, remedy=f"give the format of {package.partition(' ')[0]} another name")
+    try:
+        format_of(name)
+    except EnvironmentFault as fault:
+        return Fact("report format", fault.message, remedy=fault.hint)
+    return Fact("report format", f"{name} of {package}")
+
+
+def _added_scheduler(name: str, package: str) -> Fact:
+    if name in entry_points.own(entry_points.SCHEDULERS):
+        text = f"{name} of {package} is not used: the grader has its own"
+        return Fact("class scheduler", text, remedy=f"give the scheduler of {package.partition(' ')[0]} another name")
+    try:
+        entry_points.load(entry_points.SCHEDULERS, name, object, "a scheduler")
+    except EnvironmentFault as fault:
+        return Fact("class scheduler", fault.message, remedy=fault.hint)
+    return Fact("class scheduler", f"{name} of {package}")
+
+
+def _remedy(tiers: Sequence[TierReport]) -> str:
+    """Return the easiest fix; running as another user comes last, because it takes the most effort."""
+    ordered = sorted(tiers, key=lambda tier: is_for_others(tier.name))
+    return next((tier.remedy for tier in ordered if tier.remedy), "")
+
+
+def _exchange(tier: str, progress: Progress) -> Exchange:
+    """Observe the trial node the way a student's node is observed, and count its messages."""
+    started = time.perf_counter()
+    arrived, problem = 0, ""
+    with tempfile.TemporaryDirectory(prefix="grade-doctor-") as folder:
+        file = Path(folder) / "trial.py"
+        file.write_text(TRIAL_NODE, encoding="utf-8")
+        try:
+            summary = observe(ObserveRequest((file,), TRIAL_NS, isolation=tier), progress)
+            arrived = sum(topic.messages for topic in summary.topics if topic.name == TRIAL_TOPIC)
+            problem = "; ".join(fault.text for fault in summary.faults)
+        except GraderError as error:
+            problem = error.message
+    return Exchange(tier, TRIAL_MESSAGES, arrived, time.perf_counter() - started, problem)

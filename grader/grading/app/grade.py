@@ -1,0 +1,408 @@
+"""Grades one submission from end to end, and keeps its recordings as evidence."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import grader
+from grader.grading.app.bags import Recordings, read_given, read_recordings, recordings_digest, refuse_unplayed
+from grader.grading.app.interface_packages import Provided, definitions, known_interfaces, provide
+from grader.grading.app.request import GradeRequest, reproduction
+from grader.grading.app.seeds import PRACTICE_NOTE
+from grader.grading.app.spot_checks import SpotChecks, check
+from grader.grading.judging.beginnings import BeginningJudge
+from grader.grading.judging.judge_run import judge_run
+from grader.grading.model.exercise import Exercise, exercise_name
+from grader.grading.model.report import Environment, Report
+from grader.grading.model.run import Run
+from grader.grading.rubrics.builtin import builtin_exercises, exercise_ids
+from grader.grading.submissions.collected import listed, shown
+from grader.grading.submissions.sources import HASHES, read_reaches, read_sources
+from grader.grading.submissions.submission import stage_collected, stage_submission
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.errors import EvidenceError, SubmissionError
+from grader.runtime.model.releases import TRIED
+from grader.runtime.model.submission import Submission
+from grader.runtime.model.trace import Trace
+from grader.runtime.plan import derive, known_programs, plan_scenario
+from grader.runtime.programs.shares import install_shares
+from grader.runtime.session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
+from grader.runtime.supervisor.real_time_budget import RealTimeBudget
+from grader.runtime.supervisor.supervisor import Job
+from grader.runtime.supervisor.test_runs import TestJob, record_tests
+
+#: Exercise id and scenario id.
+Key = tuple[str, str]
+#: Called at the start of each step with a short phrase such as `Exercise 1: velocity_publisher.py (alone)`.
+Progress = Callable[[str], None]
+
+
+class EarlyReports:
+    """Makes a partial report whenever one exercise is completely recorded and others are not.
+
+    An exercise without a scenario to record is judged along with the first that is recorded.
+    """
+
+    def __init__(
+        self,
+        exercises: Sequence[Exercise],
+        scenarios: Collection[Key],
+        run: Run,
+        on_report: Callable[[Report], None],
+    ) -> None:
+        self._exercises = exercises
+        self._awaited = set(scenarios)
+        self._run = run
+        self._on_report = on_report
+        self._traces = dict(run.traces)
+        self._started = time.perf_counter()
+
+    def take(self, key: Key, trace: Trace) -> None:
+        """Take a recording; make a partial report if it completes its exercise but not the whole run."""
+        self._traces[key] = trace
+        self._awaited.discard(key)
+        pending = {exercise for exercise, _ in self._awaited}
+        if pending and key[0] not in pending:
+            duration_s = self._run.duration_s + time.perf_counter() - self._started
+            run = replace(self._run, traces=dict(self._traces), duration_s=duration_s)
+            self._on_report(judge_run(self._exercises, run, pictures=False, pending=pending))
+
+
+def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
+    session: RecordingSession,
+    request: GradeRequest,
+    progress: Progress,
+    on_recorded: Callable[[Run, Sequence[Exercise]], None] | None = None,
+    on_partial_report: Callable[[Report], None] | None = None,
+    *,
+    pictures: bool = True,
+    started: float | None = None,
+) -> Report:
+    """Grade one submission in a session, which others may use before and after it.
+
+    Raises a GraderError whose class tells who must act. The complete recording and its exercises are passed to
+    `on_recorded`; a partial report to `on_partial_report`, whenever one exercise is done and others are not. Pictures
+    are charts, which only some formats show. The duration in the report begins at `started`, a reading of
+    `time.perf_counter`; now if it is None.
+    """
+    started = time.perf_counter() if started is None else started
+    with prepared(session, request, progress, started) as ready:
+        exercises, submission, run = ready.exercises, ready.submission, ready.run
+        asked = {*ready.jobs, *ready.tests}
+        take = EarlyReports(exercises, asked, run, on_partial_report).take if on_partial_report else None
+        checks = SpotChecks(request.spot_checks, run.seed, submission.digest, ready.reaches)
+        later = request.clock == AUTO and checks.certain
+        first = None if later else take
+        budget = RealTimeBudget(request.time_budget_s, spent_s=ready.provided.spent_s)
+        traces = session.record(ready.jobs, request.clock, progress, first, budget=budget)
+        tested = record_tests(session.recorder, ready.tests, progress, budget)
+        if request.clock == AUTO:
+            # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
+            record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
+            judge_of = partial(_judge_of, exercises, submission, run.sources)
+            traces = check(checks, ready.jobs, traces, record, take or (lambda *_: None), judge_of)
+        run = replace(run, traces={**run.traces, **traces, **tested}, duration_s=time.perf_counter() - started)
+        run = replace(run, definitions=definitions(run.traces.values(), ready.provided))
+        if on_recorded is not None:
+            on_recorded(run, exercises)
+        return judge_run(exercises, run, pictures=pictures)
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A submission that was read and staged, and the recordings to make of it."""
+
+    exercises: Sequence[Exercise]
+    submission: Submission
+    provided: Provided
+    reaches: tuple[str, ...]  # what its files use that reaches into their process
+    jobs: Mapping[Key, Job]  # by exercise and scenario
+    tests: Mapping[Key, TestJob]  # the tests to run, in the same way
+    run: Run  # all but the recordings to make
+
+
+@contextmanager
+def prepared(
+    session: RecordingSession, request: GradeRequest, progress: Progress, started: float
+) -> Iterator[Prepared]:
+    """Read and stage a submission for the block, and plan its recordings; raises as `grade_in`."""
+    # What cannot be removed now is removed with the folder of the session.
+    with (
+        TemporaryDirectory(prefix="submission-", dir=session.folder, ignore_cleanup_errors=True) as folder,
+        TemporaryDirectory(prefix="installed-", dir=session.folder, ignore_cleanup_errors=True) as prefix,
+    ):
+        progress("reading the submission")
+        exercises = read_exercises(request)
+        request = replace(request, exercises=exercise_ids(request.exercises, exercises))
+        root = Path(folder)
+        root.chmod(0o755)  # as the folder of the session
+        if names_a_program(request):
+            exercises, submission = _of_one_file(request, exercises, root)
+        else:
+            submission = _staged(request, exercises, root)
+        if request.every:
+            exercises, submission = begun(exercises, submission)
+        recordings = read_recordings(request, exercises)
+        played = recordings_digest(read_given(request, recordings))
+        seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
+        environment = environment_of(session)
+        provided = provide(session, exercises, request.interfaces, submission, request.time_budget_s)
+        submission = replace(submission, notes=(*submission.notes, *provided.problems))
+        kept = _kept(request, exercises, submission, played, seed, environment, provided.offered)
+        done = {exercise for exercise, _ in kept}
+        unrecorded = [exercise for exercise in exercises if exercise.id not in done]
+        prefixes: tuple[str, ...] = ()
+        if unrecorded:
+            prefixes, problems = install_shares(submission.root, submission.projects, Path(prefix), session.ros)
+            submission = replace(submission, notes=(*submission.notes, *problems))
+        reaches = read_reaches(submission.root)
+        folders, own_hashes = provided.folders, not HASHES.isdisjoint(reaches)
+        jobs = plan_jobs(request, unrecorded, submission, recordings, seed, folders, prefixes, own_hashes=own_hashes)
+        tests = plan_tests(
+            unrecorded, submission, seed, folders, prefixes, own_hashes=own_hashes, trusted=provided.trusted
+        )
+        run = Run(
+            submission=submission,
+            traces=kept,
+            sources=read_sources(submission),
+            environment=environment,
+            seed=seed,
+            duration_s=time.perf_counter() - started,
+            notes=(*submission.notes, *_notes(request, session), *provided.notes),
+            reproduce=reproduction(request, exercises, played, seed),
+            interfaces=provided.packages,
+            offered=provided.offered,
+        )
+        yield Prepared(exercises, submission, provided, reaches, jobs, tests, run)
+
+
+def _judge_of(
+    exercises: Sequence[Exercise], submission: Submission, sources: Mapping[str, str], key: Key
+) -> BeginningJudge:
+    """Return what judges the beginnings of the recordings of a scenario."""
+    exercise = next(exercise for exercise in exercises if exercise.id == key[0])
+    return BeginningJudge(exercise, key[1], submission, sources)
+
+
+def _kept(  # noqa: PLR0913  all that a recording depends on
+    request: GradeRequest,
+    exercises: Sequence[Exercise],
+    submission: Submission,
+    played: str,
+    seed: int,
+    environment: Environment,
+    interfaces: str,
+) -> Mapping[Key, Trace]:
+    """Return the kept recordings that this run would make again with the same software; none if one is damaged."""
+    if request.recordings is None:
+        return {}
+    # Seldom needed.
+    from grader.grading.app.kept_recordings import PlannedRun, kept_traces, recorded_alike  # noqa: PLC0415
+    from grader.grading.evidence.store import open_evidence  # noqa: PLC0415 - takes long, and is seldom needed
+
+    planned = PlannedRun(submission.digest, seed, played, interfaces)
+    try:
+        evidence = open_evidence(request.recordings)
+        if evidence.manifest.environment != environment:
+            return {}
+        return kept_traces(evidence, recorded_alike(evidence, exercises, planned))
+    except EvidenceError:
+        return {}
+
+
+def _record_checks(
+    session: RecordingSession, progress: Progress, budget: RealTimeBudget, jobs: Sequence[Job]
+) -> Sequence[Trace]:
+    return session.recorder.record([replace(job, budget=budget) for job in jobs], progress)
+
+
+def read_exercises(
+    request: GradeRequest, submissions: Sequence[Path] = (), *, recorded: bool = False
+) -> list[Exercise]:
+    """Read the exercises to grade, in rubric order; raises RubricError if a rubric or a requested exercise is unusable.
+
+    Args:
+        request: Names the rubrics and exercises.
+        submissions: Other paths that students control: no rubric may load its own checks from there.
+        recorded: Whether nothing will run, so that rubrics may name message types that are not installed here.
+    """
+    theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
+    if request.rubrics:
+        # Takes long; built-in rubrics are compiled.
+        from grader.grading.rubrics.loader import read_rubric  # noqa: PLC0415
+
+        known = None if recorded else known_interfaces(request.interfaces)
+        read = partial(read_rubric, submissions=theirs, draw=request.draw, interfaces=known)
+        exercises = [read(path) for path in request.rubrics]
+    else:
+        exercises = list(builtin_exercises())
+    refuse_unplayed(request.bags, exercises)
+    chosen = exercise_ids(request.exercises, exercises)
+    if request.exercises:
+        return [exercise for exercise in exercises if exercise.id in chosen]
+    return [e for e in exercises if request.rubrics or request.every or not e.by_request]
+
+
+def plan_jobs(  # noqa: PLR0913  each comes from a different stage
+    request: GradeRequest,
+    exercises: Sequence[Exercise],
+    submission: Submission,
+    recordings: Recordings,
+    seed: int,
+    interfaces: Sequence[Path] = (),
+    prefixes: tuple[str, ...] = (),
+    *,
+    own_hashes: bool = False,
+) -> dict[tuple[str, str], Job]:
+    """Plan the recordings, by exercise and scenario; scenarios with a missing file are left out.
+
+    The interfaces are the folders of packages that are not installed; the prefixes are what `install_shares` returns.
+    `own_hashes` is whether the order of a set may matter to the programs.
+    """
+    clock = planned_clock(request.clock)
+    return {
+        (exercise.id, scenario.id): Job(
+            f"{exercise_name(exercise.number)}: {', '.join(scenario.processes)} ({scenario.id.replace('_', ' ')})",
+            replace(
+                plan_scenario(
+                    exercise.id,
+                    scenario,
+                    submission,
+                    seed=seed,
+                    recordings=recordings,
+                    clock=clock,
+                    own_hashes=own_hashes,
+                ),
+                interfaces=tuple(map(str, interfaces)),
+                prefixes=prefixes,
+            ),
+        )
+        for exercise in exercises
+        for scenario in exercise.scenarios
+        if scenario.test is None and all(submission.files[name].found for name in scenario.handed_in)
+    }
+
+
+def plan_tests(  # noqa: PLR0913  each comes from a different stage
+    exercises: Sequence[Exercise],
+    submission: Submission,
+    seed: int,
+    interfaces: Sequence[Path] = (),
+    prefixes: tuple[str, ...] = (),
+    *,
+    own_hashes: bool = False,
+    trusted: Sequence[Path] = (),
+) -> dict[Key, TestJob]:
+    """Plan the tests of rubrics, by exercise and scenario; the arguments are those of `plan_jobs`.
+
+    `trusted` are those of the interface packages that the submission does not bring: a test imports no others.
+    """
+    jobs: dict[Key, TestJob] = {}
+    for exercise in exercises:
+        for scenario in exercise.scenarios:
+            if scenario.test is None:
+                continue
+            plan = plan_scenario(
+                exercise.id,
+                scenario,
+                submission,
+                seed=seed,
+                recordings={},
+                clock=planned_clock(AUTO),
+                own_hashes=own_hashes,
+            )
+            handed_in = {name: submission.files[name] for name in scenario.processes}
+            there = {name: file for name, file in handed_in.items() if file.found}
+            jobs[exercise.id, scenario.id] = TestJob(
+                f"{exercise_name(exercise.number)}: {scenario.test.name}",
+                replace(plan, interfaces=tuple(map(str, interfaces)), prefixes=prefixes),
+                scenario.test,
+                int(derive(seed, "test", exercise.id, scenario.id), 16),
+                files=tuple((name, file.found or "", file.executable) for name, file in there.items()),
+                missing=tuple(name for name in handed_in if name not in there),
+                known=tuple(known_programs(submission)),
+                provided=scenario.provided,
+                paths=tuple(map(str, trusted)),
+            )
+    return jobs
+
+
+def begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[Exercise], Submission]:
+    """Return the exercises that a submission has a file for, and the submission limited to their files."""
+    begun = [e for e in exercises if any(submission.files[name].found for name in e.files)]
+    if not begun:
+        where = shown(submission.path, 500)
+        files = listed(wanted_files(exercises))
+        raise SubmissionError(f"{where}: expected a file of an exercise, found none", f"the files are {files}")
+    return begun, replace(submission, files={name: submission.files[name] for name in wanted_files(begun)})
+
+
+def names_a_program(request: GradeRequest) -> bool:
+    """Return whether a request names one .py file and no exercises: then those are graded that the file belongs to."""
+    chosen = bool(request.exercises) or request.every or request.collected is not None
+    named = not chosen and request.submission.casefold().endswith(".py")
+    try:
+        return named and Path(request.submission).is_file()
+    except OSError:  # no file can have this name, which staging says
+        return False
+
+
+def _of_one_file(request: GradeRequest, usual: Sequence[Exercise], root: Path) -> tuple[list[Exercise], Submission]:
+    """Stage the file of a request; return it with the exercises that it belongs to, or else with the usual ones."""
+    every = read_exercises(replace(request, every=True))
+    submission = _staged(request, every, root)
+    chosen = belonging(every, submission) or list(usual)
+    return chosen, replace(submission, files={name: submission.files[name] for name in wanted_files(chosen)})
+
+
+def belonging(exercises: Sequence[Exercise], submission: Submission) -> list[Exercise]:
+    """Return the exercises that the one file of a submission belongs to, by its name or else by its likeness."""
+    looked_for = [(exercise, [submission.files[name] for name in exercise.files]) for exercise in exercises]
+    named = [exercise for exercise, files in looked_for if any(file.found for file in files)]
+    similar = [exercise for exercise, files in looked_for if any(file.similar for file in files)]
+    return named or similar or [exercise for exercise, files in looked_for if any(file.likely for file in files)]
+
+
+def wanted_files(exercises: Sequence[Exercise]) -> list[str]:
+    """Return the names of the files that exercises require, without repetitions."""
+    return list(dict.fromkeys(name for exercise in exercises for name in exercise.files))
+
+
+def _staged(request: GradeRequest, exercises: Sequence[Exercise], root: Path) -> Submission:
+    wanted = wanted_files(exercises)
+    if request.collected is not None:
+        return stage_collected(request.collected, request.submission, wanted, root)
+    return stage_submission(request.submission, wanted, root)
+
+
+def _notes(request: GradeRequest, session: RecordingSession) -> Iterator[str]:
+    """Yield what readers must know of the seed, the release and the sandbox."""
+    if request.seed is None and request.seed_key.public:
+        yield PRACTICE_NOTE
+    if session.ros.distro not in TRIED:
+        yield f"this grader was never tested with ROS 2 {session.ros.distro}, only with {' and '.join(TRIED)}"
+    lacking = [str(found) for found in session.containment if not found.holds]
+    if session.isolation.name == NO_ISOLATION:
+        yield "the submission ran without a sandbox, as requested"
+    elif lacking:
+        yield f"sandbox {session.isolation.name}: {'; '.join(lacking)}"
+
+
+def environment_of(session: RecordingSession) -> Environment:
+    """Return the software that a session records with."""
+    return Environment(
+        grader=grader.__version__,
+        ros_distro=session.ros.distro,
+        rclpy=session.ros.rclpy_version,
+        rmw="rmw_fastrtps_cpp",
+        python=platform.python_version(),
+        isolation=session.isolation.name,
+        containment=session.containment,
+    )

@@ -1,0 +1,120 @@
+"""Runs nodes without a rubric and summarises what they do, for `grade observe`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
+from pathlib import Path
+
+from grader.grading.app.bags import observed, recordings_of
+from grader.grading.app.grade import Progress
+from grader.grading.app.inputs import NamedSimulation, SentMessages, messages, simulated
+from grader.grading.app.interface_packages import provide
+from grader.grading.app.programs import find_targets, stage
+from grader.grading.app.seeds import PRACTICE
+from grader.grading.judging.summary import summarise
+from grader.grading.judging.values import student_endpoints
+from grader.grading.model.report import Summary
+from grader.grading.submissions.sources import source_text
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.scenario import Scenario, Span, is_launch_file
+from grader.runtime.model.submission import Submission
+from grader.runtime.model.trace import Trace
+from grader.runtime.plan import plan_scenario
+from grader.runtime.programs.shares import install_shares
+from grader.runtime.session import open_session, planned_clock
+from grader.runtime.stimuli.recorded import RecordedStream
+from grader.runtime.supervisor.supervisor import Job
+from grader.runtime.worker.launching import NODES
+
+#: When a given recording starts playing; before that the nodes receive nothing of it.
+RECORDED_AFTER_NS = NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class ObserveRequest:
+    """What to observe, and how."""
+
+    # Python files, launch files, packages, workspaces and executables as `FOLDER/NAME`; each runs in its own process
+    files: tuple[Path, ...]
+    duration_ns: int = 10 * NS_PER_S  # how long they are observed
+    bags: tuple[tuple[str, Path], ...] = ()  # recordings to play: `(topic or message type, path)`
+    clock: str = "auto"  # `virtual`, `wall` or `auto`
+    isolation: str = "auto"  # `auto` or `none`
+    interfaces: tuple[Path, ...] = ()  # folders with interface packages
+    simulations: tuple[NamedSimulation, ...] = ()  # participants that react to what the programs publish
+    sent: SentMessages = field(default_factory=dict)  # messages to send to them
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """The observed behaviour of the nodes."""
+
+    trace: Trace
+    processes: tuple[str, ...]  # file names of the processes
+    isolation: str
+    sources: Mapping[str, str] = field(default_factory=dict)  # the text of their files, and of those that faults name
+
+
+def observe(request: ObserveRequest, progress: Progress) -> Summary:
+    """Run the programs together and summarise what they did; twice if messages are sent, to learn their types first.
+
+    Raises:
+        GraderError: Nobody subscribes to a topic of a message to send, or it does not fit the type.
+    """
+    watched = watch(request, progress)
+    if request.sent:
+        types = {end.topic: end.type for end in student_endpoints(watched.trace, "subscription")}
+        sent = messages(request.sent, types, request.duration_ns / NS_PER_S, request.interfaces)
+        scenario = undisturbed(request, watched.processes)
+        watched = watch(request, progress, replace(scenario, stimuli=(*scenario.stimuli, *sent)))
+    return summarise(watched.trace, watched.processes, watched.isolation, watched.sources)
+
+
+def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None = None) -> Watched:
+    """Run the programs together and return the trace.
+
+    Without a scenario, only the simulations take part, and the given recording is played.
+    """
+    known = find_targets(request.files)
+    targets = known.targets
+    names = [target.name for target in targets]
+    if scenario is None:
+        scenario = undisturbed(request, names)
+    streams = [stimulus for stimulus in scenario.stimuli if isinstance(stimulus, RecordedStream)]
+    recordings = recordings_of(streams, request.interfaces)
+    with open_session(request.isolation, progress=progress) as session:
+        submission = stage(targets, session.folder)
+        seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
+        plan = plan_scenario("observe", scenario, submission, seed=seed, recordings=recordings, clock=clock)
+        provided = provide(session, (), request.interfaces, submission)
+        installed = session.folder / "installed"
+        prefixes, _ = install_shares(submission.root, submission.projects, installed, session.ros)
+        plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)
+        trace = session.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
+        sources = _sources(trace, submission)
+    if trace.harness_problem:
+        raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")
+    trace = replace(trace, notes=(*known.notes, *trace.notes))
+    return Watched(trace, tuple(names), session.isolation.name, sources)
+
+
+def _sources(trace: Trace, submission: Submission) -> dict[str, str]:
+    """Return the text of the programs and of the files that faults name, by path; none for one that is not text."""
+    named = {fault.file for fault in trace.faults()} | {start.file for start in trace.starts}
+    named |= {file.found for file in submission.files.values() if file.found}
+    # the paths are those of staged files: a process cannot name others
+    texts = {name: source_text(submission.root / name) for name in sorted(named) if name}
+    return {name: text for name, text in texts.items() if text is not None}
+
+
+def undisturbed(request: ObserveRequest, names: Sequence[str]) -> Scenario:
+    """Return the scenario of programs with the simulations and the recording of a request, and no messages."""
+    played = observed(request.bags, RECORDED_AFTER_NS, max(NS_PER_S, request.duration_ns - RECORDED_AFTER_NS))
+    stimuli = (*simulated(request.simulations, request.interfaces), *played)
+    launched = sum(map(is_launch_file, names)) * NODES
+    limits = Limits(participants=Limits().participants + len(names) + launched)
+    return Scenario("observed", tuple(names), Span(request.duration_ns), stimuli, limits=limits)

@@ -1,0 +1,200 @@
+"""Finds the programs that `grade observe` is to run, and stages what they may import."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from grader.grading.submissions.collected import Collected, first_of, listed
+from grader.grading.submissions.projects import read_projects
+from grader.grading.submissions.submission import collect_submission, stage_collected, stage_submission
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.errors import SubmissionError
+from grader.runtime.model.projects import Project
+from grader.runtime.model.submission import Submission
+from grader.runtime.programs.executables import executables, find_executables
+
+#: What can be named.
+_WHAT = "name .py files, launch files, packages, workspaces, FOLDER/EXECUTABLE or FOLDER/PACKAGE/EXECUTABLE"
+#: The most executables that a message lists.
+_SHOWN = 12
+#: The most programs that are observed together: each is a process with a sandbox, 70 MB and a DDS participant.
+MOST_PROGRAMS = 40
+#: How far above a package the folder `src` of its workspace may be: packages lie in it or in a repository in it.
+MOST_LEVELS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One process to run: a file, or an executable of a package."""
+
+    name: str  # file name, or `PACKAGE/EXECUTABLE`
+    folder: Path  # the folder of the file, or that of the packages
+    file: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Targets:
+    """What to run.
+
+    Attributes:
+        targets: The processes, in the given order, with different names.
+        notes: Sentences about what is not run.
+    """
+
+    targets: tuple[Target, ...]
+    notes: tuple[str, ...] = ()
+
+
+def find_targets(paths: tuple[Path, ...]) -> Targets:
+    """Return what to run; raises SubmissionError for programs that are named twice, and for anything else."""
+    found = [_of_path(path) for path in paths]
+    targets = [target for one in found for target in one.targets]
+    whole = [str(target.file.resolve()) if target.file is not None else target.name for target in targets]
+    for name in whole:
+        if whole.count(name) > 1:
+            raise SubmissionError(f"{name}: expected each program once, found it twice", "name it once")
+    if len(targets) > MOST_PROGRAMS:
+        text = f"expected at most {MOST_PROGRAMS} programs, found {len(targets)}"
+        raise SubmissionError(text, "name the packages or files to observe together")
+    return Targets(_with_folders(targets), tuple(note for one in found for note in one.notes))
+
+
+def _with_folders(targets: list[Target]) -> tuple[Target, ...]:
+    """Return targets with different names: files of one name get as many of their folders as tell them apart."""
+    names = [target.name for target in targets]
+    renamed = []
+    for target in targets:
+        if target.file is None or names.count(target.name) == 1:
+            renamed.append(target)
+            continue
+        parts = target.file.resolve().parts
+        others = [other.file.resolve().parts for other in targets if other.name == target.name and other.file]
+        size = next(n for n in range(1, len(parts) + 1) if sum(other[-n:] == parts[-n:] for other in others) == 1)
+        renamed.append(replace(target, name="/".join(parts[-size:])))
+    return tuple(renamed)
+
+
+def _of_path(path: Path) -> Targets:
+    if path.is_file() and path.suffix == ".py":
+        return Targets((Target(path.name, path.resolve().parent, path),))
+    if path.is_dir():
+        return _of_folder(path)
+    if not path.exists():
+        # FOLDER/NAME, or FOLDER/PACKAGE/NAME
+        for folder, package in ((path.parent, "*"), (path.parent.parent, path.parent.name)):
+            found = _of_name(path, folder, package) if folder.is_dir() and path.parent.name else None
+            if found is not None:
+                return found
+    raise SubmissionError(f"{path}: expected a .py file, found none", _WHAT)
+
+
+def _of_folder(path: Path) -> Targets:
+    """Return all executables of a package or workspace."""
+    root = path.resolve()
+    projects, problems = read_projects(root)
+    known = executables(root, projects)
+    foreign = [f"{project.name}/{name}" for project in projects for name in project.foreign]
+    notes = [one.problem for one in known if one.file is None]
+    notes += [f"not run, because it is not a Python program: {first_of(foreign)}"] if foreign else []
+    found = tuple(Target(one.words, root) for one in known if one.file is not None)
+    if not found:
+        text = f"{path}: expected a package or workspace with executables, found none"
+        raise SubmissionError(text, "; ".join([*notes, _how_to_have_some(projects)]))
+    return Targets(found, (*notes, *problems))
+
+
+def _how_to_have_some(projects: Sequence[Project]) -> str:
+    """Return what to do about packages without executables, by how they are built."""
+    by_cmake = [project for project in projects if project.by_cmake]
+    files = [file for project in projects for _, file in project.unrunnable]
+    if files:
+        return f"install {first_of(files)} with PROGRAMS, so that it can be run"
+    ways = ["add console_scripts to setup.py"] if len(by_cmake) < len(projects) else []
+    ways += ["add install(PROGRAMS ... DESTINATION lib/${PROJECT_NAME}) to CMakeLists.txt"] if by_cmake else []
+    return ", or ".join(["name the files of the nodes to run", *ways])
+
+
+def _of_name(path: Path, folder: Path, package: str) -> Targets | None:
+    """Return the executable of a name; None if the folder has no such package."""
+    root = folder.resolve()
+    projects, _ = read_projects(root)
+    known = [one for one in executables(root, projects) if package in ("*", one.package)]
+    named = find_executables(root, projects, package, path.name)
+    found = [one for one in named if one.file is not None]
+    if len(found) == 1 or (found and path.parent.name == "*"):
+        others = [one.words for one in found[1:]]
+        notes = (f"run is {found[0].words}, the first of its name; not run: {first_of(others)}",) if others else ()
+        return Targets((Target(found[0].words, root),), notes)
+    if named and not found:
+        raise SubmissionError(f"{path}: {named[0].problem}", "write the file, or correct the name")
+    if not known:
+        return None
+    several = f"several: {listed([one.words for one in found])}" if found else "none"
+    names = listed([one.words for one in known[:_SHOWN]])
+    hint = "name it as FOLDER/PACKAGE/EXECUTABLE" if found else _WHAT
+    raise SubmissionError(f"{path}: expected an executable ({names}), found {several}", hint)
+
+
+def stage(targets: Sequence[Target], into: Path) -> Submission:
+    """Stage what the programs may import: their workspace or package, or else their common folder; one may be alone."""
+    names, files = [target.name for target in targets], [target.file for target in targets]
+    folder = Path(os.path.commonpath([target.folder for target in targets]))
+    package = package_of(folder)
+    for place, root in enumerate(dict.fromkeys((workspace_of(package), package, folder))):
+        staged = into / f"submission_{place}"
+        staged.mkdir()
+        meant = {
+            name: file.resolve().relative_to(root).as_posix() for name, file in zip(names, files, strict=True) if file
+        }
+        try:
+            submission = stage_submission(str(root), names, staged, meant)
+        except SubmissionError:
+            if root == folder and (len(files) > 1 or files[0] is None):
+                if len({target.folder for target in targets}) > 1:
+                    break
+                raise
+            continue
+        if all(submission.files[name].found == path for name, path in meant.items()):  # a copy leaves some folders out
+            return submission
+    alone = into / "alone"
+    alone.mkdir()
+    if len(targets) == 1:
+        return stage_submission(str(files[0]), names, alone)
+    return _stage_apart(targets, alone)
+
+
+def _stage_apart(targets: Sequence[Target], into: Path) -> Submission:
+    """Stage programs whose common folder holds too much: beside each other, each with its own workspace or folder."""
+    roots = {target.name: workspace_of(package_of(target.folder)) for target in targets}
+    places = {root: f"{place}_{root.name}" for place, root in enumerate(dict.fromkeys(roots.values()), 1)}
+    names = [target.name for target in targets]
+    collected = {root: collect_submission(str(root), names, into) for root in places}
+    files = tuple((f"{places[root]}/{name}", text) for root, one in collected.items() for name, text in one.files)
+    meant = {
+        target.name: f"{places[roots[target.name]]}/{target.file.resolve().relative_to(roots[target.name]).as_posix()}"
+        for target in targets
+        if target.file is not None
+    }
+    submission = stage_collected(Collected(files), str(targets[0].folder), names, into, meant)
+    for name, path in meant.items():
+        if submission.files[name].found != path:
+            raise SubmissionError(
+                f"{name}: expected a file of the submission, found one in a folder that a tool created"
+            )
+    return submission
+
+
+def package_of(folder: Path) -> Path:
+    """Return the package that a folder is in; the folder itself if it is in none."""
+    return next((up for up in (folder, *folder.parents) if (up / "package.xml").is_file()), folder)
+
+
+def workspace_of(package: Path) -> Path:
+    """Return the folder with the packages that one may need: the `src` above it, or the next if it holds others."""
+    source = next((up for up in package.parents[:MOST_LEVELS] if up.name == "src"), package.parent)
+    found = (manifest for level in ("*", "*/*") for manifest in source.glob(f"{level}/package.xml"))
+    beside = (manifest for manifest in found if manifest.parent != package)
+    return source if (package / "package.xml").is_file() and any(beside) else package

@@ -1,0 +1,1 @@
+"""Recordings that are kept with what is needed to judge them again."""

@@ -1,0 +1,631 @@
+"""Causes of wrong numbers in messages: fields, formulas and random values."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule
+from grader.grading.judging.diagnosis.wiring import (
+    Constant,
+    constant,
+    given_leaf,
+    made,
+    made_for,
+    number_in_code,
+    runs,
+    target_of,
+    variable_of,
+)
+from grader.grading.judging.facts import DrawFacts, SeriesFacts
+from grader.grading.judging.source import Source, chain, first_line, last_name, words
+from grader.grading.judging.values import as_number, leaves, number_path, published, published_numbers, value_at
+from grader.grading.judging.wording import moment, number
+from grader.grading.model.exercise import ProblemKind
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.trace import Message
+
+_DRAWS = words(
+    "uniform randint random randrange gauss normalvariate choice choices normal rand randn triangular integers sample "
+    "betavariate random_sample randbelow urandom getrandom randbytes token_bytes getrandbits randbits standard_normal"
+)
+#: How many levels of an expression around a random draw are followed.
+_DEEPEST = 12
+
+
+@dataclass(frozen=True, slots=True)
+class _Given:
+    """A statement that sets a field: the statement, the value, and the number if the text shows it."""
+
+    node: ast.AST
+    value: ast.expr
+    worth: Constant | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Wrong:
+    """The first wrong message, with its wrong fields and their contents."""
+
+    case: Case
+    source: Source
+    message: Message
+    wanted: Mapping[str, float]
+    found: Mapping[str, float]
+
+
+def _wrong(case: Case) -> _Wrong | None:
+    check = case.check
+    for message in published(case.trace, check.topic):
+        got = {path: as_number(value_at(message.value, path)) for path in check.values}
+        wrong = {p: g for p, g in got.items() if g is not None and not _is(g, check.values[p])}
+        if wrong:
+            return _Wrong(case, case.source, message, check.values, wrong)
+    return None
+
+
+def _is(got: float, want: float) -> bool:
+    return math.isclose(got, want, rel_tol=1e-6, abs_tol=1e-6)
+
+
+def _given_values(source: Source, path: str) -> list[_Given]:
+    """Return the statements that set a field such as `linear.x`, by assignment or keyword argument."""
+    group, _, leaf = path.partition(".")
+    pairs = (p for s in source.all(ast.Assign) for p in _assigned(s))
+    found = [_Given(s, v, constant(source, v)) for s, t, v in pairs if chain(t).endswith(f".{path}")]
+    for call in source.all(ast.Call):
+        around = source.parents.get(call)
+        outer = around.arg if isinstance(around, ast.keyword) else ""
+        whole = isinstance(around, ast.Assign) and any(chain(t).endswith(f".{group}") for t in around.targets)
+        own = [k for k in call.keywords if k.arg == leaf and (outer == group or whole)]
+        found += [_Given(k, k.value, constant(source, k.value)) for k in own]
+    return sorted(found, key=lambda g: first_line(g.node))
+
+
+def _assigned(statement: ast.Assign) -> Iterator[tuple[ast.Assign, ast.expr, ast.expr]]:
+    """Yield statement, target and value of an assignment; those of `a, b = 1, 2` separately."""
+    for target in statement.targets:
+        value = statement.value
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
+            yield from ((statement, t, v) for t, v in zip(target.elts, value.elts, strict=True))
+        else:
+            yield statement, target, value
+
+
+def _place_of(got: _Given) -> ast.AST:
+    """Return the node to point at: the definition of the number, if it has a name."""
+    named = got.worth is not None and isinstance(got.value, (ast.Name, ast.Attribute))
+    return got.worth.origin if named and got.worth is not None else got.node
+
+
+def _first_values(case: Case) -> list[object]:
+    facts = case.found(SeriesFacts)
+    return [] if facts is None else list(facts.first)
+
+
+def draws(source: Source) -> list[ast.Call]:
+    """Return the calls that draw a random number."""
+    return list(source.calls(*_DRAWS))
+
+
+@hint_rule("field_values", given=_wrong, priority=10010)
+def _set_elsewhere(wrong: _Wrong) -> Clue | None:
+    """The field gets the right number, in an object that is not published or is replaced before."""
+    source = wrong.source
+    sends = [c for c in source.calls("publish") if len(c.args) == 1]
+    for path, value in wrong.found.items():
+        want = wrong.wanted[path]
+        places = _given_values(source, path)
+        right = [g for g in places if g.worth is not None and _is(g.worth.value, want)]
+        if len(right) != 1 or len(sends) != 1 or not isinstance(right[0].node, ast.Assign):
+            continue
+        given, sent = right[0].node, chain(sends[0].args[0])
+        owner = next((n for t in given.targets if (n := chain(t).removesuffix(f".{path}")) != chain(t)), "")
+        clue = _overwritten(source, given, places, path, value) or _replaced(source, given, owner, sent, sends[0])
+        if clue is not None:
+            return clue
+    return None
+
+
+def _overwritten(source: Source, given: ast.Assign, places: Sequence[_Given], path: str, value: float) -> Clue | None:
+    """Return a clue if a later assignment in the same block gives the wrong number to the same field."""
+    block = source.parents.get(given)
+    later = [g for g in places if source.parents.get(g.node) is block and first_line(g.node) > first_line(given)]
+    same = [g for g in later if isinstance(g.node, ast.Assign) and _targets(g.node) == _targets(given)]
+    if len(same) != 1 or same[0].worth is None or not _is(same[0].worth.value, value):
+        return None
+    hint = f"{source.code(same[0].node)} overwrites {source.code(given)} in line {first_line(given)}: remove it"
+    return Clue(hint, source.place(same[0].node), key=f"overwritten:{path}")
+
+
+def _targets(statement: ast.Assign) -> list[str]:
+    return [chain(t) for t in statement.targets]
+
+
+def _replaced(source: Source, given: ast.Assign, owner: str, sent: str, send: ast.Call) -> Clue | None:
+    """Return a clue if what is published is made anew after the fields were set, or instead of it."""
+    function = source.function_of(send)
+    makers = [s for s in source.all(ast.Assign) if _targets(s) == [sent] and isinstance(s.value, ast.Call)]
+    here = [s for s in makers if source.function_of(s) is function and first_line(s) < first_line(send)]
+    if not owner or not sent or len(here) != 1 or here[0].value.args or here[0].value.keywords:  # type: ignore[attr-defined]
+        return None
+    code, line = source.code(here[0]), first_line(given)
+    if owner == sent and source.function_of(given) is function and line < first_line(here[0]):
+        hint = f"{code} discards what was set before it, in line {line}: remove it, or set the fields after it"
+        return Clue(hint, source.place(here[0]), key=f"replaced:{first_line(here[0])}")
+    if owner != sent and not _used(source, owner, here[0], send):
+        hint = f"{source.code(send)} sends the new, empty {sent}; the fields are set in {owner}: publish {owner}"
+        return Clue(hint, source.place(send), key=f"replaced:{first_line(here[0])}")
+    return None
+
+
+def _used(source: Source, owner: str, begin: ast.AST, end: ast.AST) -> bool:
+    """Return whether a name is used between two statements."""
+    rows = range(first_line(begin), first_line(end) + 1)
+    return any(chain(n) == owner and first_line(n) in rows for n in source.names())
+
+
+@hint_rule("field_values", given=_wrong, priority=10020)
+def _misplaced_field(wrong: _Wrong) -> Clue | None:
+    """The right numbers are in the wrong fields."""
+    numbers = leaves(wrong.message.value)
+    for path, value in wrong.found.items():
+        want = wrong.wanted[path]
+        alike = [p for p, v in numbers.items() if p != path and _is(v, want)]
+        there = [p for p in alike if not _is(wrong.wanted.get(p, 0.0), want)]
+        if _is(want, 0.0) or len(there) != 1:
+            continue
+        places = [g for g in _given_values(wrong.source, there[0]) if g.worth is None or _is(g.worth.value, want)]
+        mine = [g for g in _given_values(wrong.source, path) if g.worth is None or _is(g.worth.value, value)]
+        # a number in both places was exchanged; otherwise it was misplaced
+        chosen = mine if mine and not _is(value, 0.0) else places
+        if len(chosen) != 1:
+            continue
+        if chosen is mine and numbers.get(there[0]) is not None and _exchanged(wrong.case, path, there[0], value):
+            hint = f"{path} and {there[0]} are swapped: {wrong.source.code(chosen[0].node)} must get {number(want)}"
+            return Clue(hint, wrong.source.place(chosen[0].node), key="exchanged")
+        if chosen is not places:
+            return None
+        hint = f"{wrong.source.code(chosen[0].node)} puts {number(want)} into {there[0]}: it belongs in {path}"
+        return Clue(hint, wrong.source.place(chosen[0].node), key=f"astray:{first_line(chosen[0].node)}")
+    return None
+
+
+def _exchanged(case: Case, path: str, other: str, value: float) -> bool:
+    """Return whether the value in one field is the one expected in the other."""
+    return any(
+        other in check.values and _is(check.values[other], value)
+        for check in case.asked("field_values")
+        if path not in check.values
+    ) or _is(case.check.values.get(other, math.nan), value)
+
+
+@hint_rule("field_values", given=_wrong, priority=10030)
+def _strayed_value(wrong: _Wrong) -> Clue | None:
+    """A field that must be zero holds the value expected in another field."""
+    numbers = leaves(wrong.message.value)
+    others = {p: v for check in wrong.case.asked("field_values") for p, v in check.values.items()}
+    for path, value in wrong.found.items():
+        homes = [p for p, v in others.items() if _is(v, value) and p in numbers and not _is(numbers[p], v)]
+        places = [g for g in _given_values(wrong.source, path) if g.worth is not None and _is(g.worth.value, value)]
+        if _is(wrong.wanted[path], 0.0) and len(homes) == 1 and len(places) == 1:
+            hint = f"{wrong.source.code(places[0].node)} puts {number(value)} into {path}: it belongs in {homes[0]}"
+            return Clue(hint, wrong.source.place(places[0].node), key=f"astray:{first_line(places[0].node)}")
+    return None
+
+
+@hint_rule("field_values", given=_wrong, priority=10040)
+def _not_every_message(wrong: _Wrong) -> Clue | None:
+    """The field gets the right number, but not in every message."""
+    source = wrong.source
+    for path, want in wrong.wanted.items():
+        places = _given_values(source, path)
+        if (
+            path not in wrong.found
+            or len(places) != 1
+            or places[0].worth is None
+            or not _is(places[0].worth.value, want)
+        ):
+            continue
+        code = source.code(places[0].node)
+        test = next(source.around(places[0].node, ast.If), None)
+        sends = list(source.calls("publish"))
+        beyond = any(test not in list(source.around(c, ast.If)) for c in sends)
+        if test is not None and source.function_of(test) is not None and beyond:
+            hint = f"{code} runs only under 'if {source.code(test.test, 40)}': every message needs it"
+            return Clue(hint, source.place(places[0].node), key=f"sometimes:{first_line(test)}")
+        function = source.function_of(places[0].node)
+        here = [c for c in sends if function is not None and source.function_of(c) is function]
+        if here and all(first_line(c) < first_line(places[0].node) for c in here):
+            hint = f"{code} comes after {source.code(here[0])}: set the fields before the message is sent"
+            return Clue(hint, source.place(places[0].node), key=f"late:{first_line(here[0])}")
+    return None
+
+
+@hint_rule("field_values", given=_wrong, priority=10050)
+def _not_assigned(wrong: _Wrong) -> Clue | None:
+    """`msg.linear.x == 0.5` compares, and `msg.linear.x: 0.5` is a note on the type: neither sets the field."""
+    source = wrong.source
+    for path in wrong.found:
+        compared = [n.value for n in source.all(ast.Expr) if isinstance(n.value, ast.Compare)]
+        noted = [n for n in source.all(ast.AnnAssign) if n.value is None]
+        pairs: list[tuple[ast.expr, ast.AST, ast.expr]] = [(c.left, c, c.comparators[0]) for c in compared]
+        pairs += [(n.target, n, n.annotation) for n in noted]
+        for target, node, value in pairs:
+            if chain(target).endswith(f".{path}"):
+                code = source.code(node)
+                hint = f"{code} sets nothing: write {source.code(target)} = {source.code(value, 40)}"
+                return Clue(hint, source.place(node))
+    return None
+
+
+@hint_rule("field_values", given=_wrong, priority=10060)
+def _field_never_set(wrong: _Wrong) -> Clue | None:
+    """A required field is never set."""
+    for path, value in wrong.found.items():
+        want = wrong.wanted[path]
+        if _is(want, 0.0) or value != 0.0 or _given_values(wrong.source, path) or _touched(wrong.source, path):
+            continue
+        item = made_for(wrong.source, "publisher", wrong.case.check.topic)
+        makers = list(wrong.source.calls(item.type)) if item is not None and item.type else []
+        if len(makers) == 1:
+            name = variable_of(wrong.source, makers[0], "msg")
+            hint = f"{path} is never set and stays 0.0: add {name}.{path} = {number(want)}"
+            return Clue(hint, wrong.source.place(makers[0]))
+    return None
+
+
+def _touched(source: Source, path: str) -> bool:
+    """Return whether the text may set a field in a way that is not analysed here."""
+    group, _, leaf = path.partition(".")
+    wholes = any(isinstance(n.ctx, ast.Store) and n.attr == group for n in source.all(ast.Attribute))
+    aliases = any(last_name(s.value) == group for s in source.all(ast.Assign))
+    keywords = any(k.arg in (group, leaf) for k in source.all(ast.keyword))
+    return wholes or aliases or keywords or bool(list(source.calls("setattr", "deepcopy", "copy")))
+
+
+@hint_rule("field_values", given=_wrong, priority=10070)
+def _wrong_number(wrong: _Wrong) -> Clue | None:
+    """The only assignment of the field gives another number."""
+    # first the field that should hold a value, then those that should be zero
+    for path in sorted(wrong.found, key=lambda p: _is(wrong.wanted[p], 0.0)):
+        places = _given_values(wrong.source, path)
+        value, want = wrong.found[path], wrong.wanted[path]
+        known = [g for g in places if g.worth is not None and _is(g.worth.value, value)]
+        if len(known) == 1:
+            return _number_clue(wrong.source, known[0], path, value, want)
+        if len(places) == 1 and places[0].worth is None:
+            hint = f"{wrong.source.code(places[0].node)} gives {number(value)} at {moment(wrong.message.t_ns)}"
+            hint += f": {path} must be {number(want)} in every message"
+            return Clue(hint, wrong.source.place(places[0].node))
+    return None
+
+
+def _number_clue(source: Source, got: _Given, path: str, value: float, want: float) -> Clue:
+    place = _place_of(got)
+    code = source.code(got.node)
+    around = source.parents.get(place)
+    if place is not got.node and isinstance(around, (ast.Assign, ast.AnnAssign)):
+        code = source.code(around)
+    if _is(value, -want):
+        hint = f"{code} has the wrong sign: {path} must be {number(want)}"
+    elif math.isclose(value * math.pi, want, rel_tol=1e-3):
+        hint = f"{code} lacks pi: from degrees to radians is math.radians(...), or * math.pi / 180"
+    elif "degrees" in source.code(got.value, 200):
+        hint = f"{code} gives degrees: {path} is in rad/s, write {number(want)}"
+    else:
+        hint = f"{code} makes {path} {number(value)}: it must be {number(want)}"
+    return Clue(hint, source.place(place))
+
+
+@hint_rule("field_function", priority=10080)
+def _set_after_publishing(case: Case) -> Clue | None:
+    """The field is set after the message was published."""
+    source, values = case.source, _first_values(case)
+    if len(values) < 2 or any(value != 0 for value in values):
+        return None
+    for place in given_leaf(source, case.check.field.rpartition(".")[2]):
+        function = source.function_of(place)
+        name = _message_of(place)
+        early = [c for c in source.calls("publish") if source.function_of(c) is function and _publishes(c, name)]
+        if function is not None and early and all(first_line(c) < first_line(place) for c in early):
+            hint = f"{source.code(place)} comes after {source.code(early[0])}: set the field first, then publish"
+            return Clue(hint, source.place(place))
+    return None
+
+
+def _message_of(place: ast.AST) -> str:
+    targets = place.targets if isinstance(place, ast.Assign) else []
+    return next((chain(t.value) for t in targets if isinstance(t, ast.Attribute)), "")
+
+
+def _publishes(call: ast.Call, name: str) -> bool:
+    return bool(name) and any(chain(argument) == name for argument in call.args)
+
+
+@hint_rule("field_function", problem=ProblemKind.WRONG_VALUE, priority=10090)
+def _in_degrees(case: Case) -> Clue | None:
+    """The argument of a sine is turned into degrees."""
+    source = case.source
+    places = given_leaf(source, case.check.field.rpartition(".")[2])
+    inside = [n for p in places for n in ast.walk(p) if isinstance(n, ast.Call)]
+    turned = [n for n in inside if last_name(n.func) in ("degrees", "rad2deg")]
+    if len(turned) != 1 or "deg" in str(case.check.formula) or len(turned[0].args) != 1:
+        return None
+    argument = source.code(turned[0].args[0], 40)
+    hint = f"{source.code(turned[0])} converts radians to degrees: write {argument}"
+    return Clue(hint, source.place(turned[0]))
+
+
+@hint_rule("field_function", priority=10100)
+def _other_function(case: Case) -> Clue | None:
+    """`cos` for `sin`, or a division that rounds down."""
+    source, formula = case.source, str(case.check.formula)
+    inside = [n for p in given_leaf(source, case.check.field.rpartition(".")[2]) for n in ast.walk(p)]
+    turned = [n for n in inside if isinstance(n, ast.Call) and last_name(n.func) in ("sin", "cos", "tan")]
+    wrong = [n for n in turned if f"{last_name(n.func)}(" not in formula]
+    right = next((f for f in ("sin", "cos", "tan") if f"{f}(" in formula), "")
+    if len(wrong) == 1 and right:
+        hint = f"{source.code(wrong[0])} does not compute {formula}: write math.{right}"
+        return Clue(hint, source.place(wrong[0]))
+    whole = [n for n in inside if isinstance(n, ast.BinOp) and isinstance(n.op, ast.FloorDiv)]
+    if len(whole) == 1:
+        code = source.code(whole[0], 40)
+        return Clue(f"{code} rounds down to an integer: write / instead of //", source.place(whole[0]))
+    return None
+
+
+@hint_rule("field_function", priority=10110)
+def _counter_reset(case: Case) -> Clue | None:
+    """The counter is set to its first value before each message."""
+    source = case.source
+    timed = {n for m in made(source, "timer") for n in runs(source, m)}
+    for counter in _counters(case):
+        for store in source.stores(counter):
+            statement = source.parents.get(store)
+            value = getattr(statement, "value", None)
+            plain = isinstance(statement, ast.Assign) and isinstance(value, ast.Constant)
+            if statement is not None and plain and store in timed and not any(source.around(statement, ast.If)):
+                hint = f"{source.code(statement)} resets it with each message: set it only in __init__"
+                return Clue(hint, source.place(statement))
+    return None
+
+
+@hint_rule("field_function", priority=10120)
+def _counts_sometimes(case: Case) -> Clue | None:
+    """The counter grows only on a condition, or `=+ 1` assigns the same number each time."""
+    source = case.source
+    for counter in _counters(case):
+        for store in source.stores(counter):
+            statement = source.parents.get(store)
+            value = getattr(statement, "value", None)
+            if statement is None or source.function_name(store) in ("", "__init__"):
+                continue
+            if isinstance(statement, ast.Assign) and isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.UAdd):
+                code = source.code(statement)
+                hint = f"{code} assigns {source.code(value.operand)} each time: write {counter} += "
+                return Clue(f"{hint}{source.code(value.operand)}", source.place(statement))
+            test = next(source.around(statement, ast.If), None)
+            grows = isinstance(statement, ast.AugAssign) and isinstance(statement.op, ast.Add)
+            if grows and test is not None and _publishes_beside(source, test):
+                hint = f"{source.code(statement)} runs only under 'if {source.code(test.test, 40)}': "
+                return Clue(f"{hint}dedent it, so that it counts each message", source.place(statement))
+    return None
+
+
+def _publishes_beside(source: Source, test: ast.If) -> bool:
+    """Return whether messages are published in the function of a condition, and not under it."""
+    function = source.function_of(test)
+    sends = [c for c in source.calls("publish") if source.function_of(c) is function]
+    return bool(sends) and not any(test in list(source.around(c, ast.If)) for c in sends)
+
+
+@hint_rule("field_function", problem=ProblemKind.WRONG_VALUE, priority=10130)
+def _needless_pi(case: Case) -> Clue | None:
+    """The value is computed with pi, which the formula does not have."""
+    formula = str(case.check.formula)
+    for place in given_leaf(case.source, case.check.field.rpartition(".")[2]):
+        value = getattr(place, "value", None)
+        named = [n for n in ast.walk(value) if last_name(n) in ("pi", "tau")] if isinstance(value, ast.expr) else []
+        if named and "pi" not in formula:
+            hint = f"{case.source.code(place)} uses {last_name(named[0])}, which {formula} does not: remove it"
+            return Clue(hint, case.source.place(place))
+    return None
+
+
+@hint_rule("field_function", priority=10140)
+def _counter_never_changes(case: Case) -> Clue | None:
+    """The counter never changes."""
+    values = _first_values(case)
+    if len(values) < 2 or len(set(map(repr, values))) > 1:
+        return None
+    for counter in _counters(case):
+        if all(case.source.function_name(s) == "__init__" for s in case.source.stores(counter)):
+            return Clue(f"{counter} never changes: write {counter} += 1 after each message")
+    return None
+
+
+@hint_rule("field_function", problem=ProblemKind.COUNT_START, priority=10150)
+def _count_starts_elsewhere(case: Case) -> Clue | None:
+    """The count starts at another number than 0, or is incremented before its use."""
+    source, problem = case.source, case.verdict.problem
+    start = str(problem.start if problem is not None else None)
+    for counter in _counters(case):
+        for store in source.stores(counter):
+            statement = source.parents.get(store)
+            value = getattr(statement, "value", None)
+            if isinstance(statement, ast.Assign) and isinstance(value, ast.Constant) and str(value.value) == start:
+                hint = f"{source.code(statement)} starts the count at {start}: the first message is n = 0"
+                return Clue(hint, source.place(statement))
+            if isinstance(statement, ast.AugAssign) and start == "1" and _used_later(source, statement, counter):
+                hint = f"{source.code(statement)} comes before the value is computed: count after it"
+                return Clue(hint, source.place(statement))
+    return None
+
+
+def _used_later(source: Source, statement: ast.AST, counter: str) -> bool:
+    function = source.function_of(statement)
+    loads = [n for n in source.all(ast.Attribute) if isinstance(n.ctx, ast.Load) and chain(n) == counter]
+    lines = [first_line(n) for n in loads if source.function_of(n) is function]
+    return bool(lines) and min(lines) > first_line(statement)
+
+
+def _counters(case: Case) -> Iterator[str]:
+    """Yield the attributes of the node that a field's value depends on, also through one local variable."""
+    source = case.source
+    for place in given_leaf(source, case.check.field.rpartition(".")[2]):
+        value = getattr(place, "value", None)
+        if not isinstance(value, ast.expr):
+            continue
+        yield from _attributes(value)
+        for local in [n.id for n in ast.walk(value) if isinstance(n, ast.Name)]:
+            for statement in source.all(ast.Assign):
+                same = source.function_of(statement) is source.function_of(place)
+                if same and any(chain(target) == local for target in statement.targets):
+                    yield from _attributes(statement.value)
+
+
+def _attributes(value: ast.expr) -> Iterator[str]:
+    for node in ast.walk(value):
+        if isinstance(node, ast.Attribute) and chain(node).startswith("self.") and chain(node).count(".") == 1:
+            yield chain(node)
+
+
+@hint_rule("random_in_range", problem=ProblemKind.NO_NUMBER, priority=10160)
+def _drawn_as_text(case: Case) -> Clue | None:
+    """The type of the messages has no number."""
+    item = made_for(case.source, "publisher", case.check.topic)
+    if item is None:
+        return None
+    hint = f"{item.type} carries no number: use a numeric type such as Float32 in both files"
+    return Clue(hint, case.source.place(item.call), key=f"apart:{case.check.topic}")
+
+
+@hint_rule("random_in_range", priority=10170)
+def _draw_limits(case: Case) -> Clue | None:
+    """The limits of the random draw are wrong."""
+    source, check = case.source, case.check
+    calls = draws(source)
+    facts = case.found(DrawFacts)
+    if facts is None or not facts.outside or len(calls) != 1:
+        return None
+    call, low, high = calls[0], number(check.low), number(check.high)
+    right = f"random.uniform({float(check.low)}, {float(check.high)})"
+    if last_name(call.func) in ("gauss", "normalvariate", "normal") and not list(source.calls("min", "max", "clip")):
+        hint = f"{source.code(call)} has no limits, so some values lie far outside: use {right}"
+        return Clue(hint, source.place(call), key="draw")
+    limits = [number_in_code(source, a) for a in call.args]
+    if last_name(call.func) in ("uniform", "randint") and len(limits) == 2 and None not in limits:
+        if limits == [check.low, check.high]:
+            return None
+        right = right if last_name(call.func) == "uniform" else f"{chain(call.func)}({low}, {high})"
+        return Clue(f"{source.code(call)} draws outside {low} to {high}: use {right}", source.place(call), key="draw")
+    return _scaled_draw(source, check, call)
+
+
+def _scaled_draw(source: Source, check: Any, call: ast.Call) -> Clue | None:
+    """`random.random() * 10`: a draw from 0 to 1, scaled to other limits."""
+    whole: ast.AST = call
+    while isinstance(source.parents.get(whole), ast.BinOp):
+        whole = source.parents[whole]
+    ends = [_with(source, whole, call, drawn) for drawn in (0.0, 1.0)]
+    known = [end for end in ends if end is not None]
+    plain = last_name(call.func) in ("random", "rand", "random_sample") and not call.args
+    if not plain or len(known) < 2 or (check.low <= min(known) and max(known) <= check.high):
+        return None
+    hint = f"{source.code(whole)} goes from {number(min(known))} to {number(max(known))}"
+    right = f"random.uniform({float(check.low)}, {float(check.high)})"
+    return Clue(f"{hint}: {right}", source.place(whole), key="draw")
+
+
+def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: int = 0) -> float | None:
+    """Return the value of an expression if a call returns this number."""
+    if node is call:
+        return drawn
+    if not isinstance(node, ast.BinOp) or depth > _DEEPEST:
+        return number_in_code(source, node)
+    left = _with(source, node.left, call, drawn, depth + 1)
+    right = _with(source, node.right, call, drawn, depth + 1)
+    if left is None or right is None:
+        return None
+    if isinstance(node.op, ast.Add):
+        return left + right
+    if isinstance(node.op, ast.Sub):
+        return left - right
+    return left * right if isinstance(node.op, ast.Mult) else None
+
+
+@hint_rule("random_in_range", priority=10180)
+def _drawn_and_lost(case: Case) -> Clue | None:
+    """The drawn number is put into a variable that is not used."""
+    source, calls = case.source, draws(case.source)
+    if len(calls) != 1 or list(given_leaf(source, "data")):
+        return None
+    name = target_of(source, calls[0])
+    sends = list(source.calls("publish"))
+    sent = chain(sends[0].args[0]) if len(sends) == 1 and len(sends[0].args) == 1 else ""
+    if not name or "." in name or not sent or name == sent:
+        return None
+    hint = f"{name} is never put into the message: write {sent}.data = {source.code(calls[0], 50)}"
+    return Clue(hint, source.place(calls[0]))
+
+
+@hint_rule("random_in_range", priority=10190)
+def _shifted_draw(case: Case) -> Clue | None:
+    """Something is added to a draw between the right limits."""
+    source, check, calls = case.source, case.check, draws(case.source)
+    facts = case.found(DrawFacts)
+    if facts is None or not facts.outside or len(calls) != 1:
+        return None
+    if last_name(calls[0].func) not in ("uniform", "randint"):
+        return None
+    around = source.parents.get(calls[0])
+    limits = [number_in_code(source, a) for a in calls[0].args]
+    if not isinstance(around, ast.BinOp) or limits != [check.low, check.high]:
+        return None
+    ends = [end for limit in (check.low, check.high) if (end := _with(source, around, calls[0], limit)) is not None]
+    # single precision rounds by less than this
+    if len(ends) < len(limits) or not min(ends) - 1e-3 <= facts.least or not facts.most <= max(ends) + 1e-3:
+        return None
+    hint = f"{source.code(around, 60)} moves the values out of {number(check.low)} to {number(check.high)}: write "
+    return Clue(f"{hint}{source.code(calls[0], 50)} alone", source.place(around))
+
+
+@hint_rule("random_in_range", problem=ProblemKind.CONSTANT, priority=10200)
+def _drawn_once(case: Case) -> Clue | None:
+    """The value is drawn only once at the start, or the seed is set each time."""
+    source = case.source
+    for timer in made(source, "timer"):
+        inside = runs(source, timer)
+        seeds = [n for n in inside if isinstance(n, ast.Call) and last_name(n.func) == "seed"]
+        if seeds:
+            hint = f"{source.code(seeds[0])} in the callback restarts the same sequence each time: remove it"
+            return Clue(hint, source.place(seeds[0]), key="draw")
+        drawn = [c for c in draws(source) if c in inside]
+        outside = (c for c in draws(source) if c not in inside)
+        early = [c for c in outside if source.function_name(c) in ("", "__init__", "main")]
+        if not drawn and len(early) == 1 and len(made(source, "timer")) == 1:
+            name = last_name(timer.callback) or "the callback"
+            hint = f"{source.code(early[0])} is drawn once, when the node starts: draw it in {name}"
+            return Clue(hint, source.place(early[0]), key="draw")
+    return None
+
+
+@hint_rule("random_in_range", priority=10210)
+def _not_drawn(case: Case) -> Clue | None:
+    """The file draws no random numbers."""
+    source, check = case.source, case.check
+    facts = case.found(DrawFacts)
+    if facts is None or not facts.pattern or draws(source):
+        return None
+    values = published_numbers(case.trace, check.topic)
+    if not values:
+        return None
+    path = check.field or number_path(published(case.trace, check.topic)[0].value)
+    places = given_leaf(source, path.rpartition(".")[2])
+    if len(places) != 1:
+        return None
+    code = source.code(places[0])
+    hint = f"{code} is not random: random.uniform({float(check.low)}, {float(check.high)}) gives a new value each time"
+    return Clue(hint, source.place(places[0]))

@@ -1,0 +1,310 @@
+"""Makes the figures of an exercise: charts of its checks, the graph, recordings to play, and lines of the source."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+
+from grader.grading.judging.authored import is_authored, mistake_of
+from grader.grading.judging.charts import Lanes, marked_moments, time_chart
+from grader.grading.judging.findings import fault_sentence
+from grader.grading.judging.logs.outputs import printed_lines
+from grader.grading.judging.plots import chart_of, shows_graph
+from grader.grading.judging.recorded_values import recorded_values
+from grader.grading.judging.values import on_student_topic
+from grader.grading.judging.wording import quote
+from grader.grading.model.chart import (
+    Chart,
+    Excerpt,
+    Figure,
+    GraphFigure,
+    Moment,
+    Panel,
+    Playback,
+    SourceFile,
+    Stage,
+    Tone,
+)
+from grader.grading.model.exercise import Criterion, Exercise, Location, has, reads_sources
+from grader.grading.model.report import ExerciseReport
+from grader.runtime.model.author_files import AuthorMistake
+from grader.runtime.model.quantities import counted, seconds
+from grader.runtime.model.scenario import Scenario
+from grader.runtime.model.submission import Submission
+from grader.runtime.model.trace import GraphSnapshot, Request, Response, Trace
+
+
+def illustrated(
+    report: ExerciseReport,
+    exercise: Exercise,
+    traces: Mapping[str, Trace],
+    submission: Submission,
+    sources: Mapping[str, str],
+) -> ExerciseReport:
+    """Return the report with figures, the source, the lines of it that matter, and the expected results."""
+    files = {name: submission.files[name] for name in exercise.files if name in submission.files}
+    mistakes: list[AuthorMistake] = []
+    return replace(
+        report,
+        figures=figures_of(exercise, traces, mistakes),
+        excerpts=excerpts_for(report, submission, sources),
+        sources=tuple(_whole(f.found, sources[name]) for name, f in files.items() if f.found and name in sources),
+        expected={c.id: phrase for c in exercise.criteria if (phrase := expectation(c, mistakes))},
+        notes=(*report.notes, *(f"the rubric has a mistake: {mistake}" for mistake in dict.fromkeys(mistakes))),
+    )
+
+
+def expectation(criterion: Criterion, mistakes: list[AuthorMistake]) -> str:
+    """Return the phrase for what a check expects, without a full stop; empty if it has none.
+
+    A mistake in a check of an author's is appended to `mistakes`.
+    """
+    check: Any = criterion.check
+    try:
+        own = check.expected if has(check, "expected") else ""
+    except Exception as error:
+        if not is_authored(check):
+            raise
+        mistakes.append(mistake_of(check, error))
+        return ""
+    return own if isinstance(own, str) else ""
+
+
+def figures_of(
+    exercise: Exercise, traces: Mapping[str, Trace], mistakes: list[AuthorMistake] | None = None
+) -> tuple[Figure, ...]:
+    """Return the charts of an exercise in rubric order, the graph if a criterion shows it, then each recording.
+
+    Mistakes in the charts of an author's checks are appended to `mistakes`.
+    """
+    drawn = [chart for c in exercise.criteria for chart in _drawn(c, traces, [] if mistakes is None else mistakes)]
+    figures: list[Figure] = list(_merged(drawn))
+    graph = graph_figure(exercise, traces)
+    graphs = tuple(c.id for c in exercise.criteria if shows_graph(c.check))
+    if graph is not None and graphs:
+        figures.append(replace(graph, criteria=graphs))
+    told = {id_ for figure in figures for id_ in figure.criteria}
+    figures += _playbacks(exercise, traces, told)
+    return tuple(replace(f, id=f"{exercise.id}-{number}") for number, f in enumerate(figures, 1))
+
+
+def _drawn(criterion: Criterion, traces: Mapping[str, Trace], mistakes: list[AuthorMistake]) -> Iterable[Chart]:
+    trace = traces.get(criterion.scenario)
+    if trace is None:
+        return
+    try:
+        chart = chart_of(criterion.check, trace)
+        if chart is not None and is_authored(criterion.check):
+            chart = msgspec.convert(msgspec.to_builtins(chart), Chart)  # raises for values of a wrong type
+    except Exception as error:  # a failing chart must not cost the report
+        chart = None
+        if is_authored(criterion.check):
+            mistakes.append(mistake_of(criterion.check, error))
+    if isinstance(chart, Chart):
+        yield replace(chart, scenario=criterion.scenario, criteria=(criterion.id,))
+
+
+def _merged(charts: Iterable[Chart]) -> Iterable[Chart]:
+    """Merge charts of which one shows all that the other does: criteria about the same data share one chart."""
+    kept: list[Chart] = []
+    for chart in charts:
+        place = next((k for k, one in enumerate(kept) if _holds(one, chart) or _holds(chart, one)), None)
+        if place is None:
+            kept.append(chart)
+        else:
+            other = kept[place]
+            fuller = other if _holds(other, chart) else chart
+            rest = chart if fuller is other else other
+            # the first of its criteria is the one that the chart was drawn for
+            kept[place] = replace(fuller, criteria=tuple(dict.fromkeys((*fuller.criteria, *rest.criteria))))
+    return kept
+
+
+def _holds(chart: Chart, other: Chart) -> bool:
+    """Return whether a chart shows the same recording as another, all its panels and cases, and perhaps more."""
+    if chart.scenario != other.scenario or chart.square != other.square or not set(other.cases) <= set(chart.cases):
+        return False
+    return all(any(_covers(panel, asked) for panel in chart.panels) for asked in other.panels)
+
+
+def _covers(panel: Panel, other: Panel) -> bool:
+    alike = (panel.title, panel.unit, panel.lanes, panel.grid) == (other.title, other.unit, other.lanes, other.grid)
+    parts = ((panel.series, other.series), (panel.bands, other.bands), (panel.levels, other.levels))
+    return alike and all(all(part in mine for part in theirs) for mine, theirs in parts)
+
+
+def _playbacks(exercise: Exercise, traces: Mapping[str, Trace], told: Set[str]) -> Iterable[Playback]:
+    """Return each recording, with the criteria about it that no other figure shows."""
+    recorded = [s for s in exercise.scenarios if s.id in traces]
+    for scenario in recorded:
+        title = f"The run: {scenario.id.replace('_', ' ')}" if len(recorded) > 1 else "The run"
+        criteria = tuple(c.id for c in exercise.criteria if c.scenario == scenario.id and _is_recorded(c, told))
+        yield playback(traces[scenario.id], scenario.id, scenario.processes, title, criteria)
+
+
+def playback(
+    trace: Trace, scenario: str, processes: Sequence[str], title: str = "The run", criteria: tuple[str, ...] = ()
+) -> Playback:
+    """Return a recording to play.
+
+    Args:
+        trace: The recording.
+        scenario: Id of its scenario.
+        processes: Names of its processes.
+        title: Title of the figure.
+        criteria: The criteria that are shown with it.
+    """
+    timeline = replace(timeline_chart(trace, processes), scenario=scenario)
+    graphs = _changes(trace)
+    connected = f" {_said(graphs[-1][1])}." if graphs and graphs[-1][1].nodes else ""
+    return Playback(
+        id="run",
+        title=title,
+        about=f"{timeline.about}{connected}",
+        criteria=criteria,
+        timeline=timeline,
+        topics=recorded_values(trace),
+        graphs=graphs,
+    )
+
+
+def _is_recorded(criterion: Criterion, told: Set[str]) -> bool:
+    return criterion.id not in told and not reads_sources(criterion.check)
+
+
+#: Maximum number of changes of the graph that can be played.
+_MOST_CHANGES = 40
+
+
+def _changes(trace: Trace) -> tuple[tuple[float, GraphSnapshot], ...]:
+    """Return the student's own graph from each moment at which it changed, in seconds."""
+    last: dict[float, GraphSnapshot] = {}
+    for graph in trace.graphs():
+        if graph.t_ns <= trace.stop_ns:
+            last[seconds(graph.t_ns)] = _own(graph)
+    times = list(last)
+    changed = [t for k, t in enumerate(times) if k == 0 or last[t] != last[times[k - 1]]]
+    stride = -(-len(changed) // _MOST_CHANGES) or 1
+    return tuple((t, last[t]) for t in dict.fromkeys((*changed[::stride], *changed[-1:])))
+
+
+#: Lines shown before and after the referenced one.
+AROUND = 3
+#: Longest line shown, in characters; a source line may be a megabyte long.
+_LONGEST_LINE = 400
+#: Maximum number of lines of a file that are shown.
+_MOST_LINES = 1000
+_TAB = 4
+
+
+def excerpts_for(report: ExerciseReport, submission: Submission, sources: Mapping[str, str]) -> tuple[Excerpt, ...]:
+    """Return the source around each place that a verdict or a fault names, without duplicates."""
+    places = [v.location for v in report.verdicts if v.location is not None]
+    places += [Location(f.file, f.line) for f in report.faults if f.file and f.line > 0]
+    texts = {file.found: sources[wanted] for wanted, file in submission.files.items() if wanted in sources}
+    lines = {name: text.splitlines() for name, text in texts.items() if any(p.file == name for p in places)}
+    found = (_excerpt(place, lines.get(place.file, [])) for place in dict.fromkeys(places))
+    return tuple(excerpt for excerpt in found if excerpt is not None)
+
+
+def _excerpt(place: Location, lines: list[str]) -> Excerpt | None:
+    if not 1 <= place.line <= len(lines):
+        return None
+    first = max(1, place.line - AROUND)
+    return Excerpt(place.file, place.line, first, _showable(lines[first - 1 : place.line + AROUND]))
+
+
+def _whole(name: str, text: str) -> SourceFile:
+    lines = text.splitlines()
+    return SourceFile(name, _showable(lines[:_MOST_LINES]), max(0, len(lines) - _MOST_LINES))
+
+
+def _showable(lines: Sequence[str]) -> tuple[str, ...]:
+    return tuple(line[:_LONGEST_LINE].expandtabs(_TAB) for line in lines)
+
+
+def graph_figure(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphFigure | None:
+    """Return the graph in every situation with new information, or None if no node ever appeared."""
+    stages = [stage for s in exercise.scenarios if s.id in traces for stage in _stages(s, exercise, traces[s.id])]
+    told: dict[tuple[object, ...], Stage] = {}
+    for stage in stages:
+        told.setdefault((stage.graph.nodes, stage.graph.endpoints, stage.graph.services), stage)
+    distinct = [stage for stage in told.values() if stage.graph.nodes]
+    if not distinct:
+        return None
+    about = " ".join(f"{stage.title.capitalize()}: {_said(stage.graph)}." for stage in distinct)
+    return GraphFigure("graph", "The live ROS graph", about, (), tuple(distinct))
+
+
+def _stages(scenario: Scenario, exercise: Exercise, trace: Trace) -> list[Stage]:
+    graphs = [_own(g) for g in trace.graphs() if g.t_ns <= trace.stop_ns]
+    if not graphs:
+        return []
+    if len(exercise.scenarios) > 1:
+        return [Stage(scenario.id.replace("_", " "), max(reversed(graphs), key=_size))]
+    if graphs[0] == graphs[-1]:
+        return [Stage("from the start to the end", graphs[0])]
+    return [Stage("at the start", graphs[0]), Stage("at the end", graphs[-1])]
+
+
+def _own(graph: GraphSnapshot) -> GraphSnapshot:
+    """Return the graph of the student's own endpoints, without a time."""
+    return replace(graph, t_ns=0, endpoints=tuple(e for e in graph.endpoints if on_student_topic(e)))
+
+
+def _size(graph: GraphSnapshot) -> int:
+    return len(graph.endpoints) + len(graph.services)
+
+
+def _said(graph: GraphSnapshot) -> str:
+    publishers = [e for e in graph.endpoints if e.kind == "publisher"]
+    parts = []
+    for publisher in publishers:
+        takers = [e for e in graph.endpoints if e.kind == "subscription" and e.topic == publisher.topic]
+        parts += [f"{publisher.node} publishes {publisher.topic} to {t.node}" for t in takers]
+        parts += [] if takers else [f"{publisher.node} publishes {publisher.topic}"]
+    served = {p.topic for p in publishers}
+    unserved = [e for e in graph.endpoints if e.kind == "subscription" and e.topic not in served]
+    parts += [f"{e.node} subscribes to {e.topic}" for e in unserved]
+    visible = [e for e in graph.services if "/_" not in e.service]
+    parts += [f"{e.node} {'serves' if e.kind == 'service' else 'calls'} {e.service}" for e in visible]
+    return ", ".join(dict.fromkeys(parts)) or f"{counted(len(graph.nodes), 'node')} without topics"
+
+
+#: Number of lanes for services; a node's parameters and an action need several.
+MOST_SERVICES = 6
+
+
+def timeline_chart(trace: Trace, processes: Sequence[str]) -> Chart:
+    """Return the timeline of a scenario; it exists even for a silent node."""
+    lanes = Lanes()
+    for process in processes:
+        lanes.logs(trace, process)
+    sent: list[Request | Response] = [*trace.of(Request), *trace.of(Response)]
+    exchanges = [o for o in sent if o.t_ns <= trace.stop_ns]
+    for service in list(dict.fromkeys(o.service for o in exchanges))[:MOST_SERVICES]:
+        lanes.add(f"{service}: called")
+        lanes.exchanges(o for o in exchanges if o.service == service)
+    faults = [(f.t_ns, fault_sentence(f)) for f in trace.faults() if f.t_ns <= trace.stop_ns]
+    faults += [(m.t_ns, m.detail) for m in trace.marks("limit")]
+    if faults:
+        lanes.add("faults")
+        lanes.dots("fault", faults, Tone.BAD)
+    about = _about(trace, processes)
+    chart = time_chart(trace, "timeline", "Logs and faults over time", about, lanes.panel())
+    return replace(chart, moments=(*marked_moments(trace), Moment(seconds(trace.stop_ns), "end")))
+
+
+def _about(trace: Trace, processes: Sequence[str]) -> str:
+    parts = []
+    for process in processes:
+        records = [r for r in trace.records(process) if r.t_ns <= trace.stop_ns]
+        about = f"{process}: {counted(len(records), 'log record')}"
+        lines = printed_lines(trace, process)
+        parts.append(f"{about}, {counted(len(lines), 'printed line')}" if lines else about)
+    faults = [quote(fault_sentence(f)) for f in trace.faults() if f.t_ns <= trace.stop_ns]
+    parts.append(f"faults: {'; '.join(faults[:3])}" if faults else "no fault")
+    return f"{'; '.join(parts)}; observed for {seconds(trace.stop_ns):.1f} s."

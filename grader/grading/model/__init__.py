@@ -1,0 +1,1 @@
+"""The vocabulary of grading: exercises, reports, charts and the options of a run."""

@@ -1,0 +1,1 @@
+"""Reads rubric files as values of `grader.grading.model`."""

@@ -1,0 +1,113 @@
+"""Tries the simulations of a rubric when it is read: an author learns of a mistake before a student's file runs."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from functools import partial
+from itertools import islice
+from typing import Any
+
+from grader.grading.rubrics.model import RubricShape, ScenarioShape
+from grader.grading.rubrics.types import build
+from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlTree
+from grader.grading.submissions.collected import shown
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.scenario import Between, Choose, FieldSpec, Stimulus, Written
+from grader.runtime.simulation.loading import begin_of, guarded, made
+from grader.runtime.simulation.participant import SHORTEST_PERIOD_NS, Moment, Output
+from grader.runtime.stimuli.simulation import Simulated
+
+#: How many steps and messages of a step are tried.
+STEPS, OUTPUTS = 3, 20
+
+
+@dataclass(frozen=True, slots=True)
+class Offered:
+    """What a simulation publishes, hears and serves, by name and type, and what it publishes in its first steps."""
+
+    publishes: Mapping[str, str]
+    hears: Mapping[str, str]
+    serves: Mapping[str, str]
+    outputs: tuple[Output, ...]
+
+
+def simulated_in(rubric: RubricShape) -> Iterator[tuple[TreePath, Simulated]]:
+    """Yield the simulations of a rubric, each with the place of its name."""
+    for index, scenario in enumerate(rubric.scenarios):
+        for number, shape in enumerate(scenario.stimuli):
+            if shape.chosen[0] == Simulated.key:
+                chosen = shape.chosen[1]
+                yield ("scenarios", index, "stimuli", number, Simulated.key, chosen.chosen[0]), build(chosen)
+
+
+def offered(simulated: Simulated) -> Offered:
+    """Try a simulation with the first value that each parameter may have; raises HarnessError if it fails."""
+    parameters = {name: _first(spec) for name, spec in simulated.parameters.items()}
+    one = made(simulated.name, simulated.path, simulated.content, parameters)
+    call = partial(guarded, simulated.name, simulated.path)
+    call(lambda: one.begin(random.Random(0)))  # noqa: S311  the same at each reading
+    if not (isinstance(one.period, int) and one.period >= SHORTEST_PERIOD_NS):
+        raise HarnessError(
+            f"the simulation `{simulated.name}` has a period of {one.period!r} ns, expected at least 1 ms"
+        )
+    publishes, hears, serves = (
+        call(lambda method=method: dict(getattr(one, method)()), begin_of(one, method, simulated.path))  # type: ignore[misc]
+        for method in ("publishes", "hears", "serves")
+    )
+    outputs: list[Output] = []
+    for number in range(STEPS):
+        now = Moment(number * one.period, number * one.period)
+        outputs += call(lambda now=now: list(islice(one.step(now), OUTPUTS)), begin_of(one, "step", simulated.path))  # type: ignore[misc]
+    wrong = [output for output in outputs if not _is_output(output, publishes)]
+    if wrong:
+        text = f"the simulation `{simulated.name}` publishes {shown(str(wrong[0]), 80)}, expected one of its topics "
+        raise HarnessError(f"{text}({', '.join(publishes) or 'it has none'}) and a mapping of fields")
+    return Offered(publishes, hears, serves, tuple(outputs))
+
+
+def _first(spec: FieldSpec) -> Any:
+    if isinstance(spec, Between):
+        return spec.low
+    if isinstance(spec, Choose):
+        return spec.options[0]
+    if isinstance(spec, Written):
+        return spec.text.replace("{}", f"{spec.number.low:.{spec.decimals}f}")
+    return tuple(map(_first, spec)) if isinstance(spec, tuple) else spec
+
+
+def _is_output(output: object, topics: Mapping[str, str]) -> bool:
+    return isinstance(output, tuple) and len(output) == 2 and output[0] in topics and isinstance(output[1], Mapping)
+
+
+def published_by(stimulus: Stimulus) -> Iterable[str]:
+    """Return the topics that a stimulus publishes on; none for a simulation that fails, which another rule tells."""
+    if isinstance(stimulus, Simulated):
+        with suppress(HarnessError):
+            return offered(stimulus).publishes
+    topic = getattr(stimulus, "topic", "")
+    return [topic] if topic else []
+
+
+def simulation_mistakes(rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
+    """Yield simulations that fail, and those that publish or serve what another stimulus of the scenario does."""
+    taken = {index: _names_of_others(scenario) for index, scenario in enumerate(rubric.scenarios)}
+    for path, simulated in simulated_in(rubric):
+        where = tree.at_key(path)
+        try:
+            found = offered(simulated)
+        except HarnessError as error:
+            yield where.mistake(f"expected a simulation that runs, found that {error.message}")
+            continue
+        names, others = {*found.publishes, *found.serves}, taken[int(path[1])]
+        for name in sorted(names & others):
+            yield where.mistake(f"expected topics and services that no other stimulus has, found `{name}` again")
+        others |= names
+
+
+def _names_of_others(scenario: ScenarioShape) -> set[str]:
+    """Return the topics and services of the stimuli that are not simulations."""
+    stimuli = [build(shape) for shape in scenario.stimuli]
+    return {getattr(s, key) for s in stimuli for key in ("topic", "service") if hasattr(s, key)}

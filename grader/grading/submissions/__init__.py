@@ -1,0 +1,1 @@
+"""Reads submissions, folders and archives, as values of `grader.runtime.model`."""

@@ -1,0 +1,173 @@
+"""The files of a submission before they are written, and which names are allowed or skipped."""
+
+from __future__ import annotations
+
+import os
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import field
+
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.limits import MAX_NAME_BYTES, MAX_PATH_BYTES
+
+#: Longest piece of foreign text in a message, in characters.
+SHOWN_LENGTH = 80
+
+
+def shown(text: str, limit: int = SHOWN_LENGTH) -> str:
+    """Return text as one printable line, with escaped control characters and lone surrogates, cut in the middle."""
+    kept = text if len(text) <= 2 * limit else text[:limit] + text[-limit:]
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in kept)
+    if len(line) <= limit and len(kept) == len(text):
+        return line
+    head = (limit - 1) // 2
+    return f"{line[: limit - 1 - head]}…{line[len(line) - head :]}"
+
+
+def listed(names: list[str] | tuple[str, ...], conjunction: str = "or") -> str:
+    """Return names as a phrase: `a`, `a or b`, `a, b or c`; needs at least one name."""
+    if len(names) == 1:
+        return names[0]
+    return f"{', '.join(names[:-1])} {conjunction} {names[-1]}"
+
+
+def first_of(names: Sequence[str]) -> str:
+    """Return the first three names as a phrase that ends in `and 2 more`, if there are more."""
+    more = [f"{len(names) - 3} more"] if len(names) > 3 else []
+    return listed([*map(shown, names[:3]), *more], "and")
+
+
+#: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`.
+GENERATED_MARKERS = ("pyvenv.cfg", "COLCON_IGNORE")
+
+
+_BY_SYSTEMS = frozenset({"__pycache__", "__MACOSX"})
+_SKIPPED_FOLDERS = _BY_SYSTEMS | {"venv", "node_modules"}
+# Files that file managers create in every folder; macOS puts `._x` beside every file x of an archive.
+#: The page that `grade --open` writes into the current folder, which may be that of the submission.
+PAGE_NAME = "grade-report.html"
+_SKIPPED_FILES = frozenset({".DS_Store", "Thumbs.db", "desktop.ini", PAGE_NAME})
+_DRIVE = re.compile(r"[A-Za-z]:")
+_RESERVED = re.compile(r"(?i)(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])\s*(\..*)?")
+# Windows drops these at the end of a name, so that two names become one; other systems keep them.
+_ENDS_ODDLY = re.compile(r"[ .]\Z")
+_CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+
+_OBJECTIONS: dict[str, Callable[[str], object]] = {
+    "an absolute name": lambda path: path.startswith("/") or _DRIVE.match(path),
+    "a name that leads out of the archive": lambda path: ".." in path.split("/"),
+    "a name with a control character": _CONTROLS.search,
+    "a name with an empty part": lambda path: not {"", "."}.isdisjoint(path.split("/")),
+    "a name with a backslash": lambda path: "\\" in path,
+    "a name with a part that ends in a space or a dot": lambda path: any(map(_ENDS_ODDLY.search, path.split("/"))),
+    "a name that Windows keeps for a device": lambda path: any(map(_RESERVED.fullmatch, path.split("/"))),
+    "a name that is too long": lambda path: _bytes(path) > MAX_PATH_BYTES or _longest_part(path) > MAX_NAME_BYTES,
+}
+
+
+def is_skipped_folder(name: str) -> bool:
+    """Return whether a folder of this name is skipped: caches, environments, version control."""
+    return name in _SKIPPED_FOLDERS or name.startswith(".")
+
+
+def is_skipped_file(name: str) -> bool:
+    """Return whether an operating system or the grader created a file of this name."""
+    return name in _SKIPPED_FILES or name.startswith("._")
+
+
+def why_skipped(name: str, *, is_folder: bool) -> str:
+    """Return why a submission of this name would be skipped, as a phrase.
+
+    Empty if it would not be, or if a system or interpreter created it: then nobody expects it to be found.
+    """
+    if is_skipped_file(name) or (is_folder and name in _BY_SYSTEMS):
+        return ""
+    if name.startswith("."):
+        return "its name begins with a dot"
+    return "its name is that of a tool's folder" if is_folder and is_skipped_folder(name) else ""
+
+
+def is_skipped(path: str) -> bool:
+    """Return whether a relative path, with `/`, is or lies in something that is skipped."""
+    *folders, name = path.split("/")
+    return is_skipped_file(name) or any(map(is_skipped_folder, folders))
+
+
+def generated_folders(paths: Iterable[str]) -> dict[str, str]:
+    """Return the folders made by a tool, as path -> marker file; never the top folder."""
+    found: dict[str, str] = {}
+    for path in paths:
+        folder, _, name = path.rpartition("/")
+        if folder and name in GENERATED_MARKERS:
+            known = found.get(folder, name)
+            found[folder] = min(known, name, key=GENERATED_MARKERS.index)
+    return found
+
+
+def folders_of(path: str) -> Iterator[str]:
+    """Yield the parent folders of a path, the outermost first."""
+    at = path.find("/")
+    while at >= 0:
+        yield path[:at]
+        at = path.find("/", at + 1)
+
+
+def name_problem(path: str) -> str:
+    """Describe what is wrong with the name of an archive member, as a phrase; empty if nothing is."""
+    return next((phrase for phrase, is_wrong in _OBJECTIONS.items() if is_wrong(path)), "")
+
+
+def collision(files: Iterable[str]) -> tuple[str, str] | None:
+    """Return two names that cannot both exist on some system, or None.
+
+    These are duplicate names, names that differ only in case or in Unicode composition, and a file where another path
+    needs a folder.
+    """
+    kept: dict[str, tuple[str, bool]] = {}
+    for path in files:
+        if _folded(path) in kept:
+            return kept[_folded(path)][0], path
+        kept[_folded(path)] = (path, True)
+        for folder in folders_of(path):
+            other, is_file = kept.setdefault(_folded(folder), (folder, False))
+            if is_file or other != folder:
+                return other, folder
+    return None
+
+
+def _folded(name: str) -> str:
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+def _bytes(name: str) -> int:
+    return len(os.fsencode(name))
+
+
+def _longest_part(path: str) -> int:
+    return max(map(_bytes, path.split("/")))
+
+
+@dataclass(frozen=True, slots=True)
+class Collected:
+    """Files that were read, not yet written."""
+
+    # Relative POSIX path and content; every path stays inside, and paths are unique
+    files: tuple[tuple[str, bytes], ...]
+    notes: tuple[str, ...] = ()  # sentences about skipped files
+
+
+@dataclass(slots=True)
+class LeftOut:
+    """Names of skipped files and folders, by reason."""
+
+    by_reason: dict[str, dict[str, None]] = field(default_factory=dict)
+
+    def add(self, reason: str, relative: str) -> None:
+        """Record a skipped path once."""
+        self.by_reason.setdefault(reason, {})[relative] = None
+
+    def notes(self) -> tuple[str, ...]:
+        """Return one sentence per reason, in an order that does not depend on the file system."""
+        items = sorted(self.by_reason.items())
+        return tuple(f"not copied: {first_of(sorted(names, key=os.fsencode))} ({reason})" for reason, names in items)

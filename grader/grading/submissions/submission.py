@@ -1,0 +1,339 @@
+"""Reads a student's submission: stages a copy, and maps its files to processes."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import stat
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path, PurePosixPath
+from types import MappingProxyType
+
+from grader.grading.submissions.collected import Collected, first_of, listed, shown
+from grader.grading.submissions.projects import read_projects
+from grader.grading.submissions.staging import collect_folder, read_start, write_files
+from grader.runtime.model.errors import SubmissionError
+from grader.runtime.model.limits import MAX_ARCHIVE_BYTES, MAX_FILE_BYTES
+from grader.runtime.model.projects import Project
+from grader.runtime.model.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
+from grader.runtime.programs.executables import Executable, executables, find_executables
+
+#: Names at least this similar are shown as a possible misspelling.
+SIMILARITY = 0.8
+
+#: Files named in a hint about a submission without any.
+_MOST_WANTED = 4
+
+#: Misspelt names shown for one file.
+MAX_SIMILAR = 3
+
+#: Other Python files shown for a missing one, and the likeness of names from which one of them is probably meant.
+MAX_CANDIDATES, LIKELY = 12, 0.6
+#: Files of packages that are not nodes.
+_NO_NODES = ("__init__.py", "setup.py", "conftest.py")
+
+_EXPECTED = "a folder, a .py file or an archive"
+
+# Suffixes that browsers, editors and file managers add to a name: `x(1).py`, `x - Copy.py`, `x.py.txt`; and notebooks.
+_EXTENSIONS = re.compile(r"(?:\.(?:txt|bak|orig|old|save|py|ipynb))+$")
+_COPY_MARK = re.compile(r"[\s_-]*(?:\(\d+\)|copy|copia|kopie)\s*\d*$")
+
+
+def stage_submission(
+    path: str, wanted: Sequence[str], into: Path, meant: Mapping[str, str] = MappingProxyType({})
+) -> Submission:
+    """Copy a submission and find the wanted files in it.
+
+    Args:
+        path: A folder, an archive or one .py file, as the user typed it. If a folder or archive holds no .py file but
+            one archive, that archive is used: learning platforms deliver uploads this way.
+        wanted: File names of all exercises being graded; a missing one has the names that look like it.
+        into: Empty folder that receives the copy.
+        meant: Wanted file name -> the path inside the submission that is meant, where several files may have the name.
+
+    Raises:
+        SubmissionError: There is no such path, it is not a folder, archive or .py file, it holds no .py file, a limit
+            is exceeded, or an archive cannot be used.
+        HarnessError: The copy cannot be written, or no process can be started that reads project files.
+    """
+    return stage_collected(collect_submission(path, wanted, into), path, wanted, into, meant)
+
+
+def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collected:
+    """Read a submission without writing anything; arguments and errors are those of `stage_submission`."""
+    where = shown(path, 500)
+    source = Path(path)
+    if stat.S_ISDIR(_mode(path, where)):
+        return _with_python(collect_folder(source, into=into, where=where), wanted, where)
+    return _collect_file(source, wanted, where)
+
+
+def every_file(path: str, into: Path) -> Collected:
+    """Read all files of a submission, also of one without a .py file; without one, those of the only archive in it.
+
+    Errors are those of `stage_submission`, but for a missing .py file.
+    """
+    where, source = shown(path, 500), Path(path)
+    folder = stat.S_ISDIR(_mode(path, where))
+    collected = collect_folder(source, into=into, where=where) if folder else _every_file_of(source, (), where)
+    if _has_python(name for name, _ in collected.files):
+        return collected
+    from grader.grading.submissions.archives import collect_archive  # noqa: PLC0415 - as below
+
+    archives = _archives(collected)
+    if len(archives) != 1:
+        return collected
+    name, packed = archives[0]
+    return collect_archive(packed, where=f"{where}/{shown(name)}")
+
+
+def stage_collected(
+    collected: Collected, path: str, wanted: Sequence[str], into: Path, meant: Mapping[str, str] = MappingProxyType({})
+) -> Submission:
+    """Write files that were read, here or on another machine, and find the wanted ones; raises HarnessError."""
+    digest = write_files(collected, into)
+    projects, problems = read_projects(into) if wanted else ((), ())  # without, it is staged for its digest alone
+    programs = executables(into, projects)
+    files = {
+        name: _look_for_executable(name, into, projects, programs, collected.files, wanted)
+        if "/" in name and name not in meant
+        else _look_for(name, collected.files, wanted, programs, meant.get(name, ""))
+        for name in wanted
+    }
+    several = tuple(note for file in files.values() for note in _notes_on(file))
+    return Submission(
+        name=_name(Path(path)),
+        path=path,
+        root=into,
+        digest=digest,
+        files=files,
+        notes=(*several, *_unrunnable(files.values(), projects), *collected.notes, *problems),
+        projects=projects,
+    )
+
+
+def _mode(path: str, where: str) -> int:
+    if not path:
+        raise SubmissionError(f"expected {_EXPECTED}, found an empty path", "use . for this folder")
+    try:
+        return os.stat(path).st_mode  # noqa: PTH116 - a Path would change what was typed, e.g. `x.py/`
+    except (FileNotFoundError, NotADirectoryError):
+        raise not_there(path) from None
+    except OSError as error:
+        raise SubmissionError(f"{where}: cannot be read: {error.strerror}") from None
+    except ValueError:
+        raise SubmissionError(f"{where}: expected a path, found one that no file can have") from None
+
+
+def not_there(path: str, hint: str = "") -> SubmissionError:
+    """Return the error for a path at which there is nothing."""
+    text = f"{shown(path, 500)}: expected {_EXPECTED}, found nothing there"
+    return SubmissionError(text, hint or "check the path, and the folder you are in")
+
+
+def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
+    return _with_python(_every_file_of(source, wanted, where), wanted, where)
+
+
+def _every_file_of(source: Path, wanted: Sequence[str], where: str) -> Collected:
+    """Return a .py file, or the files of an archive."""
+    if not source.is_file():
+        raise SubmissionError(f"{where}: expected {_EXPECTED}, found a device, pipe or socket")
+    # Most submissions are folders.
+    from grader.grading.submissions.archives import (  # noqa: PLC0415
+        ARCHIVE_SUFFIXES,
+        HEAD_BYTES,
+        archive_kind,
+        collect_archive,
+    )
+
+    content = read_start(source, MAX_ARCHIVE_BYTES + 1, where=where)
+    kind = archive_kind(content[:HEAD_BYTES])
+    # A program may look like an old tar archive, by chance or on purpose.
+    if source.suffix.casefold() == ".py" and kind in (None, "tar"):
+        if len(content) > MAX_FILE_BYTES:
+            raise SubmissionError(f"{where}: expected at most {MAX_FILE_BYTES >> 20} MiB, found more")
+        return Collected(((source.name, content),))
+    if kind is None and not source.name.casefold().endswith(ARCHIVE_SUFFIXES):
+        raise SubmissionError(f"{where}: expected {_EXPECTED}, found another kind of file", _other_kind(source, wanted))
+    return collect_archive(content, where=where)
+
+
+def _archives(collected: Collected) -> list[tuple[str, bytes]]:
+    from grader.grading.submissions.archives import ARCHIVE_SUFFIXES  # noqa: PLC0415 - as above
+
+    return [(name, content) for name, content in collected.files if name.casefold().endswith(ARCHIVE_SUFFIXES)]
+
+
+def _other_kind(source: Path, wanted: Sequence[str]) -> str:
+    """Return a hint for a file that is neither a program nor an archive: a notebook, or a program of another name."""
+    if is_notebook(source.name):
+        return f"{shown(source.name)} is a notebook: {EXPORT_NOTEBOOK}"
+    if any(_similar(name, [source.name], wanted) for name in wanted) or ".py" in source.suffixes:
+        return f"rename {shown(source.name)} so that it ends in .py"
+    return ""
+
+
+def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Collected:
+    """Return the files if there are .py files among them, or else those of the only archive in them."""
+    names = [name for name, _ in collected.files]
+    if _has_python(names):
+        return collected
+    from grader.grading.submissions.archives import collect_archive  # noqa: PLC0415 - as above
+
+    archives = _archives(collected)
+    if len(archives) != 1:
+        raise _no_python(collected, wanted, where)
+    name, packed = archives[0]
+    inside = f"{where.rstrip('/')}/{shown(name)}"
+    inner = collect_archive(packed, where=inside)
+    if not _has_python(name for name, _ in inner.files):
+        raise _no_python(inner, wanted, inside)
+    return Collected(inner.files, (f"the contents of {shown(name)} were graded", *collected.notes, *inner.notes))
+
+
+def _has_python(names: Iterable[str]) -> bool:
+    return any(name.casefold().endswith(".py") for name in names)
+
+
+def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> SubmissionError:
+    names = [name for name, _ in collected.files]
+    archives = [name for name, _ in _archives(collected)]
+    similar = [name for want in wanted for name in _similar(want, names, wanted)]
+    hint = ""
+    notebooks = [name for name in names if is_notebook(name)]
+    if notebooks:
+        hint = f"{shown(notebooks[0])} is a notebook: {EXPORT_NOTEBOOK}"
+    elif similar:
+        hint = f"rename {shown(similar[0])} so that it ends in .py"
+    elif archives:
+        one = "put your .py files into one zip"
+        hint = f"{one}, not into several" if len(archives) > 1 else f"{one}: {shown(archives[0])} is inside another one"
+    elif collected.notes:
+        hint = collected.notes[0]
+    elif wanted:
+        hint = f"hand in {listed([shown(name) for name in wanted][:_MOST_WANTED])}"
+    found = f"{len(archives)} archives" if len(archives) > 1 else first_of(names) if names else "none"
+    return SubmissionError(f"{where}: expected at least one .py file, found {found}", hint)
+
+
+def _name(source: Path) -> str:
+    """Return the name that reports show: the last part of the path, also for `.` and `..`."""
+    return source.name if source.name not in ("", "..") else source.resolve().name or "/"
+
+
+def _look_for_executable(  # noqa: PLR0913  what a submission consists of
+    wanted: str,
+    root: Path,
+    projects: Sequence[Project],
+    programs: Sequence[Executable],
+    files: Sequence[tuple[str, bytes]],
+    all_wanted: Sequence[str],
+) -> StudentFile:
+    """Find `PACKAGE/NAME` among the programs of a submission; `*` stands for any package."""
+    package, _, name = wanted.partition("/")
+    named = find_executables(root, projects, package, name)
+    found = [one for one in named if one.file is not None]
+    if found:
+        others = tuple(dict.fromkeys(one.file or "" for one in found[1:] if one.file != found[0].file))
+        return StudentFile(wanted, found[0].file, others=others, executable=name)
+    problem = named[0].problem if named else ""
+    similar = difflib.get_close_matches(wanted, [one.words for one in programs], MAX_SIMILAR, SIMILARITY)
+    rest = [one.words for one in programs if one.words not in similar]
+    rest = rest or sorted((path for path, _ in files if _may_be_node(path, all_wanted)), key=_nearest_the_top)
+    return StudentFile(wanted, None, tuple(similar), candidates=tuple(rest[:MAX_CANDIDATES]), problem=problem)
+
+
+def _unrunnable(files: Iterable[StudentFile], projects: Sequence[Project]) -> Iterator[str]:
+    """Yield a note for each executable that `ros2 run` starts only if its source is executable and was linked."""
+    known = {f"{project.folder}/{file}".lstrip("/") for project in projects for _, file in project.unrunnable}
+    for file in files:
+        if "/" in file.wanted and file.found in known:
+            problem = f"{shown(file.found or '')} is not installed as a program, so that `ros2 run` may not find it"
+            yield f"{problem}; install it with install(PROGRAMS ...)"
+
+
+def _notes_on(file: StudentFile) -> Iterator[str]:
+    """Yield what readers must know about how a file was found."""
+    if file.others:
+        yield _several(file)
+    if file.executable and "/" not in file.wanted:
+        yield f"{file.wanted}: the graded executable is {file.executable}, in {shown(file.found or '')}"
+
+
+def _look_for(
+    wanted: str,
+    files: Sequence[tuple[str, bytes]],
+    all_wanted: Sequence[str],
+    programs: Sequence[Executable],
+    meant: str,
+) -> StudentFile:
+    names = [name for name, _ in files]
+    if meant in names:
+        return StudentFile(wanted, meant)
+    exact = sorted((name for name in names if PurePosixPath(name).name == wanted), key=_nearest_the_top)
+    if exact:
+        return StudentFile(wanted, exact[0], others=tuple(exact[1:]))
+    installed = [one for one in programs if wanted in (one.name, f"{one.name}.py") and one.file is not None]
+    if len(installed) == 1:
+        return StudentFile(wanted, installed[0].file, executable=installed[0].name)
+    similar = tuple(_similar(wanted, names, all_wanted))
+    others = {name: content for name, content in files if name not in similar and _may_be_node(name, all_wanted)}
+    ranked = sorted((-_resemblance(name, others[name], wanted), _nearest_the_top(name), name) for name in others)
+    candidates = tuple(name for _, _, name in ranked[:MAX_CANDIDATES])
+    return StudentFile(wanted, None, similar=similar, candidates=candidates, likely=bool(ranked and -ranked[0][0] >= 1))
+
+
+def _may_be_node(path: str, all_wanted: Sequence[str]) -> bool:
+    name = PurePosixPath(path).name
+    return name.casefold().endswith(".py") and name not in (*all_wanted, *_NO_NODES)
+
+
+def _resemblance(path: str, content: bytes, wanted: str) -> float:
+    """Return how much a Python file resembles a wanted one; from 1 on, it is probably meant."""
+    plain, text = _plain(wanted), content.decode("utf-8", "replace")
+    names_it = "rclpy" in text and plain in text.replace("_", "").casefold()
+    likeness = difflib.SequenceMatcher(None, _plain(PurePosixPath(path).name), plain, autojunk=False).ratio()
+    return likeness + ("rclpy" in text) * 0.1 + (names_it or likeness >= LIKELY)
+
+
+def _nearest_the_top(relative: str) -> tuple[int, bytes]:
+    return relative.count("/"), os.fsencode(relative)
+
+
+def _several(file: StudentFile) -> str:
+    return f"{shown(file.found or '')} is graded, because it is nearest the top; not graded: {first_of(file.others)}"
+
+
+def _similar(wanted: str, files: Iterable[str], all_wanted: Sequence[str]) -> list[str]:
+    """Return files whose name looks like a misspelling of a wanted name, nearest first."""
+    plain = _plain(wanted)
+    ranked = []
+    for relative in files:
+        name = PurePosixPath(relative).name
+        if name in all_wanted or len(name) > 2 * len(wanted) + 20 or not _may_be_python(name):
+            continue
+        likeness = _likeness(_plain(name), plain)
+        if likeness >= SIMILARITY:
+            ranked.append((-likeness, _nearest_the_top(relative), relative))
+    return [relative for _, _, relative in sorted(ranked)[:MAX_SIMILAR]]
+
+
+def _may_be_python(name: str) -> bool:
+    folded = name.casefold()
+    return "." not in folded or _EXTENSIONS.search(folded) is not None
+
+
+def _plain(name: str) -> str:
+    """Return a file name without case, separators, copy marks and extensions."""
+    stem = _EXTENSIONS.sub("", unicodedata.normalize("NFKC", name).casefold())
+    return re.sub(r"[\W_]+", "", _COPY_MARK.sub("", stem))
+
+
+def _likeness(one: str, other: str) -> float:
+    matcher = difflib.SequenceMatcher(None, one, other, autojunk=False)
+    if matcher.real_quick_ratio() < SIMILARITY or matcher.quick_ratio() < SIMILARITY:
+        return 0.0
+    return matcher.ratio()

@@ -1,1 +1,0 @@
-"""Reads rubric files as values of `grader.core`."""

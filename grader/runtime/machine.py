@@ -1,0 +1,230 @@
+"""Describes this machine, as far as grading depends on it, and adapts time-outs to its load."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import re
+import shutil
+import stat
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import grader
+from grader.runtime.host.originals import wait_until
+from grader.runtime.model.checkup import Fact
+from grader.runtime.model.quantities import GIB, MIB
+from grader.runtime.model.releases import release_of
+from grader.runtime.ros_installation import RosInstallation
+from grader.runtime.sandbox.properties import confined, install_command, setting_command
+from grader.runtime.weaknesses import BUBBLEWRAP, FAST_DDS, LINUX, kernel_version, known, repaired_here, version_of
+
+#: How long to wait for an endpoint or a message that was announced.
+SETTLE_S = 5.0
+#: On a busy machine, time-outs are multiplied by the load per processor, up to this factor.
+MOST_BUSY = 4.0
+#: After this many time-outs, further waits are brief; after `MOST_LOSSES`, nothing is waited for again.
+LOSSES, BRIEF_S, MOST_LOSSES = 3, 0.05, 20
+
+
+def load_per_processor() -> float:
+    """Return the load average per processor, from 1 to `MOST_BUSY`; 1 if the system does not provide it."""
+    try:
+        return min(MOST_BUSY, max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)))
+    except OSError:
+        return 1.0
+
+
+class Patience:
+    """The time-out of one recording, which gets short after repeated losses.
+
+    Args:
+        full_s: Time-out of the first waits, on an idle machine.
+    """
+
+    def __init__(self, full_s: float = SETTLE_S) -> None:
+        self._full_s = full_s * load_per_processor()
+        self._losses = 0
+
+    @property
+    def wait_s(self) -> float:
+        """Time-out of the next wait, in seconds."""
+        return self._full_s if self._losses < LOSSES else BRIEF_S
+
+    @property
+    def is_left(self) -> bool:
+        """Whether it is worth waiting again for something that did not come."""
+        return self._losses < MOST_LOSSES
+
+    @property
+    def has_lost(self) -> bool:
+        """Whether any wait timed out."""
+        return self._losses > 0
+
+    def wait(self, condition: Callable[[], bool], *, pause_s: float = 0.00015) -> bool:
+        """Wait until a condition holds; return whether it did before the time-out."""
+        came = wait_until(condition, self.wait_s, pause_s=pause_s)
+        if not came:
+            self.lose()
+        return came
+
+    def lose(self) -> None:
+        """Count one wait that timed out."""
+        self._losses += 1
+
+
+#: Disk space that staged submissions, recordings and reports may need at the same time.
+MIN_SCRATCH_BYTES = 512 * MIB
+#: Memory below which a scenario with two nodes, its worker and the grader may not fit.
+MIN_MEMORY_BYTES = GIB
+
+#: How long a program may take to tell its version, in seconds.
+SAID_S = 60.0
+_VERSION = re.compile(r"<version>\s*([0-9.]+)\s*</version>")
+_CREATE_RULESET, _ASK_VERSION = 444, 1  # linux/landlock.h; the number is the same on every architecture
+#: Where the kernel exposes its settings.
+SETTINGS_FOLDER = Path("/proc/sys")
+_PERSISTENT = "/etc/sysctl.d/60-rclpy-grader.conf"
+
+
+def software(ros: RosInstallation | None) -> Iterator[Fact]:
+    """Yield the versions of all software involved; those of ROS only if it is installed."""
+    yield Fact("grader", grader.__version__)
+    yield _python(ros)
+    if ros is not None:
+        origin = "Python wheels" if ros.source == "wheels" else "the sourced installation"
+        yield Fact("ROS 2", f"{ros.distro}, from {origin} in {ros.prefix}")
+        yield Fact("rclpy", ros.rclpy_version)
+        yield Fact("RMW", f"rmw_fastrtps_cpp {_package_version(ros.prefix, 'rmw_fastrtps_cpp')}{_fast_dds(ros)}")
+    yield _bubblewrap()
+
+
+def _python(ros: RosInstallation | None) -> Fact:
+    """Report the version of Python, and whether it is older than the one that the ROS release is made for."""
+    value = f"{platform.python_version()} ({sys.executable})"
+    wanted = release_of(ros.distro).python if ros is not None else None
+    if ros is None or wanted is None or wanted <= sys.version_info[:2]:
+        return Fact("Python", value)
+    newer = ".".join(map(str, wanted))
+    lack = f"ROS 2 {ros.distro} runs on Python {newer}: criteria whose programs need it are undecided here"
+    return Fact("Python", f"{value}; {lack}", remedy=f"install the grader with python{newer}")
+
+
+def weaknesses(ros: RosInstallation | None) -> Iterator[Fact]:
+    """Yield the known weaknesses of the versions here."""
+    bwrap = shutil.which("bwrap")
+    versions = {
+        FAST_DDS: version_of(_fast_dds(ros)) if ros is not None else (),
+        BUBBLEWRAP: version_of(_said_by(bwrap)) if bwrap else (),
+        LINUX: kernel_version(platform.release(), platform.version()),
+    }
+    setuid = bool(bwrap) and bool(Path(str(bwrap)).stat().st_mode & stat.S_ISUID)
+    yield from known(versions, setuid=setuid, repaired=repaired_here())
+
+
+def system() -> Iterator[Fact]:
+    """Yield the relevant properties of the kernel and the hardware."""
+    yield Fact("kernel", f"{platform.system()} {platform.release()} {platform.machine()}, {_distribution()}")
+    yield Fact("user", f"{'root' if os.geteuid() == 0 else f'uid {os.geteuid()}'}{_surroundings()}")
+    yield _namespaces()
+    yield Fact("Landlock", _landlock())
+    yield Fact("processors", str(len(os.sched_getaffinity(0))))
+    yield _memory()
+    yield _scratch()
+
+
+def _package_version(prefix: Path, package: str) -> str:
+    """Return the version of a ROS package from its manifest, or an empty string."""
+    try:
+        manifest = (prefix / "share" / package / "package.xml").read_text(encoding="utf-8")
+    except (OSError, UnicodeError):
+        return ""
+    found = _VERSION.search(manifest)
+    return found[1] if found else ""
+
+
+def _fast_dds(ros: RosInstallation) -> str:
+    """Return the version of Fast DDS from the name of its library, as a phrase, or an empty string."""
+    for folder in ros.runtime.library_paths:
+        for name in ("fastrtps", "fastdds"):
+            versions = sorted(re.findall(r"\.so\.(\d+\.\d+\.\d+)", " ".join(map(str, folder.glob(f"lib{name}*.so.*")))))
+            if versions:
+                return f", Fast DDS {versions[-1]}"
+    return ""
+
+
+def _bubblewrap() -> Fact:
+    path = shutil.which("bwrap")
+    if path is None:
+        return Fact("bubblewrap", "not installed", remedy=install_command("bubblewrap"))
+    return Fact("bubblewrap", f"{_said_by(path).removeprefix('bubblewrap ')} ({path})")
+
+
+def _said_by(program: str) -> str:
+    try:
+        done = subprocess.run([program, "--version"], capture_output=True, text=True, timeout=SAID_S, check=False)
+    except (OSError, subprocess.SubprocessError, UnicodeError):
+        return "cannot be started"
+    return done.stdout.strip()[:80]
+
+
+def _distribution() -> str:
+    try:
+        return platform.freedesktop_os_release().get("PRETTY_NAME", "an unnamed distribution")
+    except OSError:
+        return "an unnamed distribution"
+
+
+def _surroundings() -> str:
+    marks = {"/.dockerenv": "a Docker container", "/run/.containerenv": "a Podman container"}
+    inside = next((name for path, name in marks.items() if Path(path).exists()), "")
+    filtered = "system calls filtered" if confined() else ""
+    if os.environ.get("GITHUB_ACTIONS") == "true":
+        inside = inside or "a GitHub Actions runner"
+    known = ", ".join(part for part in (f"in {inside}" if inside else "", filtered) if part)
+    return f", {known}" if known else ""
+
+
+def _namespaces() -> Fact:
+    """Report whether ordinary users may create namespaces; root always may."""
+    command = setting_command()
+    if not command:
+        filtered = ", but a filter of system calls may" if confined() else ""
+        return Fact("user namespaces", f"no setting forbids them{filtered}")
+    name, _, value = command.rpartition(" ")[2].partition("=")
+    now = SETTINGS_FOLDER.joinpath(*name.split(".")).read_text(encoding="ascii").strip()
+    lasting = f"until the next start; for good: echo {name}={value} | sudo tee {_PERSISTENT}"
+    return Fact("user namespaces", f"kept from ordinary users by {name}={now}", remedy=f"{command} ({lasting})")
+
+
+def _landlock() -> str:
+    version = ctypes.CDLL(None, use_errno=True).syscall(_CREATE_RULESET, None, 0, _ASK_VERSION)
+    return f"version {version}" if version > 0 else "not offered by this kernel"
+
+
+def _memory() -> Fact:
+    available = _available_memory()
+    fits = available is None or available >= MIN_MEMORY_BYTES
+    value = "unknown" if available is None else f"{available / GIB:.1f} GiB available"
+    return Fact("memory", value, fits=fits, remedy="" if fits else "end other programs: a scenario may need 1 GiB")
+
+
+def _available_memory() -> int | None:
+    """Return the memory available to new programs, in bytes, or None if the kernel does not report it."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return None
+    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:")), None)
+
+
+def _scratch() -> Fact:
+    folder = tempfile.gettempdir()
+    free = shutil.disk_usage(folder).free
+    fits = free >= MIN_SCRATCH_BYTES
+    remedy = "" if fits else "free some space, or set TMPDIR to a folder that has it"
+    return Fact("temporary files", f"{free / GIB:.1f} GiB free in {folder}", fits=fits, remedy=remedy)

@@ -1,0 +1,1 @@
+"""The vocabulary of recording: traces, scenarios, submissions, limits and errors."""

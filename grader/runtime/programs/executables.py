@@ -1,0 +1,180 @@
+"""Finds the programs that the packages of a submission install, by their names as `ros2 run` takes them."""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from grader.runtime.host.packages import CMAKE, package_folders, walk
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.projects import Project
+
+#: A package with this file installs its programs with CMake.
+CMAKE_LISTS = CMAKE
+#: The most files of a package that are searched for a module or a program.
+MOST_FILES = 2_000
+
+
+@dataclass(frozen=True, slots=True)
+class Executable:
+    """A program of a package."""
+
+    package: str  # name of the ROS package
+    name: str  # name of the executable
+    file: str | None  # the file that it runs, relative to the submission; None if it is not there
+    target: str = ""  # the entry point, as `MODULE:FUNCTION`; empty for a file that is installed as it is
+    source: str = ""  # the file that is installed as it is, relative to its package; empty for an entry point
+
+    @property
+    def words(self) -> str:
+        """Package and name, as in `ros2 run PACKAGE NAME`."""
+        return f"{self.package}/{self.name}"
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with a program whose file is not there, as a sentence."""
+        if self.source:
+            return f"{self.source}, which is installed as {self.words}, is not in the submission"
+        return f"the entry point {self.words} is {self.target}, which is not in the submission"
+
+
+def project_folders(root: Path) -> list[Path]:
+    """Return the folders of all ROS packages in a submission, outermost first."""
+    return [Path(folder) for folder in package_folders(str(root))]
+
+
+def files_below(folder: Path) -> Iterator[str]:
+    """Yield the paths of all files below a folder, relative to it, without those in folders that a tool has made."""
+    for here, _, files in walk(str(folder)):
+        for file in files:
+            yield Path(here, file).relative_to(folder).as_posix()
+
+
+def executables(root: Path, projects: Sequence[Project]) -> list[Executable]:
+    """Return the programs of all packages of a submission, in the order of its folders.
+
+    They are the entry points, and what CMake or setup.py installs as it is.
+    """
+    found, files = [], _Files(root)
+    for project in projects:
+        names = set()
+        for name, module, function in project.scripts:
+            path = files.find(project.folder, f"{module.replace('.', '/')}.py")
+            file = None if path is None else path.relative_to(root).as_posix()
+            found.append(Executable(project.name, name, file, f"{module}:{function}"))
+            names.add(name)
+        for name, source in project.programs:
+            if name not in names:
+                found.append(_installed(files, project, name, source))
+    return found
+
+
+def _installed(files: _Files, project: Project, name: str, source: str) -> Executable:
+    path = posixpath.join(project.folder, source)
+    return Executable(project.name, name, path if files.has(path) else None, source=source)
+
+
+def find_executables(root: Path, projects: Sequence[Project], package: str, name: str) -> list[Executable]:
+    """Return the programs that `PACKAGE/NAME` stands for, in the order of the folders; `*` stands for any package.
+
+    Where the files of a package do not tell all its programs, a file of the name in it is taken. All are files of the
+    submission, or are not there.
+    """
+    here = [project for project in projects if package in ("*", project.name)]
+    found = [one for one in executables(root, here) if one.name == name]
+    files = _Files(root)
+    for project in here:
+        if any(one.package == project.name for one in found):
+            continue
+        installed = dict(project.unrunnable)
+        if name in installed:
+            found.append(_installed(files, project, name, installed[name]))
+            continue
+        path = files.find(project.folder, name) if _may_have_others(root, project) else None
+        if path is not None and path.suffix == ".py":
+            found.append(Executable(project.name, name, path.relative_to(root).as_posix()))
+    return found
+
+
+def find_executable(root: Path, projects: Sequence[Project], package: str, name: str) -> Executable | None:
+    """Return the program that `ros2 run PACKAGE NAME` would start; None if there is none."""
+    return next(iter(find_executables(root, projects, package, name)), None)
+
+
+def find_loose(root: Path, name: str) -> Executable | None:
+    """Return a file NAME or NAME.py anywhere in a submission, for a package that it does not have."""
+    files = _Files(root)
+    found = next((path for one in (name, f"{name}.py") if (path := files.find("", one)) is not None), None)
+    known = found is not None and found.suffix == ".py"
+    return Executable("", name, found.relative_to(root).as_posix()) if known and found is not None else None
+
+
+def _may_have_others(root: Path, project: Project) -> bool:
+    """Return whether a package may have programs that its files do not tell."""
+    folder = root / project.folder
+    return project.unread or not any((folder / name).is_file() for name in ("setup.py", "setup.cfg", CMAKE))
+
+
+def why_unknown(root: Path, projects: Sequence[Project], package: str, name: str) -> str:
+    """Return why a program that was not found may be there all the same; empty if it cannot be."""
+    for project in projects:
+        if project.name == package and name in project.foreign:
+            return "it is not a Python program"
+        if project.name == package and project.unread and (root / project.folder / CMAKE).is_file():
+            return "CMakeLists.txt may install it in a way that is not read here"
+    return ""
+
+
+def has_package(projects: Sequence[Project], name: str) -> bool:
+    """Return whether a submission has a ROS package."""
+    return any(project.name == name for project in projects)
+
+
+class _Files:
+    """The files of a submission; each folder is listed once, however many names are looked for in it.
+
+    Args:
+        root: The submission.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+        self._listed: dict[str, dict[str, list[Path]]] = {}
+
+    def find(self, within: str, tail: str) -> Path | None:
+        """Return the file nearest the top of a folder whose path ends like this.
+
+        A tail that could lead out of the folder is refused before the file system is asked, and so is a file that a
+        link leads to.
+        """
+        parts = tail.split("/")
+        if "\0" in tail or not {"", ".", ".."}.isdisjoint(parts):
+            return None
+        if within not in self._listed:
+            self._listed[within] = self._list(self._root / within)
+        near = len((self._root / within).parts)
+        for path in self._listed[within].get(parts[-1], ()):
+            ends_so = path.parts[-len(parts) :] == tuple(parts) and len(path.parts) - len(parts) >= near
+            if ends_so and self._is_inside(path):
+                return path
+        return None
+
+    def has(self, path: str) -> bool:
+        """Return whether a relative path is that of a plain file that no link leads to."""
+        return "\0" not in path and self._is_inside(self._root / path)
+
+    def _list(self, folder: Path) -> dict[str, list[Path]]:
+        """Return the files below a folder by name, the ones nearest the top first."""
+        found: dict[str, list[Path]] = {}
+        seen = 0
+        for above, _, names in walk(str(folder)):
+            seen += len(names)
+            for name in names:
+                found.setdefault(name, []).append(Path(above, name))
+            if seen > MOST_FILES:
+                break
+        return found
+
+    def _is_inside(self, path: Path) -> bool:
+        return path.is_file() and path.resolve() == self._root.resolve() / path.relative_to(self._root)

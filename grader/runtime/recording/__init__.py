@@ -1,0 +1,1 @@
+"""Recordings: on the wire between processes, and as files."""

@@ -1,0 +1,12 @@
+"""Participants of a scenario that react: simulated robots, for rubrics that grade closed loops.
+
+    from grader.api import DifferentialDrive, Moment, Simulation
+
+A rubric uses one as a stimulus: `simulation: {differential_drive: {x: {between: [-1, 1]}}}`. The author of a rubric
+writes another as a class in a file that the rubric lists under `simulations`.
+"""
+
+from grader.runtime.simulation.participant import Moment, Output, Simulation
+from grader.runtime.simulation.robots import DifferentialDrive, Turtle, Unicycle
+
+__all__ = ["DifferentialDrive", "Moment", "Output", "Simulation", "Turtle", "Unicycle"]

@@ -1,0 +1,104 @@
+"""Makes simulations: the built-in ones and those in an author's file, each guarded against errors and endless work."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Mapping
+from types import FrameType
+from typing import Any, TypeVar
+
+from grader.runtime.model.author_files import AuthorMistake, line_of, run, words_of
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.simulation.participant import Simulation
+from grader.runtime.simulation.robots import SIMULATIONS
+
+Result = TypeVar("Result")
+
+#: Name of the table in an author's file.
+TABLE = "SIMULATIONS"
+#: Processor time that one call of a simulation may take, in seconds.
+CALL_S = 5.0
+
+
+class SimulationError(HarnessError):
+    """A simulation in a rubric's file fails; the rubric's author has to fix it."""
+
+    def __init__(self, mistake: AuthorMistake) -> None:
+        super().__init__(str(mistake))
+        self.mistake = mistake
+
+
+class _Endless(BaseException):
+    """A call took too long; no simulation catches this by accident."""
+
+
+def classes(path: str, content: bytes) -> Any:
+    """Return the table of simulations in an author's file, None without one; raises what the file raises."""
+    return vars(run("_own_simulations", path, content)).get(TABLE)
+
+
+def made(name: str, path: str, content: bytes, parameters: Mapping[str, Any]) -> Simulation:
+    """Return a simulation.
+
+    Args:
+        name: Its name in a rubric.
+        path: The author's file with its class; empty for a built-in one.
+        content: The text of that file.
+        parameters: Values of its parameters.
+
+    Raises:
+        HarnessError: The file or the class raises an error.
+    """
+
+    def make() -> Simulation:
+        kind: type[Simulation] = (classes(path, content) if path else SIMULATIONS)[name]
+        return kind(**{key: _as_parameter(value) for key, value in parameters.items()})
+
+    return guarded(name, path, make)
+
+
+def guarded(name: str, path: str, work: Callable[[], Result], begins: int = 1) -> Result:
+    """Call a simulation, and return what it returns.
+
+    Args:
+        name: Its name in a rubric.
+        path: The author's file, empty for a built-in simulation.
+        work: The call.
+        begins: The line to name if an error arises outside of the file, because a method returns something wrong.
+
+    Raises:
+        SimulationError: It is in an author's file, and raises an error or takes too long.
+        HarnessError: The same of a built-in one.
+    """
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        del number, frame
+        raise _Endless(f"the call took more than {CALL_S:g} s of processor time")
+
+    timed = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGVTALRM, stop) if timed else None
+    try:
+        if timed:
+            signal.setitimer(signal.ITIMER_VIRTUAL, CALL_S)
+        return work()
+    except (Exception, SystemExit, _Endless) as error:  # whatever the author's file raises, the author has to fix
+        kind = "" if isinstance(error, _Endless) else f"{type(error).__name__}: "
+        text = f"the simulation `{name}` failed: {kind}{words_of(error)[:200]}"
+        if not path:
+            raise HarnessError(text) from error
+        raise SimulationError(AuthorMistake(path, line_of(error, path, begins), text)) from error
+    finally:
+        if timed:
+            signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+            signal.signal(signal.SIGVTALRM, before)
+
+
+def begin_of(simulation: Simulation, method: str, path: str) -> int:
+    """Return the line of an author's file in which a method of a simulation begins; 0 if it begins elsewhere."""
+    code = getattr(getattr(type(simulation), method, None), "__code__", None)
+    return code.co_firstlineno if code is not None and code.co_filename == path else 0
+
+
+def _as_parameter(value: Any) -> Any:
+    return tuple(map(_as_parameter, value)) if isinstance(value, list) else value

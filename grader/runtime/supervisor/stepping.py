@@ -1,0 +1,135 @@
+"""A run that is stepped from outside: sends commands to its worker, and answers its questions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.trace import Observation
+from grader.runtime.plan import Plan
+from grader.runtime.recording.codec import to_json
+from grader.runtime.recording.packed import observations_from_json
+from grader.runtime.steps import Command, Finish, LaunchFailedError
+from grader.runtime.supervisor.supervisor import TRIES, Recorder, Worker, WorkerLostError
+
+#: Answers a question of the worker, while virtual time stands still.
+Answer = Callable[[Mapping[str, Any]], Any]
+
+
+class SteppedRun:
+    """One run in a worker of a recorder; nobody else uses that worker before the run has ended.
+
+    Args:
+        recorder: Lends the worker.
+        plan: Limits, seed and clock of the run.
+        answer: Answers questions of the worker. What it raises is raised by the command that led to the question.
+
+    Attributes:
+        now_ns: Virtual time since the run began.
+        ended: The exit code of each process that has ended; None if it is not known.
+        full: The limit that ended the recording, as a sentence; empty if none did.
+        notes: Sentences for whoever reads the recording; known once the run has ended.
+        unsuitable: Why virtual time does not suit the nodes; known once the run has ended, empty if it does.
+
+    Raises:
+        HarnessError: No worker can be started.
+    """
+
+    def __init__(self, recorder: Recorder, plan: Plan, answer: Answer) -> None:
+        self._recorder = recorder
+        self._answer = answer
+        self._observations: list[Observation] = []
+        self._raised: BaseException | None = None
+        self._busy = self._closed = False
+        self.now_ns = 0
+        self.ended: dict[str, int | None] = {}
+        self.full = self.unsuitable = ""
+        self.notes: list[str] = []
+        self._worker = self._lent(plan, TRIES)
+
+    def _lent(self, plan: Plan, tries: int) -> Worker:
+        """Return a worker that has begun the run; one that has died while it was idle is replaced."""
+        worker = self._recorder.lend()
+        try:
+            worker.step(plan)
+        except BaseException as error:
+            self._recorder.take_back(worker, usable=False)
+            if isinstance(error, WorkerLostError) and tries > 1:
+                return self._lent(plan, tries - 1)
+            raise
+        return worker
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a command is under way, so that no other one can be carried out."""
+        return self._busy
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the run has ended."""
+        return self._closed
+
+    def perform(self, command: Command) -> tuple[dict[str, Any], list[Observation]]:
+        """Carry out a command; return what the worker answers, and what was observed since the last command.
+
+        Raises:
+            HarnessError: The command names something that this machine does not have, or the worker failed.
+            RuntimeError: Another command is under way, or the run has ended.
+        """
+        if self._closed:
+            raise RuntimeError("the run has ended")
+        if self._busy:
+            raise RuntimeError("another step is under way")
+        self._busy = True
+        try:
+            told = self._worker.exchange({"do": type(command).__name__, "with": to_json(command)})
+            while "ask" in told:
+                told = self._worker.exchange({"answer": self._answered(told)})
+        except BaseException:
+            self._give_up()  # the worker may be anywhere
+            raise
+        finally:
+            self._busy = False
+        observations = self._adopt(told)
+        if self._raised is not None:
+            raised, self._raised = self._raised, None
+            self._observations = observations
+            raise raised
+        observations, self._observations = [*self._observations, *observations], []
+        if told.get("problem"):
+            self._observations = observations
+            raise (LaunchFailedError if told.get("launch_failed") else HarnessError)(told["problem"])
+        return told, observations
+
+    def close(self) -> list[Observation]:
+        """End the run with all its processes, and return what was observed last."""
+        if self._closed:
+            return []
+        told, observations = self.perform(Finish())
+        self.notes, self.unsuitable = told["notes"], told["unsuitable"]
+        self._closed = True
+        usable = False
+        try:
+            usable = self._worker.exchange(None).get("worn") is False
+        finally:
+            self._recorder.take_back(self._worker, usable=usable)
+        return observations
+
+    def _answered(self, question: Mapping[str, Any]) -> Any:
+        if self._raised is not None:
+            return None  # the first error is raised at the end of the command
+        try:
+            return self._answer(question)
+        except Exception as error:
+            self._raised = error
+            return None
+
+    def _adopt(self, told: Mapping[str, Any]) -> list[Observation]:
+        self.now_ns, self.full = told["now_ns"], told["full"]
+        self.ended = dict(told["ended"])
+        return observations_from_json(told["news"])
+
+    def _give_up(self) -> None:
+        self._closed = True
+        self._recorder.take_back(self._worker, usable=False)

@@ -1,0 +1,237 @@
+"""Base class of the runners: the parts of running a plan that are the same on both clocks."""
+
+from __future__ import annotations
+
+import bisect
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, ClassVar
+
+from grader.runtime.model.scenario import Event
+from grader.runtime.model.trace import ClockKind, Mark, Observation, Trace
+from grader.runtime.plan import Plan
+from grader.runtime.simulation.participant import Moment
+from grader.runtime.stimuli.calls import AddClients, Ask, PlannedCalls
+from grader.runtime.stimuli.events import Disappear, TopicEvent, in_order
+from grader.runtime.stimuli.server import AddServer, RemoveServer, Respond
+from grader.runtime.stimuli.simulation import Step
+from grader.runtime.worker.ending import never_stopped, reported_fault
+from grader.runtime.worker.observer import Observer, Taken
+from grader.runtime.worker.service_peers import ServicePeers
+from grader.runtime.worker.simulations import Simulations
+from grader.runtime.worker.student_process import NodeProcess
+from grader.runtime.worker.topic_peers import TopicPeers
+from grader.runtime.worker.trace_recorder import TraceRecorder
+from grader.runtime.worker.transit import Transit
+
+
+class Runner(ABC):
+    """Runs one plan.
+
+    Args:
+        plan: What to run.
+        students: The started processes, each waiting for its first answer.
+        observer: The grader's node.
+    """
+
+    clock: ClassVar[ClockKind]
+    #: The default reason for using this clock.
+    clock_reason: ClassVar[str] = ""
+    _topics: TopicPeers
+
+    def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
+        self._plan = plan
+        self._students = students
+        self._observer = observer
+        self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
+        self._stop_ns = 0
+        self._starts_ns = dict(plan.starts_ns)
+        self._simulations = Simulations(plan)
+        self._transits = {connection.topic: Transit(connection) for connection in plan.connections}
+        # Simulations last: of two events at one instant, that of the plan comes first.
+        planned = in_order([*plan.events(), *self._simulations.events()])
+        self._due = in_order(arrived for event in planned if (arrived := self._arrival(event)) is not None)
+        participants = max(plan.limits.participants, len(plan.processes))  # each process needs one
+        self._recorder = TraceRecorder(replace(plan.limits, participants=participants))
+        self._services = ServicePeers(
+            plan,
+            observer.services,
+            self._recorder,
+            nodes=lambda: self._recorder.graph.nodes,
+            later=self._later,
+            simulated=self._simulated,
+        )
+
+    def run(self) -> Trace:
+        """Run the plan to its end and return the trace."""
+        self._begin()
+        self._run_on()
+        # The graph before the stop signal, which takes nodes out of it.
+        self._recorder.look_back(self._last_look())
+        self._stop_ns = self._end_ns
+        unfit = self._unfit()
+        # A recording that is not judged, or has ended early, shows nothing about the end of its programs.
+        if self._plan.shutdown_ns and not (unfit or self._recorder.full):
+            self._shut_down()
+        return Trace(
+            scenario=self._plan.scenario,
+            clock=self.clock,
+            clock_reason=unfit or self.clock_reason,
+            stop_ns=self._stop_ns,
+            observations=self._observations(),
+            notes=self._recorder.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
+            starts=tuple(s.start_told for s in self._students if s.start_told is not None),
+            # The grader's own fault first: it says more than that the machine was busy.
+            harness_problem=self._graders_fault() or self._harness_problem(),
+            incomplete=self._is_incomplete(),
+            may_drift=self._may_drift(),
+        )
+
+    @abstractmethod
+    def _time_ns(self) -> int:
+        """Return the time of the run, in nanoseconds from its start."""
+
+    @abstractmethod
+    def _clock_ns(self, now_ns: int) -> int:
+        """Return what the clock of a student's node shows at a time of the run, in nanoseconds since 1970."""
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Start the processes that do not start late."""
+
+    @abstractmethod
+    def _run_on(self) -> None:
+        """Continue until the end, or until nothing more can happen."""
+
+    @abstractmethod
+    def _last_look(self) -> int:
+        """Record the graph at the end, and return the time."""
+
+    @abstractmethod
+    def _interrupt(self, student: NodeProcess) -> None:
+        """Send a process the stop signal, as Ctrl-C does."""
+
+    @abstractmethod
+    def _is_served(self, calls: PlannedCalls) -> bool:
+        """Return whether the server for some calls exists and is matched."""
+
+    def _unfit(self) -> str:
+        """Return why this clock is not suitable for the nodes; empty if it is."""
+        return ""
+
+    def _may_drift(self) -> bool:
+        """Return whether the work of a node may slow it down on the real clock, which this one may hide."""
+        return False
+
+    def _graders_fault(self) -> str:
+        """Return what failed in the grader's own code in the processes; empty if nothing did."""
+        return next((student.grader_failed for student in self._students if student.grader_failed), "")
+
+    def _harness_problem(self) -> str:
+        """Return why the recording cannot be judged; empty if it can."""
+        return ""
+
+    def _is_incomplete(self) -> bool:
+        """Return whether something that the middleware should have delivered did not come in time."""
+        return False
+
+    def _observations(self) -> tuple[Observation, ...]:
+        """Return the observations, in order."""
+        return tuple(self._recorder.observations)
+
+    @abstractmethod
+    def _announce_exchange(self, kind: str, service: str, count: int) -> None:
+        """Note that requests or responses are on their way to the students' nodes."""
+
+    def _shut_down(self) -> None:
+        """Send the stop signal to every process, and continue until all have ended."""
+        # No stimuli after the stop signal: they would wake nodes that are about to end.
+        self._due, self._end_ns = [], self._time_ns() + self._plan.shutdown_ns
+        for student in self._students:
+            if not student.ended:
+                student.stop_signalled = True
+                self._recorder.add(Mark(self._time_ns(), "stop_signal", student.name))
+                self._interrupt(student)
+        self._run_on()
+        for student in self._students:
+            if not student.ended:
+                self._recorder.add(never_stopped(student.name, self._end_ns, self._plan.shutdown_ns))
+
+    def _finished(self) -> bool:
+        return all(s.ended for s in self._students) and not any(isinstance(d, (TopicEvent, Step)) for d in self._due)
+
+    def _record(self, now_ns: int, taken: Taken, *, early: bool = False) -> None:
+        # Before the message is recorded, after which its topic has been seen.
+        first = taken.topic == self._plan.first_message_on and not self._recorder.seen(taken.topic)
+        if first and not self._stop_ns:
+            self._end_ns = now_ns + self._plan.duration_ns
+        self._recorder.message(now_ns, taken, early=early)
+        # Not after the end: a simulation would go on reacting to nodes that are about to leave.
+        if self._simulations.exist and not (self._recorder.full or self._stop_ns):
+            for event in self._simulations.hear(taken, self._moment(now_ns)):
+                if (arrived := self._arrival(event)) is not None:
+                    self._later(arrived)
+
+    def _simulated(self, now_ns: int, service: str, request: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        """Return the response to a request at a time; None if nothing but the plan says what it is."""
+        return self._simulations.answer(service, request, self._moment(now_ns))
+
+    def _moment(self, now_ns: int) -> Moment:
+        return Moment(now_ns, self._clock_ns(now_ns))
+
+    def _end_if_full(self, now_ns: int) -> None:
+        if self._recorder.full:
+            self._end_ns = min(self._end_ns, now_ns)
+
+    def _report_fault(self, student: NodeProcess, report: Mapping[str, Any], now_ns: int) -> None:
+        """Record a fault that a process has reported."""
+        fault, limits = report.get("fault"), self._plan.limits
+        self._recorder.add(reported_fault(student.name, now_ns, fault, limits, student.places))
+
+    def _later(self, event: Event) -> None:
+        """Schedule an event, after all others that are due at the same time."""
+        # To the right of what is due at the same time: causes before effects.
+        bisect.insort(self._due, event, key=lambda e: e.t_ns)
+
+    def _arrival(self, event: Event) -> Event | None:
+        """Return an event as it reaches the processes; None for a message that is lost on the way."""
+        transit = self._transits.get(event.topic) if isinstance(event, TopicEvent) else None
+        if transit is None:
+            return event
+        if event.creates or isinstance(event, Disappear):
+            return replace(event, t_ns=max(event.t_ns, transit.over_ns))
+        arrives_ns = transit.arrives_ns(event.t_ns)
+        return None if arrives_ns is None else replace(event, t_ns=arrives_ns)
+
+    def _send(self, event: Event, now_ns: int) -> None:
+        """Execute an event when it reaches the processes, which may be now."""
+        arrived = self._arrival(event)
+        if arrived is not None and arrived.t_ns > now_ns:
+            self._later(arrived)
+        elif arrived is not None:
+            self._do(arrived, now_ns)
+
+    def _do(self, event: Event, now_ns: int) -> None:
+        """Execute one event of a stimulus."""
+        if isinstance(event, TopicEvent):
+            self._topics.do(event, now_ns)
+        elif isinstance(event, Step):
+            *published, following = self._simulations.step(event, self._moment(event.t_ns))
+            for message in published:
+                self._send(message, now_ns)
+            self._later(following)
+        elif isinstance(event, AddServer):
+            self._services.add_server(now_ns, event.server)
+        elif isinstance(event, RemoveServer):
+            self._services.remove_server(now_ns, event.server)
+        elif isinstance(event, Respond):
+            if self._services.answer(now_ns, event.server, event.number):
+                self._announce_exchange("response", event.server.service, 1)
+        elif isinstance(event, AddClients):
+            self._services.add_clients(event.calls)
+        elif isinstance(event, Ask):
+            if self._is_served(event.call.calls):
+                self._announce_exchange("request", self._services.call(now_ns, event.call), 1)
+            else:
+                self._services.wait(event)  # until its server exists

@@ -1,1 +1,0 @@
-"""Reads submissions, folders and archives, as values of `grader.core`."""
