@@ -7,14 +7,15 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from places import GRADE
 from sandboxes import USER, unreachable, user_start
-from verifying import GRADE, differences, program, verified, written
+from verifying import differences, program, verified, written
 
 from grader.cli.main import app
 from grader.grading.app import conditions as module
@@ -128,19 +129,11 @@ RACING = {
 }
 
 
-@pytest.fixture
-def folder() -> Iterator[Path]:
-    """An empty folder; unlike pytest's own, every user can enter what is above it."""
-    with tempfile.TemporaryDirectory() as name:
-        Path(name).chmod(0o755)
-        yield Path(name)
-
-
 @pytest.mark.ros
-def test_programs_that_repeat_are_told_from_those_that_do_not(folder: Path) -> None:
+def test_programs_that_repeat_are_told_from_those_that_do_not(open_folder: Path) -> None:
     """By recording again, without any other change; those of the wall clock are neither."""
     texts = {**{name: text for name, (text, _) in DIFFERING.items()}, **REPEATING, **RACING}
-    code, found = verified(written(folder, texts), "--condition", "again")
+    code, found = verified(written(open_folder, texts), "--condition", "again")
     assert code == 1
     assert found["result"] == "different"
     assert {name: one["cause"] for name, one in differences(found).items()} == {
@@ -152,17 +145,17 @@ def test_programs_that_repeat_are_told_from_those_that_do_not(folder: Path) -> N
 
 @pytest.mark.ros
 @pytest.mark.parametrize("condition", ["executed", "together"])
-def test_what_repeats_does_so_under_other_conditions(folder: Path, condition: str) -> None:
+def test_what_repeats_does_so_under_other_conditions(open_folder: Path, condition: str) -> None:
     """Also what a program draws after it has imported numpy, and how deep it can recurse."""
-    code, found = verified(written(folder, REPEATING), "--condition", condition)
+    code, found = verified(written(open_folder, REPEATING), "--condition", condition)
     assert (code, differences(found)) == (0, {})
 
 
 @pytest.mark.ros
-def test_the_first_difference_says_where_it_is(folder: Path) -> None:
+def test_the_first_difference_says_where_it_is(open_folder: Path) -> None:
     """With both events, and with the line that logged."""
     text = program(imports="import itertools", each="self.get_logger().info(str(id(object())))")
-    (path,) = written(folder, {"ada": text})
+    (path,) = written(open_folder, {"ada": text})
     done = subprocess.run([GRADE, "verify", path, "--condition", "again"], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     line = 1 + text.splitlines().index("        self.get_logger().info(str(id(object())))")
@@ -173,9 +166,9 @@ def test_the_first_difference_says_where_it_is(folder: Path) -> None:
 
 
 @pytest.mark.ros
-def test_only_the_wall_clock_can_decide(folder: Path) -> None:
+def test_only_the_wall_clock_can_decide(open_folder: Path) -> None:
     """Then nothing is verified, and the reason is said."""
-    (path,) = written(folder, RACING)
+    (path,) = written(open_folder, RACING)
     done = subprocess.run([GRADE, "verify", path, "--quick"], capture_output=True, text=True, check=False)
     assert done.returncode == 3
     assert "Not comparable event by event, because the wall clock decides:" in done.stdout
@@ -183,10 +176,10 @@ def test_only_the_wall_clock_can_decide(folder: Path) -> None:
 
 
 @pytest.mark.ros
-def test_the_result_in_evidence(folder: Path) -> None:
+def test_the_result_in_evidence(open_folder: Path) -> None:
     """The kept recordings are compared too; evidence of other files is refused, and judging again works as before."""
-    (path,) = written(folder, {"ada": REPEATING["plain"]})
-    kept = folder / "kept"
+    (path,) = written(open_folder, {"ada": REPEATING["plain"]})
+    kept = open_folder / "kept"
     command = [GRADE, path, "--exercise", "velocity_publisher", "-o", f"evidence={kept}"]
     subprocess.run(command, capture_output=True, check=False)
     code, found = verified([path], "--evidence", str(kept), "--condition", "order")
@@ -198,7 +191,7 @@ def test_the_result_in_evidence(folder: Path) -> None:
     before = json.loads((kept / "report.json").read_text(encoding="utf-8"))
     judged = subprocess.run([GRADE, "rejudge", str(kept), "--json"], capture_output=True, text=True, check=False)
     assert json.loads(judged.stdout)["exercises"] == before["exercises"]
-    other = written(folder, {"bob": REPEATING["clocks"]})
+    other = written(open_folder, {"bob": REPEATING["clocks"]})
     done = subprocess.run(
         [GRADE, "verify", *other, "--evidence", str(kept)], capture_output=True, text=True, check=False
     )
@@ -208,10 +201,10 @@ def test_the_result_in_evidence(folder: Path) -> None:
 
 
 @pytest.mark.ros
-def test_changed_evidence_differs(folder: Path) -> None:
+def test_changed_evidence_differs(open_folder: Path) -> None:
     """What was recorded of another version of the grader or on another machine is compared event by event."""
-    (path,) = written(folder, {"ada": REPEATING["plain"]})
-    kept = folder / "kept"
+    (path,) = written(open_folder, {"ada": REPEATING["plain"]})
+    kept = open_folder / "kept"
     command = [GRADE, path, "--exercise", "velocity_publisher", "--seed", "1", "-o", f"evidence={kept}"]
     subprocess.run(command, capture_output=True, check=False)
     manifest = json.loads((kept / "evidence.json").read_text(encoding="utf-8"))
@@ -224,15 +217,15 @@ def test_changed_evidence_differs(folder: Path) -> None:
 
 @pytest.mark.ros
 @pytest.mark.long
-def test_an_ordinary_user(folder: Path, ros: RosInstallation) -> None:
+def test_an_ordinary_user(open_folder: Path, ros: RosInstallation) -> None:
     """Who cannot become another one, and has another sandbox than root."""
     if os.geteuid() != 0:
         pytest.skip("only root can become an ordinary user")
     before = user_start(ros)
     if why := unreachable(before, ros):
         pytest.skip(why)
-    paths = written(folder, {"ada": REPEATING["plain"]})
-    home = folder / "home"
+    paths = written(open_folder, {"ada": REPEATING["plain"]})
+    home = open_folder / "home"
     home.mkdir()
     os.chown(home, USER, USER)
     own = {"HOME": str(home), "XDG_CACHE_HOME": str(home), "TMPDIR": str(home)}

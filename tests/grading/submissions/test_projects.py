@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from places import TESTS
 
 from grader.grading.submissions import projects
 from grader.grading.submissions.projects import read_projects
@@ -296,7 +297,7 @@ def test_files_that_collide_or_never_end_are_noted(tmp_path: Path, ros: RosInsta
 def test_the_limits_leave_room_for_honest_files() -> None:
     """The process that reads an ordinary package is far from its limits of memory and time."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert read_projects(Path(__file__).parents[2] / "packages" / "workspace")[1] == ()
+    assert read_projects(TESTS / "packages" / "workspace")[1] == ()
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = (after.ru_utime + after.ru_stime) - (used.ru_utime + used.ru_stime)
     assert spent < projects.PROCESSOR_S / 2
