@@ -211,6 +211,26 @@ def test_every_module_says_what_it_holds() -> None:
         assert ast.get_docstring(tree_of(path)), path
 
 
+def class_names(package: Path) -> dict[str, list[str]]:
+    """Return the modules that define a public class of each name."""
+    found: dict[str, list[str]] = {}
+    for path in sorted(package.rglob("*.py")):
+        for node in tree_of(path).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found.setdefault(node.name, []).append(path.relative_to(package).as_posix())
+    return found
+
+
+def test_a_name_of_a_class_has_one_meaning(tmp_path: Path) -> None:
+    """No two public classes of the grader have one name, so that each search finds one thing."""
+    shared = {name: places for name, places in class_names(PACKAGE).items() if len(places) > 1}
+
+    assert shared == {}
+    (tmp_path / "one.py").write_text("class Line: ...\nclass _Own: ...\n")
+    (tmp_path / "other.py").write_text("class Line: ...\nclass _Own: ...\n")
+    assert class_names(tmp_path) == {"Line": ["one.py", "other.py"]}
+
+
 #: Places on one person's machine; what students hand in may name any.
 AT_HOME = re.compile(r"(?<![\w.}])(/home/(?!log\b)\w|/root/|/Users/\w|[A-Z]:\\\\)")
 
