@@ -40,7 +40,7 @@ from grader.grading.rubrics.schema import rubric_schema
 from grader.runtime.model import quantities
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path += [str(ROOT / "tests"), str(ROOT / "tests" / "recorded")]
+sys.path.append(str(ROOT / "tests" / "support"))
 import archive  # noqa: E402  the recordings of the test submissions
 import sample_folders  # noqa: E402  where those are
 
