@@ -144,6 +144,7 @@ PURE = (
     "runtime/model",
     "runtime/worker/claims.py",
     "runtime/worker/core.py",
+    "runtime/worker/delay.py",
     "grading/model",
     "grading/judging",
     "grading/reporting",

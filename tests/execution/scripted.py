@@ -12,9 +12,9 @@ from grader.runtime.model.trace import Endpoint, Fault, GraphSnapshot, OutputLin
 from grader.runtime.plan import Plan
 from grader.runtime.stimuli.numbers import PlannedNumbers
 from grader.runtime.worker.core import Taken
+from grader.runtime.worker.delay import Delay
 from grader.runtime.worker.ending import ended_by
 from grader.runtime.worker.notes import Places
-from grader.runtime.worker.workload import Delay
 
 #: Stands for the submission: this file is in it.
 HERE = Path(__file__).resolve().parent

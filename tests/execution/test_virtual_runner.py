@@ -46,10 +46,10 @@ from grader.runtime.stimuli.recorded import PlannedRecording
 from grader.runtime.worker import core, discovery, trace_recorder
 from grader.runtime.worker import virtual_runner as module
 from grader.runtime.worker.core import Taken
+from grader.runtime.worker.delay import HOPELESS_NS
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.virtual_runner import VirtualRunner
-from grader.runtime.worker.workload import HOPELESS_NS
 
 
 @pytest.fixture(autouse=True)
