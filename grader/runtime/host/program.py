@@ -205,7 +205,9 @@ def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | Wal
         link.send({"kind": "fault", "fault": describer.exception(error)})
 
     if clock == "virtual":
-        return VirtualTime(link, report_fault)
+        time = VirtualTime(link)
+        time.install(report_fault)
+        return time
 
     from .wall import WallTime
 
