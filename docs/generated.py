@@ -32,7 +32,7 @@ from grader.grading.app.explain import explain_checks, explain_rubrics
 from grader.grading.judging.run_check import check_name
 from grader.grading.model.chart import Chart, Panel
 from grader.grading.model.exercise import Criterion, Exercise
-from grader.grading.model.report import CheckExplanation, CriterionExplanation, Parameter, Report
+from grader.grading.model.report import CheckExplanation, CheckParameter, CriterionExplanation, Report
 from grader.grading.reporting.html.render import render_html
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.loader import read_rubric
@@ -222,7 +222,7 @@ def _check(e: CheckExplanation, pictures: Mapping[str, Chart]) -> str:
     return "\n\n".join(filter(None, lines))
 
 
-def _parameter(parameter: Parameter) -> str:
+def _parameter(parameter: CheckParameter) -> str:
     default = "required" if parameter.required else f"`{parameter.value}`"
     return f"| `{parameter.name}` | {default} | {_cell(parameter.meaning)} |"
 

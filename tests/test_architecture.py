@@ -140,13 +140,23 @@ def test_what_is_no_reading_is_let_be(line: str, tmp_path: Path) -> None:
     assert text_readers(tmp_path) == []
 
 
-#: Packages that are pure.
-PURE = ("runtime/model", "grading/model", "grading/judging", "grading/reporting", "course/mutation/operators")
+#: Packages and modules that are pure.
+PURE = (
+    "runtime/model",
+    "runtime/worker/claims.py",
+    "runtime/worker/core.py",
+    "runtime/worker/delay.py",
+    "grading/model",
+    "grading/judging",
+    "grading/reporting",
+    "course/mutation/operators",
+)
 
 
 def impurities(package: Path) -> list[str]:
     """Return every import in a pure package of what touches the world, as sentences."""
     paths = sorted(path for pure in PURE for path in (package / pure).rglob("*.py"))
+    paths += [package / pure for pure in PURE if pure.endswith(".py") and (package / pure).exists()]
     found = []
     for path in paths:
         name = path.relative_to(package).as_posix()
@@ -167,6 +177,7 @@ def test_a_planted_impurity_is_found(tmp_path: Path) -> None:
         "runtime/model/bad.py": "import os.path as p, random\n",
         "grading/reporting/bad.py": "import datetime\n",
         "grading/reporting/delivery.py": "import tempfile\n",
+        "runtime/worker/core.py": "import time\n",
     }
     for name, source in planted.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -176,6 +187,7 @@ def test_a_planted_impurity_is_found(tmp_path: Path) -> None:
         "grading/reporting/bad.py imports datetime",
         "runtime/model/bad.py imports os",
         "runtime/model/bad.py imports random",
+        "runtime/worker/core.py imports time",
     ]
 
 
@@ -210,6 +222,26 @@ def test_every_module_says_what_it_holds() -> None:
     """One sentence at the top of every file."""
     for path in sorted(PACKAGE.rglob("*.py")):
         assert ast.get_docstring(tree_of(path)), path
+
+
+def class_names(package: Path) -> dict[str, list[str]]:
+    """Return the modules that define a public class of each name."""
+    found: dict[str, list[str]] = {}
+    for path in sorted(package.rglob("*.py")):
+        for node in tree_of(path).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found.setdefault(node.name, []).append(path.relative_to(package).as_posix())
+    return found
+
+
+def test_a_name_of_a_class_has_one_meaning(tmp_path: Path) -> None:
+    """No two public classes of the grader have one name, so that each search finds one thing."""
+    shared = {name: places for name, places in class_names(PACKAGE).items() if len(places) > 1}
+
+    assert shared == {}
+    (tmp_path / "one.py").write_text("class Line: ...\nclass _Own: ...\n")
+    (tmp_path / "other.py").write_text("class Line: ...\nclass _Own: ...\n")
+    assert class_names(tmp_path) == {"Line": ["one.py", "other.py"]}
 
 
 #: Places on one person's machine; what students hand in may name any.

@@ -25,7 +25,7 @@ from grader.grading.model.grading_options import (
     GRADE,
     GradingOptions,
     Keyed,
-    Kind,
+    OptionKind,
     key_values,
     names,
     option_words,
@@ -143,9 +143,9 @@ class WithTwoMore(GradingOptions):
     """The record with two options that the grader does not have."""
 
     gravity: float = module._row(
-        9.81, "--gravity", "How heavy things are.", kind=Kind.SECONDS, kept=True, keyed=Keyed.RECORDING
+        9.81, "--gravity", "How heavy things are.", kind=OptionKind.SECONDS, kept=True, keyed=Keyed.RECORDING
     )
-    maps: tuple[Path, ...] = module._row((), "--map", "Use this map.", kind=Kind.PATH, metavar="FILE", kept=True)
+    maps: tuple[Path, ...] = module._row((), "--map", "Use this map.", kind=OptionKind.PATH, metavar="FILE", kept=True)
 
 
 @pytest.mark.parametrize("command", [GRADE, BATCH])

@@ -11,10 +11,10 @@ from grader.runtime.host.clock import EPOCH_NS
 from grader.runtime.model.trace import Endpoint, Fault, GraphSnapshot, OutputLine
 from grader.runtime.plan import Plan
 from grader.runtime.stimuli.numbers import PlannedNumbers
+from grader.runtime.worker.core import Taken
+from grader.runtime.worker.delay import Delay
 from grader.runtime.worker.ending import ended_by
 from grader.runtime.worker.notes import Places
-from grader.runtime.worker.observer import Taken
-from grader.runtime.worker.workload import Delay
 
 #: Stands for the submission: this file is in it.
 HERE = Path(__file__).resolve().parent
@@ -163,10 +163,6 @@ class ScriptedStudent:
         """Return what measures its steps."""
         self.workload = self.workload or ScriptedWorkload(self, t_ns)
         return self.workload
-
-    def claims_of(self, kind: str, name: str) -> list[dict[str, Any]]:
-        """Return its endpoints of a kind and name."""
-        return [c for c in self.claims if (c["kind"], c["name"]) == (kind, name)]
 
     def tell(self, answer: dict[str, Any]) -> None:
         """Take an answer of the conductor."""

@@ -69,10 +69,9 @@ class VirtualTime:
 
     Args:
         link: The connection to the grader.
-        report_fault: Called with an exception that ended one of the student's threads.
     """
 
-    def __init__(self, link: Link, report_fault: Callable[[BaseException], None]) -> None:
+    def __init__(self, link: Link) -> None:
         self._link = link
         self.clock = VirtualClock()
         self.scheduler = Scheduler(lambda: self.clock.now_ns, self._ask_for_time)
@@ -92,12 +91,19 @@ class VirtualTime:
         self._work: Work | None = None
         self._charging: set[GreenThread] = set()
         self._charges = False
+        #: Called with a reason before the program waits for something outside of virtual time.
+        self.give_up_outside: Callable[[str], None] = lambda reason: None
+
+    def install(self, report_fault: Callable[[BaseException], None]) -> None:
+        """Make the threads, locks, selectors and clocks of this process virtual.
+
+        Args:
+            report_fault: Called with an exception that ended one of the student's threads.
+        """
         threads.install_locks(self.scheduler, self.clock)
         threads.install_threads(self.scheduler, self.clock, report_fault)
         times.install_looks(self.clock)
         times.install_sleep_and_clocks(self.scheduler, self.clock)
-        #: Called with a reason before the program waits for something outside of virtual time.
-        self.give_up_outside: Callable[[str], None] = lambda reason: None
         threads.install_selectors(self.scheduler, self.clock, lambda: self.give_up_outside("waiting"))
 
     def install_ros(self) -> None:

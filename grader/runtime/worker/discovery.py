@@ -2,112 +2,32 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Any
 
 from grader.runtime.machine import Patience
-from grader.runtime.model.trace import GraphSnapshot, keeps_within
+from grader.runtime.model.trace import GraphSnapshot
 from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.stimuli.messages import PlannedMessages
+from grader.runtime.worker.claims import (
+    CHANNELS,
+    ORDINARY,
+    answers,
+    compatible,
+    fits,
+    meets,
+    passes,
+    readers_of,
+    serves,
+)
+from grader.runtime.worker.core import Core, announce
 from grader.runtime.worker.observer import Observer
-from grader.runtime.worker.ros_names import is_name, is_node_name
-from grader.runtime.worker.service_ends import BACKGROUND_TYPES
+from grader.runtime.worker.ros_names import is_name
 from grader.runtime.worker.service_peers import ServicePeers
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.trace_recorder import NAME_CHARACTERS, TraceRecorder
-
-#: The most messages that are believed to be sent between two reports.
-COUNT = 1_000_000
-#: Valid types and parameters; anything else that a process reports as a name is never shown.
-_TYPE = re.compile(r"[A-Za-z0-9_]+(?:/[A-Za-z0-9_]+){1,2}")
-_PARAMETER = re.compile(r"[^\s]{1,150}")
-
-
-def counts(data: Any) -> dict[str, int]:
-    """Return the number of messages by channel, without entries that are not valid channels or counts."""
-    if not isinstance(data, dict):
-        return {}
-    channels = {name: count for name, count in data.items() if is_name(str(name).partition(" ")[2])}
-    return {str(name): min(count, COUNT) for name, count in channels.items() if isinstance(count, int) and count > 0}
-
-
-def is_claim(claim: Any) -> bool:
-    """Return whether a value is a complete description of an endpoint or a parameter."""
-    if not isinstance(claim, dict) or not all(isinstance(claim.get(k), str) for k in ("kind", "name", "type")):
-        return False
-    kind, name = claim["kind"], claim["name"]
-    if kind == "parameter":
-        node, _, parameter = name.partition(":")
-        return is_node_name(node) and _PARAMETER.fullmatch(parameter) is not None
-    if not (is_node_name if kind == "node" else is_name)(name) or (
-        kind != "node" and _TYPE.fullmatch(claim["type"]) is None
-    ):
-        return False
-    ends = kind in ("publisher", "subscription")
-    bools = all(isinstance(claim.get(k), bool) for k in ("reliable", "latched", "manual"))
-    return not ends or (bools and isinstance(claim.get("deadline_ns"), int))
-
-
-def readers_of(student: NodeProcess, topic: str) -> list[dict[str, Any]]:
-    """Return the subscriptions that a process reports on a topic."""
-    return [c for c in student.claims if c["kind"] == "subscription" and c["name"] == topic]
-
-
-#: The QoS of an endpoint that asks for nothing special; what a claim leaves out is as here.
-ORDINARY = {"reliable": True, "latched": False, "deadline_ns": 0, "manual": False, "lease_ns": 0}
-
-
-def fits(writer: Mapping[str, Any], reader: Mapping[str, Any]) -> bool:
-    """Return whether the QoS that a writer offers satisfies that of a reader: the policies of `unmet_policy`."""
-    offer, wish = {**ORDINARY, **writer}, {**ORDINARY, **reader}
-    return (
-        (offer["reliable"] or not wish["reliable"])
-        and (offer["latched"] or not wish["latched"])
-        and keeps_within(offer["deadline_ns"], wish["deadline_ns"])
-        and (offer["manual"] or not wish["manual"])
-        and keeps_within(offer["lease_ns"], wish["lease_ns"])
-    )
-
-
-def meets(writer: Mapping[str, Any], reader: Mapping[str, Any]) -> bool:
-    """Return whether a publisher and a subscription have the same topic and type, so that only QoS keeps them apart."""
-    return (writer["name"], writer["type"]) == (reader["name"], reader["type"])
-
-
-def compatible(writer: Mapping[str, Any], reader: Mapping[str, Any]) -> bool:
-    """Return whether the messages of a publisher reach a subscription."""
-    return meets(writer, reader) and fits(writer, reader)
-
-
-def passes(sender: Mapping[str, Any], receiver: Mapping[str, Any]) -> bool:
-    """Return whether what one end of a service sends reaches the other; without QoS, an end is an ordinary one."""
-    return fits(sender.get("sends", ORDINARY), receiver.get("takes", ORDINARY))
-
-
-def answers(server: Mapping[str, Any], client: Mapping[str, Any]) -> bool:
-    """Return whether requests and responses pass between a server and a client, so that they see each other."""
-    return passes(client, server) and passes(server, client)
-
-
-def serves(claim: dict[str, Any], service: str, interface: str) -> bool:
-    """Return whether a claim provides a service: as its server, or as a node, for services that every node has."""
-    if claim["kind"] == "node":
-        return interface.startswith(BACKGROUND_TYPES) and claim["name"] == service.rpartition("/")[0]
-    return (claim["kind"], claim["name"], claim["type"]) == ("service", service, interface)
-
-
-#: The channels on which endpoints receive.
-CHANNELS = {"subscription": "topic", "service": "request", "client": "response"}
-
-
-def announce(student: NodeProcess, channel: str, count: int) -> None:
-    """Add messages to those that are on their way to a process, unless its end of the channel has no counterpart."""
-    if channel not in student.unmatched:
-        student.arrivals[channel] = student.arrivals.get(channel, 0) + count
-
 
 #: How long, in real time, to wait until a removed endpoint has left the graph.
 DEPARTURE_S = 2.0
@@ -124,7 +44,7 @@ class Discovery:
     """Tracks the endpoints of the students' processes and of the grader, and waits until they are matched.
 
     Args:
-        students: The processes.
+        core: Provides the processes, and how many messages they keep for subscriptions that come later.
         observer: The grader's node.
         recorder: Records graph snapshots and notes.
         services: The grader's servers and clients.
@@ -135,19 +55,19 @@ class Discovery:
         fixed: The streams whose type a rubric has fixed.
         latched: The other streams whose publisher is latched, because the first subscription asked for that.
         published: How many messages each stimulus has published.
-        kept: How many messages each process has published on a topic of a latched publisher of its own.
         patience: The timeout for anything that was announced.
     """
 
     def __init__(
         self,
-        students: list[NodeProcess],
+        core: Core[NodeProcess],
         observer: Observer,
         recorder: TraceRecorder,
         services: ServicePeers,
         mark_dead: Callable[[NodeProcess], None],
     ) -> None:
-        self._students = students
+        self._core = core
+        self._students = core.processes
         self._observer = observer
         self._recorder = recorder
         self._services = services
@@ -165,7 +85,6 @@ class Discovery:
         self._writers: Counter[str] = Counter()
         self._refused: dict[tuple[str, int], set[tuple[str, int]]] = {}
         self.published: Counter[str] = Counter()
-        self.kept: Counter[tuple[str, str]] = Counter()
 
     def match(self, now_ns: int) -> None:
         """Wait until the graph shows exactly the endpoints that exist, and all of them are matched."""
@@ -195,12 +114,12 @@ class Discovery:
         for talker in self._students:
             latched = [c for c in talker.claims if c["kind"] == "publisher" and c["latched"]]
             # how many a student's publisher keeps is not known, but that one comes is certain
-            writers += [(talker.name, c, min(1, self.kept[talker.name, c["name"]])) for c in latched]
+            writers += [(talker.name, c, min(1, self._core.kept[talker.name, c["name"]])) for c in latched]
         served = {
             (student.name, writer["name"], sender): count
             for sender, writer, count in writers
             for student in self._students
-            if any(c["latched"] and compatible(writer, c) for c in readers_of(student, writer["name"]))
+            if any(c["latched"] and compatible(writer, c) for c in readers_of(student.claims, writer["name"]))
         }
         students = {student.name: student for student in self._students}
         for (reader, topic, sender), count in served.items():
@@ -231,7 +150,7 @@ class Discovery:
         writer = self.offered(topic)
         # The grader watches its own stimuli where a student publishes on the same topic.
         own = sum(writer["reliable"] or not reliable for reliable in self._observer.watching(topic, writer["type"]))
-        readers = sum(compatible(writer, c) for s in self._students if not s.ended for c in readers_of(s, topic))
+        readers = sum(compatible(writer, c) for s in self._students if not s.ended for c in readers_of(s.claims, topic))
         return self._observer.subscribers_matched(topic) >= int(readers + own)
 
     def takes(self, reader: dict[str, Any], topic: str) -> bool:

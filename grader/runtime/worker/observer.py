@@ -11,7 +11,7 @@ import secrets
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,14 +25,15 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from grader.runtime.host.originals import unread_bytes, wait_until
 from grader.runtime.message_classes import message_class, plain_fields
-from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB, size
 from grader.runtime.model.trace import Endpoint, GraphSnapshot
 from grader.runtime.padding import without_padding
+from grader.runtime.worker.claims import BACKGROUND_TYPES
 from grader.runtime.worker.console import TEXT_CHARACTERS, Logged
+from grader.runtime.worker.core import Taken, in_order
 from grader.runtime.worker.ros_names import asked, listed
-from grader.runtime.worker.service_ends import BACKGROUND_TYPES, ServiceEnds
+from grader.runtime.worker.service_ends import ServiceEnds
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -50,22 +51,6 @@ REST_S, QUIET_LOOKS, QUIET_PAUSE_S = 0.5, 4, 0.005
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 #: The most participants of the grader, and how long to wait for the name of a new one.
 PARTICIPANTS, NAME_S = 8, 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class Taken:
-    """One received message: topic, type, bytes and decoded fields."""
-
-    topic: str
-    type: str
-    cdr: bytes
-    value: Mapping[str, Any]
-    sent_ns: int = 0  # when it was sent, by the system clock; 0 if that is not known
-
-
-def in_order(messages: Iterable[Taken]) -> list[Taken]:
-    """Sort messages of one instant by topic and type, because which topic's arrive first is up to the middleware."""
-    return sorted(messages, key=lambda taken: (taken.topic, taken.type))
 
 
 class Observer:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bisect
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,8 +15,9 @@ from grader.runtime.stimuli.calls import AddClients, Ask, PlannedCalls
 from grader.runtime.stimuli.events import Disappear, TopicEvent, in_order
 from grader.runtime.stimuli.server import AddServer, RemoveServer, Respond
 from grader.runtime.stimuli.simulation import Step
+from grader.runtime.worker.core import Agenda, Taken
 from grader.runtime.worker.ending import never_stopped, reported_fault
-from grader.runtime.worker.observer import Observer, Taken
+from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.service_peers import ServicePeers
 from grader.runtime.worker.simulations import Simulations
 from grader.runtime.worker.student_process import NodeProcess
@@ -44,14 +44,14 @@ class Runner(ABC):
         self._plan = plan
         self._students = students
         self._observer = observer
-        self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
         self._stop_ns = 0
-        self._starts_ns = dict(plan.starts_ns)
         self._simulations = Simulations(plan)
         self._transits = {connection.topic: Transit(connection) for connection in plan.connections}
         # Simulations last: of two events at one instant, that of the plan comes first.
         planned = in_order([*plan.events(), *self._simulations.events()])
-        self._due = in_order(arrived for event in planned if (arrived := self._arrival(event)) is not None)
+        due = in_order(arrived for event in planned if (arrived := self._arrival(event)) is not None)
+        end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
+        self._agenda = Agenda(due, dict(plan.starts_ns), end_ns)
         participants = max(plan.limits.participants, len(plan.processes))  # each process needs one
         self._recorder = TraceRecorder(replace(plan.limits, participants=participants))
         self._services = ServicePeers(
@@ -59,7 +59,7 @@ class Runner(ABC):
             observer.services,
             self._recorder,
             nodes=lambda: self._recorder.graph.nodes,
-            later=self._later,
+            later=self._agenda.later,
             simulated=self._simulated,
         )
 
@@ -69,7 +69,7 @@ class Runner(ABC):
         self._run_on()
         # The graph before the stop signal, which takes nodes out of it.
         self._recorder.look_back(self._last_look())
-        self._stop_ns = self._end_ns
+        self._stop_ns = self._agenda.end_ns
         unfit = self._unfit()
         # A recording that is not judged, or has ended early, shows nothing about the end of its programs.
         if self._plan.shutdown_ns and not (unfit or self._recorder.full):
@@ -146,8 +146,7 @@ class Runner(ABC):
 
     def _shut_down(self) -> None:
         """Send the stop signal to every process, and continue until all have ended."""
-        # No stimuli after the stop signal: they would wake nodes that are about to end.
-        self._due, self._end_ns = [], self._time_ns() + self._plan.shutdown_ns
+        self._agenda.shut_down(self._time_ns(), self._plan.shutdown_ns)
         for student in self._students:
             if not student.ended:
                 student.stop_signalled = True
@@ -156,22 +155,19 @@ class Runner(ABC):
         self._run_on()
         for student in self._students:
             if not student.ended:
-                self._recorder.add(never_stopped(student.name, self._end_ns, self._plan.shutdown_ns))
-
-    def _finished(self) -> bool:
-        return all(s.ended for s in self._students) and not any(isinstance(d, (TopicEvent, Step)) for d in self._due)
+                self._recorder.add(never_stopped(student.name, self._agenda.end_ns, self._plan.shutdown_ns))
 
     def _record(self, now_ns: int, taken: Taken, *, early: bool = False) -> None:
         # Before the message is recorded, after which its topic has been seen.
         first = taken.topic == self._plan.first_message_on and not self._recorder.seen(taken.topic)
         if first and not self._stop_ns:
-            self._end_ns = now_ns + self._plan.duration_ns
+            self._agenda.end_ns = now_ns + self._plan.duration_ns
         self._recorder.message(now_ns, taken, early=early)
         # Not after the end: a simulation would go on reacting to nodes that are about to leave.
         if self._simulations.exist and not (self._recorder.full or self._stop_ns):
             for event in self._simulations.hear(taken, self._moment(now_ns)):
                 if (arrived := self._arrival(event)) is not None:
-                    self._later(arrived)
+                    self._agenda.later(arrived)
 
     def _simulated(self, now_ns: int, service: str, request: Mapping[str, Any]) -> Mapping[str, Any] | None:
         """Return the response to a request at a time; None if nothing but the plan says what it is."""
@@ -182,17 +178,12 @@ class Runner(ABC):
 
     def _end_if_full(self, now_ns: int) -> None:
         if self._recorder.full:
-            self._end_ns = min(self._end_ns, now_ns)
+            self._agenda.end_by(now_ns)
 
     def _report_fault(self, student: NodeProcess, report: Mapping[str, Any], now_ns: int) -> None:
         """Record a fault that a process has reported."""
         fault, limits = report.get("fault"), self._plan.limits
         self._recorder.add(reported_fault(student.name, now_ns, fault, limits, student.places))
-
-    def _later(self, event: Event) -> None:
-        """Schedule an event, after all others that are due at the same time."""
-        # To the right of what is due at the same time: causes before effects.
-        bisect.insort(self._due, event, key=lambda e: e.t_ns)
 
     def _arrival(self, event: Event) -> Event | None:
         """Return an event as it reaches the processes; None for a message that is lost on the way."""
@@ -208,7 +199,7 @@ class Runner(ABC):
         """Execute an event when it reaches the processes, which may be now."""
         arrived = self._arrival(event)
         if arrived is not None and arrived.t_ns > now_ns:
-            self._later(arrived)
+            self._agenda.later(arrived)
         elif arrived is not None:
             self._do(arrived, now_ns)
 
@@ -220,7 +211,7 @@ class Runner(ABC):
             *published, following = self._simulations.step(event, self._moment(event.t_ns))
             for message in published:
                 self._send(message, now_ns)
-            self._later(following)
+            self._agenda.later(following)
         elif isinstance(event, AddServer):
             self._services.add_server(now_ns, event.server)
         elif isinstance(event, RemoveServer):

@@ -12,10 +12,9 @@ from typing import Any
 from grader.runtime.message_classes import interface_class
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.trace import ServiceEnd
+from grader.runtime.worker.claims import BACKGROUND_TYPES
 from grader.runtime.worker.ros_names import asked
 
-#: Prefixes of the types of services that every node has.
-BACKGROUND_TYPES = ("rcl_interfaces/", "type_description_interfaces/")
 #: The most requests that one poll takes.
 AT_ONCE = 1000
 

@@ -21,7 +21,7 @@ from grader.runtime.simulation.participant import SHORTEST_PERIOD_NS, Moment, Ou
 from grader.runtime.stimuli.messages import Advertise, PlannedMessages, PublishFields
 from grader.runtime.stimuli.server import AddServer, PlannedServer
 from grader.runtime.stimuli.simulation import PlannedSimulation, Step
-from grader.runtime.worker.observer import Taken
+from grader.runtime.worker.core import Taken
 
 Result = TypeVar("Result")
 

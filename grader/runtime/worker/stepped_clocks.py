@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
 from grader.runtime.model.trace import ClockKind, Endpoint, Observation, unmet_policy
 from grader.runtime.plan import Plan, derive
 from grader.runtime.stimuli.messages import PlannedMessages
+from grader.runtime.worker.core import Core
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.stepped_runner import Question, Starter, SteppedRunner
 from grader.runtime.worker.student_process import NodeProcess
@@ -32,9 +33,6 @@ class VirtualSteppedRunner(SteppedRunner, VirtualRunner):
         self, plan: Plan, students: list[NodeProcess], observer: Observer, start: Starter, ask: Question
     ) -> None:
         super().__init__(plan, students, observer, start, ask)
-        self._to_ns = 0
-        self._until_news = False
-        self._order = random.Random(derive(int(plan.host_seed, 16), "order")) if plan.drawn_order else None  # noqa: S311
 
     def unsuitable(self) -> str:
         """Return why virtual time does not suit the nodes; empty if it does."""
@@ -46,47 +44,38 @@ class VirtualSteppedRunner(SteppedRunner, VirtualRunner):
         A plan ends before what happens at its end. A step includes it: whoever waits for a second expects the timer of
         that second. The loop therefore ends a nanosecond later, and no process is told of that nanosecond.
         """
-        self._to_ns, self._until_news = max(self._now_ns, to_ns), until_news
-        self._end_ns = self._to_ns + 1
-        self._run_on()
-        self._until_news = False
-        if not self._recorder.full and not (until_news and self._recorder.observations):
-            self._now_ns = self._to_ns
-        self._now_ns = min(self._now_ns, self._to_ns)
 
-    def _is_interrupted(self) -> bool:
-        return self._until_news and bool(self._recorder.observations)
+        def is_enough() -> bool:
+            return until_news and bool(self._recorder.observations)
 
-    def _quiet_until(self, student: NodeProcess) -> int:
-        return max(self._now_ns, min(super()._quiet_until(student), self._to_ns))
+        self._core.go_to(to_ns)
+        self._carry_out(self._core.run_on(is_enough))
+        self._core.arrive(early=bool(self._recorder.full) or is_enough())
 
-    def _ready_students(self) -> Iterator[NodeProcess]:
-        """Yield the processes that have something to do; with a drawn order, in an order that follows from the seed."""
-        ready = super()._ready_students()
-        if self._order is None:
-            return ready
-        found = list(ready)
-        self._order.shuffle(found)
-        return iter(found)
+    def _make_core(self) -> Core[NodeProcess]:
+        shuffle = None
+        if self._plan.drawn_order:
+            shuffle = random.Random(derive(int(self._plan.host_seed, 16), "order")).shuffle  # noqa: S311
+        return Core(self._students, self._agenda, includes_end=True, shuffle=shuffle)
 
     def _begin_process(self, student: NodeProcess, delay_ns: int) -> None:
-        student.wake_ns = self._now_ns + delay_ns
+        self._core.waits(student, self._core.now_ns + delay_ns)
 
     def _await_start(self, started: Sequence[NodeProcess]) -> None:
         del started
-        self._advance(self._now_ns)
+        self._advance(self._core.now_ns)
 
     def _interrupt(self, student: NodeProcess) -> None:
-        self._to_ns, self._end_ns = self._now_ns, self._now_ns + 1
+        self._core.go_to(self._core.now_ns)
         super()._interrupt(student)
 
     def _await_end(self, student: NodeProcess) -> None:
         del student
-        self._advance(self._now_ns)
+        self._advance(self._core.now_ns)
 
     def _lose(self, student: NodeProcess) -> None:
         self._discovery.lose(student)
-        self._end(student)
+        self._core.ended(student)
 
 
 class WallSteppedRunner(SteppedRunner, WallRunner):
@@ -111,7 +100,7 @@ class WallSteppedRunner(SteppedRunner, WallRunner):
 
     def idle(self) -> None:
         """Record what happens between two commands, for as long as one pause takes."""
-        self._end_ns = self._time_ns() + self.longest_pause_ns
+        self._agenda.end_ns = self._time_ns() + self.longest_pause_ns
         self._look(self._time_ns())
         self._pause()
 
@@ -121,7 +110,7 @@ class WallSteppedRunner(SteppedRunner, WallRunner):
     def _await(self, condition: Callable[[], bool], until_ns: int) -> None:
         """Record what happens until a condition holds, or until a moment; it is looked at once at least."""
         while True:
-            self._end_ns = until_ns
+            self._agenda.end_ns = until_ns
             self._look(self._time_ns())
             if condition() or self._recorder.full or self._time_ns() >= until_ns:
                 return

@@ -16,7 +16,18 @@ from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import Fault, FaultKind, Mark, Observation
 from grader.runtime.plan import Plan
 from grader.runtime.simulation.participant import Moment, Output, Simulation
-from grader.runtime.steps import Advance, Call, Command, Interrupt, Kill, Publish, SendGoal, Serve, Simulate, Start
+from grader.runtime.steps import (
+    Advance,
+    CallService,
+    Command,
+    Interrupt,
+    Kill,
+    Publish,
+    SendGoal,
+    Serve,
+    Simulate,
+    StartProcesses,
+)
 from grader.runtime.stimuli.calls import AddClients, Ask, PlannedCall, PlannedCalls
 from grader.runtime.stimuli.events import Disappear, TopicEvent
 from grader.runtime.stimuli.goals import goal_call
@@ -103,13 +114,13 @@ class SteppedRunner(Runner):
         match command:
             case Advance():
                 self._advance(command.to_ns, until_news=command.until_news)
-            case Start():
+            case StartProcesses():
                 return self._begin_processes(command)
             case Publish():
                 self._publish(command)
             case Serve():
                 self._serve(command.service, command.type)
-            case Call():
+            case CallService():
                 return self._call(command)
             case SendGoal():
                 return self._send_goal(command)
@@ -185,17 +196,17 @@ class SteppedRunner(Runner):
 
     # ------------------------------------------------------------- processes
 
-    def _begin_processes(self, command: Start) -> dict[str, Any]:
+    def _begin_processes(self, command: StartProcesses) -> dict[str, Any]:
         started: list[NodeProcess] = []
         left_out: list[str] = []
         for student, delay_ns in self._start(command.plan, left_out):
             self._students.append(student)
             if delay_ns:
-                self._starts_ns[student.name] = self._time_ns() + delay_ns
+                self._agenda.starts_ns[student.name] = self._time_ns() + delay_ns
             self._begin_process(student, delay_ns)
             started.append(student)
         if command.settle:
-            self._await_start([student for student in started if student.name not in self._starts_ns])
+            self._await_start([student for student in started if student.name not in self._agenda.starts_ns])
         return {"started": [student.name for student in started], "left_out": left_out}
 
     def _named(self, process: str) -> NodeProcess:
@@ -239,7 +250,7 @@ class SteppedRunner(Runner):
         stream = self._on_topics[topic] = Stream(command, self._time_ns())
         first = stream.event(0)
         assert first is not None
-        self._later(first)
+        self._agenda.later(first)
 
     def _do(self, event: Event, now_ns: int) -> None:
         if not isinstance(event, PublishNext):
@@ -249,7 +260,7 @@ class SteppedRunner(Runner):
         if self._on_topics.get(event.topic) is not stream:
             return
         if (following := stream.event(event.number + 1)) is not None:
-            self._later(following)
+            self._agenda.later(following)
         self._send(PublishRecorded(event.t_ns, event.topic, stream.message(event.number), {}), now_ns)
 
     def _serve(self, service: str, interface: str) -> None:
@@ -264,12 +275,12 @@ class SteppedRunner(Runner):
         answer = self._ask({"ask": "service", "service": service, "request": request, "now_ns": now_ns})
         return answer if isinstance(answer, dict) else None
 
-    def _call(self, command: Call) -> dict[str, Any]:
+    def _call(self, command: CallService) -> dict[str, Any]:
         now_ns = self._time_ns()
         calls = PlannedCalls(command.service, command.type, now_ns, NS_PER_S, 1, (command.request,))
         check_fields(calls, command.service)
         self._do(AddClients(now_ns, calls), now_ns)
-        self._later(Ask(now_ns, PlannedCall(calls, 0)))
+        self._agenda.later(Ask(now_ns, PlannedCall(calls, 0)))
         return {"client": self._services.clients_of(command.service)}
 
     def _send_goal(self, command: SendGoal) -> dict[str, Any]:
@@ -279,7 +290,7 @@ class SteppedRunner(Runner):
         for part in (call, *(following for _, following in call.then)):
             self._do(AddClients(now_ns, part.calls), now_ns)
             clients.append(self._services.clients_of(part.calls.service))
-        self._later(Ask(now_ns, call))
+        self._agenda.later(Ask(now_ns, call))
         return {"clients": clients}
 
     def _simulate(self, command: Simulate) -> None:
@@ -289,7 +300,7 @@ class SteppedRunner(Runner):
             if isinstance(event, (Advertise, AddServer)):
                 self._do(event, now_ns)
             else:
-                self._later(event)
+                self._agenda.later(event)
 
 
 class _Elsewhere(Simulation):

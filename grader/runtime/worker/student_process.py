@@ -25,6 +25,7 @@ from grader.runtime.model.trace import Fault, FaultKind, LogRecord, OutputLine, 
 from grader.runtime.sandbox.protocol import Command
 from grader.runtime.sandbox.starter import StartedProcess
 from grader.runtime.worker.console import TEXT_CHARACTERS
+from grader.runtime.worker.core import Process
 from grader.runtime.worker.ending import ended_by, exited, graders_fault, limit_behind
 from grader.runtime.worker.notes import Places, hidden_notes, note_of, start_of
 from grader.runtime.worker.workload import Workload
@@ -66,23 +67,14 @@ SILENCE_S = 90.0
 
 
 @dataclass
-class NodeProcess:
-    """A running student process.
+class NodeProcess(Process):
+    """A running student process; see `Process` for what virtual time knows of it.
 
     Attributes:
-        name: The wanted file name, which identifies the process in traces.
         root: The submission's folder as the process sees it.
-        wake_ns: When it next wants to run, or None.
-        claims: Its endpoints, as it reports them.
-        arrivals: Messages that are on their way to it and not yet announced to it, by channel.
         told: The counterparts that it has to wait for.
-        renewed: Whether its endpoints have changed since then.
-        unmatched: The channels of its endpoints that had too few counterparts when the wait for them timed out.
         sees_graph: Whether its program queries the graph, as it reports.
         offers: The services, clients and parameters that it has reported.
-        nudged: Whether it has to run again at this instant, because its endpoints were matched.
-        leaving: Whether it waits until what it has sent has arrived, before it tells which endpoints it removes.
-        ended: Whether it has ended.
         exit_code: Its exit code as a shell shows it, 128 and the number of the signal that ended it; None until it has
             ended, or if it is not known.
         limits: Its limits.
@@ -108,22 +100,13 @@ class NodeProcess:
         reached: Names of audit events that its program raised, as it reports.
     """
 
-    name: str
     root: str
     process: subprocess.Popen[bytes] | StartedProcess
     line: socket.socket
     limits: Limits = field(default_factory=Limits)
-    wake_ns: int | None = None
-    claims: list[dict[str, Any]] = field(default_factory=list)
-    arrivals: dict[str, int] = field(default_factory=dict)
     told: dict[str, dict[str, list[int]]] = field(default_factory=dict)
-    renewed: bool = False
-    unmatched: frozenset[str] = frozenset()
     sees_graph: bool = False
     offers: set[tuple[str, str, str]] = field(default_factory=set)
-    nudged: bool = False
-    leaving: bool = False
-    ended: bool = False
     exit_code: int | None = None
     workload: Workload | None = None
     most_bytes: int = 0
@@ -227,12 +210,6 @@ class NodeProcess:
         if self.workload is None:
             self.workload = Workload(self.process.pid, t_ns)
         return self.workload
-
-    def claims_of(self, kind: str, name: str) -> list[dict[str, Any]]:
-        """Return the endpoints of a kind and name that the process reports; every node has some services."""
-        # The services of parameters and of types come with a node, and hosts do not report them one by one.
-        node = name.rpartition("/")[0] if kind == "service" else ""
-        return [c for c in self.claims if (c["kind"], c["name"]) in ((kind, name), ("node", node))]
 
     def note(self, report: Mapping[str, Any]) -> None:
         """Record a note: how the file is started, which comes first, or something that readers must know."""

@@ -11,7 +11,9 @@ from grader.runtime.stimuli.events import Appear, Disappear, TopicEvent
 from grader.runtime.stimuli.messages import Advertise, PlannedMessages, PublishFields
 from grader.runtime.stimuli.numbers import PublishNumber
 from grader.runtime.stimuli.recorded import PublishRecorded
-from grader.runtime.worker.discovery import Discovery, announce, readers_of
+from grader.runtime.worker.claims import readers_of
+from grader.runtime.worker.core import announce
+from grader.runtime.worker.discovery import Discovery
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.trace_recorder import TraceRecorder
@@ -149,11 +151,11 @@ class VirtualTopicPeers(TopicPeers):
         self._discovery.published[topic] += 1
         for student in self._students:
             # Only to those that receive it: a process waits in real time for what is announced.
-            if any(self._discovery.takes(reader, topic) for reader in readers_of(student, topic)):
+            if any(self._discovery.takes(reader, topic) for reader in readers_of(student.claims, topic)):
                 announce(student, f"topic {topic}", 1)
 
     def _asked(self, topic: str) -> list[tuple[str, bool]]:
-        return [(reader["type"], reader["latched"]) for s in self._students for reader in readers_of(s, topic)]
+        return [(reader["type"], reader["latched"]) for s in self._students for reader in readers_of(s.claims, topic)]
 
     def _withdraw(self, topic: str, now_ns: int) -> None:
         del now_ns

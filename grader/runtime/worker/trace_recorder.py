@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import NS_PER_S, size
 from grader.runtime.model.trace import Fault, GraphSnapshot, Mark, Message, Observation, Offer, Request, Response
-from grader.runtime.worker.observer import Taken
+from grader.runtime.worker.core import Taken
 
 #: The most notes of a trace, and the maximum length of a note and of a name in it.
 NOTES, NOTE_CHARACTERS, NAME_CHARACTERS = 50, 500, 200

@@ -55,7 +55,7 @@ class WallRunner(Runner):
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
-        self._due = sorted(_with_early_publishers(self._due), key=lambda e: e.t_ns)
+        self._agenda.due = sorted(_with_early_publishers(self._agenda.due), key=lambda e: e.t_ns)
         self._topics: WallTopicPeers = WallTopicPeers(observer, self._recorder)
         self._next_graph_ns = 0
         self._graph_every_ns = GRAPH_EVERY_NS
@@ -78,29 +78,32 @@ class WallRunner(Runner):
         """Start the clock and every process that does not start late."""
         self._started = time.monotonic_ns()
         for student in self._students:
-            if student.name not in self._starts_ns:
+            if student.name not in self._agenda.starts_ns:
                 student.tell({"now_ns": 0, "free_until_ns": 0})
 
     def _run_on(self) -> None:
         """Poll until the end, or until nothing more can happen."""
         before_ns = self._time_ns() if self._stop_ns else 0
-        while (now_ns := self._time_ns()) < self._end_ns and not self._finished():
+        while (now_ns := self._time_ns()) < self._agenda.end_ns and not self._finished():
             self.held_up_ns = max(self.held_up_ns, now_ns - before_ns)
             before_ns = now_ns
             self._look(now_ns)
             self._pause()
 
+    def _finished(self) -> bool:
+        return self._agenda.is_over(self._students)
+
     def _pause(self) -> None:
         """Wait until something has arrived or is due, but not for long: many things are only noticed by looking."""
         time.sleep(self.pause_s)
-        moments = [self._end_ns, *self._starts_ns.values(), *(event.t_ns for event in self._due[:1])]
+        moments = [*self._agenda.moments(), *self._agenda.starts_ns.values()]
         left_ns = min(self.longest_pause_ns, min(moments) - self._time_ns())
         if left_ns > 0:
             self._observer.await_arrival(left_ns)
 
     def _last_look(self) -> int:
-        self._look_at_graph(self._end_ns)
-        return self._end_ns
+        self._look_at_graph(self._agenda.end_ns)
+        return self._agenda.end_ns
 
     def _interrupt(self, student: NodeProcess) -> None:
         student.tell({"stop": True})
@@ -112,20 +115,20 @@ class WallRunner(Runner):
         return "the machine was too busy: a reference timer beside the node was held up as well"
 
     def _look(self, now_ns: int) -> None:
-        while self._due and self._due[0].t_ns <= now_ns:
-            self._do(self._due.pop(0), now_ns)
+        while self._agenda.is_due(now_ns):
+            self._do(self._agenda.due.pop(0), now_ns)
         self._topics.leave(now_ns)
         for due in self._services.ready(self._is_served):
-            self._later(replace(due, t_ns=now_ns))
+            self._agenda.later(replace(due, t_ns=now_ns))
         self._services.take()
         self._services.record(now_ns)
         for server in self._services.done():
             # removed later, because its last response would be lost otherwise
-            if not any(isinstance(due, RemoveServer) and due.server == server for due in self._due):
-                self._later(RemoveServer(now_ns + LINGER_NS, server))
+            if not any(isinstance(due, RemoveServer) and due.server == server for due in self._agenda.due):
+                self._agenda.later(RemoveServer(now_ns + LINGER_NS, server))
         for student in self._students:
-            if 0 < self._starts_ns.get(student.name, 0) <= now_ns:
-                del self._starts_ns[student.name]
+            if 0 < self._agenda.starts_ns.get(student.name, 0) <= now_ns:
+                del self._agenda.starts_ns[student.name]
                 self._recorder.add(Mark(now_ns, "process_starts", student.name))
                 student.tell({"now_ns": 0, "free_until_ns": 0})
             self._hear(student, now_ns)

@@ -13,7 +13,7 @@ from copies import handed
 
 from grader.course.similarity import pages
 from grader.course.similarity.library import ComparedProgram, Handed, Likeness, Pair, SameText, Side, Similar
-from grader.course.similarity.pages import Line, lines_of, render_overview, render_pair, render_table, report_of
+from grader.course.similarity.pages import ShownLine, lines_of, render_overview, render_pair, render_table, report_of
 
 EVIL = "<script>document.title='owned'</script>\u202e\x1b[31m=cmd|'/C calc'!A0\" onmouseover=\"alert(1)"
 
@@ -91,10 +91,10 @@ def test_a_long_file_is_shown_around_what_is_alike() -> None:
     """The rest is counted."""
     text = "".join(f"x{k} = {k}\n" for k in range(1, 1001))
     lines = lines_of(Side(ComparedProgram("a.py", text, ""), 1.0, (500,)))
-    assert lines[0] == Line(0, "496 lines not shown")
+    assert lines[0] == ShownLine(0, "496 lines not shown")
     assert [line.number for line in lines if line.alike] == [500]
     assert [line.number for line in lines[1:-1]] == list(range(497, 504))
-    assert lines[-1] == Line(0, "497 lines not shown")
+    assert lines[-1] == ShownLine(0, "497 lines not shown")
 
 
 def test_no_file_makes_a_huge_page() -> None:

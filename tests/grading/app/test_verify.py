@@ -20,9 +20,9 @@ from verifying import differences, program, verified, written
 from grader.cli.main import app
 from grader.grading.app import conditions as module
 from grader.grading.app import verify as verifying
-from grader.grading.app.conditions import LOOPS, Condition, conditions
+from grader.grading.app.conditions import LOOPS, VerifyCondition, conditions
 from grader.grading.model.conditions import CONDITIONS, SANDBOXES, USUAL
-from grader.grading.model.verification import State
+from grader.grading.model.verification import ConditionState
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import RosInstallation
 from grader.runtime.sandbox.tiers import isolation_from_name
@@ -257,13 +257,13 @@ print(json.dumps({"isolation": "x", "said": said}))
 
 
 @pytest.fixture
-def started(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[Condition], dict[str, Any]]:
+def started(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[VerifyCondition], dict[str, Any]]:
     """Start the stand-in under a condition, and return what it said."""
     monkeypatch.setattr(verifying, "PROGRAM", (sys.executable, "-c", SAYS))
     monkeypatch.setenv("GRADER_SEED_KEY", "a key that nobody else may read")
     tmp_path.chmod(0o755)
 
-    def start(condition: Condition) -> dict[str, Any]:
+    def start(condition: VerifyCondition) -> dict[str, Any]:
         (line,) = verifying._recorded(tmp_path, [], condition, "bubblewrap")
         said: dict[str, Any] = line["said"]
         return said
@@ -271,12 +271,12 @@ def started(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[Condit
     return start
 
 
-def made(name: str, isolation: str = "landlock") -> Condition:
+def made(name: str, isolation: str = "landlock") -> VerifyCondition:
     (condition,) = conditions([name], isolation)
     return condition
 
 
-def test_each_condition_is_made(started: Callable[[Condition], dict[str, Any]]) -> None:
+def test_each_condition_is_made(started: Callable[[VerifyCondition], dict[str, Any]]) -> None:
     """And nothing else is changed by it."""
     usual = started(made("again"))
     assert (usual["cwd"], usual["PYTHONHASHSEED"], usual["GRADER_SEED_KEY"], usual["loops"]) == ("/", "1", None, 0)
@@ -301,7 +301,7 @@ def test_each_condition_is_made(started: Callable[[Condition], dict[str, Any]]) 
     )
 
 
-def test_no_loop_is_left(started: Callable[[Condition], dict[str, Any]]) -> None:
+def test_no_loop_is_left(started: Callable[[VerifyCondition], dict[str, Any]]) -> None:
     """Neither after a recording, nor if the one who started them is killed."""
     started(made("load"))
     assert started(made("again"))["loops"] == 0
@@ -445,16 +445,18 @@ print(json.dumps({{"number": 0, "sources": {{}}}}))
 @pytest.mark.parametrize(
     ("then", "code", "state"),
     [
-        ("pass", 0, State.SAME),
-        ('trace["stop_ns"] = 6', 1, State.DIFFERENT),
-        ('trace["clock_reason"] = "it is late"', 1, State.DIFFERENT),
-        ('trace["harness_problem"] = "the machine was too busy"', 3, State.FAILED),
-        ('line = {"number": 0, "problem": "no space left", "hint": ""}', 3, State.FAILED),
-        ("sys.exit(1)", 3, State.FAILED),
-        ('line = {"number": 0, "sources": {}}', 3, State.FAILED),
+        ("pass", 0, ConditionState.SAME),
+        ('trace["stop_ns"] = 6', 1, ConditionState.DIFFERENT),
+        ('trace["clock_reason"] = "it is late"', 1, ConditionState.DIFFERENT),
+        ('trace["harness_problem"] = "the machine was too busy"', 3, ConditionState.FAILED),
+        ('line = {"number": 0, "problem": "no space left", "hint": ""}', 3, ConditionState.FAILED),
+        ("sys.exit(1)", 3, ConditionState.FAILED),
+        ('line = {"number": 0, "sources": {}}', 3, ConditionState.FAILED),
     ],
 )
-def test_exit_codes(then: str, code: int, state: State, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exit_codes(
+    then: str, code: int, state: ConditionState, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A recording that is missing or failed is no difference, and does not count as the same either."""
     stand_in(monkeypatch, ANSWERS.format(mark=str(tmp_path / "mark"), then=then))
     (path,) = written(tmp_path, {"ada": REPEATING["plain"]})

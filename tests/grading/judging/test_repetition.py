@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.grading.judging.repetition import events, first_difference
-from grader.grading.model.verification import Cause, Difference, Kind
+from grader.grading.model.verification import Cause, Difference, DifferenceKind
 from grader.runtime.model.trace import (
     ClockKind,
     Delivery,
@@ -81,23 +81,23 @@ def test_the_first_one_counts_events_of_the_programs_alone() -> None:
     late: list[Observation] = [*USUAL]
     late[3] = sent(101)
     found = between(trace(*USUAL), trace(seen(1, "/talker"), *late))
-    assert (found.kind, found.number, found.first, found.other) == (Kind.TIME, 3, USUAL[3], late[3])
+    assert (found.kind, found.number, found.first, found.other) == (DifferenceKind.TIME, 3, USUAL[3], late[3])
 
 
 @pytest.mark.parametrize(
     ("other", "kind"),
     [
-        ((sent(50), logged(51, "sent"), sent(100), logged(100, "sent")), Kind.TIME),
-        ((logged(50, "sent"), sent(50), sent(100), logged(100, "sent")), Kind.ORDER),
-        ((sent(50), sent(100), logged(50, "sent"), logged(100, "sent")), Kind.ORDER),
-        ((sent(50), logged(50, "other"), sent(100), logged(100, "sent")), Kind.CONTENT),
-        ((sent(50), logged(50, "sent"), sent(100)), Kind.CONTENT),
-        ((*USUAL[1:], sent(150)), Kind.CONTENT),
-        ((sent(50, 0.3), logged(50, "sent"), sent(100), logged(100, "sent")), Kind.CONTENT),
-        ((logged(50, "sent"), sent(100), logged(100, "sent")), Kind.CONTENT),
+        ((sent(50), logged(51, "sent"), sent(100), logged(100, "sent")), DifferenceKind.TIME),
+        ((logged(50, "sent"), sent(50), sent(100), logged(100, "sent")), DifferenceKind.ORDER),
+        ((sent(50), sent(100), logged(50, "sent"), logged(100, "sent")), DifferenceKind.ORDER),
+        ((sent(50), logged(50, "other"), sent(100), logged(100, "sent")), DifferenceKind.CONTENT),
+        ((sent(50), logged(50, "sent"), sent(100)), DifferenceKind.CONTENT),
+        ((*USUAL[1:], sent(150)), DifferenceKind.CONTENT),
+        ((sent(50, 0.3), logged(50, "sent"), sent(100), logged(100, "sent")), DifferenceKind.CONTENT),
+        ((logged(50, "sent"), sent(100), logged(100, "sent")), DifferenceKind.CONTENT),
     ],
 )
-def test_kinds(other: tuple[Observation, ...], kind: Kind) -> None:
+def test_kinds(other: tuple[Observation, ...], kind: DifferenceKind) -> None:
     """A message that is missing is no other order, although the next one is the same."""
     assert between(trace(*USUAL), trace(*other)).kind is kind
 
@@ -105,26 +105,28 @@ def test_kinds(other: tuple[Observation, ...], kind: Kind) -> None:
 def test_bytes_count_where_fields_are_the_same() -> None:
     """Two messages with the same fields may have been sent in two ways."""
     first, other = trace(sent(1, cdr=b"ab")), trace(sent(1, cdr=b"ac"))
-    assert between(first, other).kind is Kind.CONTENT
+    assert between(first, other).kind is DifferenceKind.CONTENT
 
 
 def test_what_only_the_grader_saw() -> None:
     """The graph, notes and suspicions; what a program did comes first."""
     first = trace(*USUAL)
-    assert between(first, trace(seen(1, "/talker"), *USUAL[1:])).kind is Kind.GRADER
-    assert between(first, trace(seen(0, "/talker", participant=1), *USUAL[1:])).kind is Kind.GRADER
-    assert between(first, replace(first, notes=("lost",))).kind is Kind.GRADER
-    assert between(first, replace(first, reached=("os.fork",))).kind is Kind.GRADER
+    assert between(first, trace(seen(1, "/talker"), *USUAL[1:])).kind is DifferenceKind.GRADER
+    assert between(first, trace(seen(0, "/talker", participant=1), *USUAL[1:])).kind is DifferenceKind.GRADER
+    assert between(first, replace(first, notes=("lost",))).kind is DifferenceKind.GRADER
+    assert between(first, replace(first, reached=("os.fork",))).kind is DifferenceKind.GRADER
     both = trace(seen(1, "/talker"), sent(51), *USUAL[2:])
-    assert between(first, both).kind is Kind.TIME
+    assert between(first, both).kind is DifferenceKind.TIME
 
 
 def test_what_belongs_to_the_whole_recording() -> None:
     """When it ended, and how the programs were started."""
     first = trace(*USUAL)
-    assert between(first, replace(first, stop_ns=5)).kind is Kind.TIME
-    assert between(first, replace(first, starts=(Start("a.py", "a.py", StartWay.SCRIPT),))).kind is Kind.CONTENT
-    assert between(first, replace(first, tested=Outcome(passed=True))).kind is Kind.CONTENT
+    assert between(first, replace(first, stop_ns=5)).kind is DifferenceKind.TIME
+    assert (
+        between(first, replace(first, starts=(Start("a.py", "a.py", StartWay.SCRIPT),))).kind is DifferenceKind.CONTENT
+    )
+    assert between(first, replace(first, tested=Outcome(passed=True))).kind is DifferenceKind.CONTENT
 
 
 def test_the_clock() -> None:
@@ -132,7 +134,7 @@ def test_the_clock() -> None:
     first = trace(*USUAL)
     wall = trace(sent(1), clock_reason="it starts other processes")
     found = between(first, wall)
-    assert (found.kind, found.number) == (Kind.CLOCK, 0)
+    assert (found.kind, found.number) == (DifferenceKind.CLOCK, 0)
     assert first_difference(wall, trace(clock_reason="it is late"), {}) is None
 
 
@@ -204,8 +206,8 @@ def test_what_the_grader_did_is_compared_as_well() -> None:
     """Its stimuli are the same in each recording."""
     first = (Delivery(1, "/odom", TWIST, {}, b"a"), Request(2, "/go", "std_srvs/srv/Trigger", 1, "grader", 1, {}))
     assert first_difference(trace(*first), trace(*first), {}) is None
-    assert between(trace(*first), trace(first[0], replace(first[1], t_ns=3))).kind is Kind.TIME
-    assert between(trace(*first), trace(replace(first[0], cdr=b"b"), first[1])).kind is Kind.CONTENT
+    assert between(trace(*first), trace(first[0], replace(first[1], t_ns=3))).kind is DifferenceKind.TIME
+    assert between(trace(*first), trace(replace(first[0], cdr=b"b"), first[1])).kind is DifferenceKind.CONTENT
 
 
 OBSERVED = st.lists(
@@ -228,7 +230,7 @@ def test_a_difference_is_found_exactly_if_there_is_one(one: list[Observation], t
     assert (back is None) == (found is None)
     if found is not None and back is not None:
         assert (found.kind, found.first, found.other) == (back.kind, back.other, back.first)
-        assert (found.kind is Kind.GRADER) == same_events
+        assert (found.kind is DifferenceKind.GRADER) == same_events
         before = found.number - 1
         if not same_events:
             assert events(first)[:before] == events(other)[:before]

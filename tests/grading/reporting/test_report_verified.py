@@ -7,16 +7,26 @@ from dataclasses import replace
 
 import pytest
 
-from grader.grading.model.verification import Cause, Difference, Fact, Kind, LeftOut, Place, State, Tried, Verification
+from grader.grading.model.verification import (
+    Cause,
+    ConditionState,
+    Difference,
+    DifferenceKind,
+    LeftOutScenario,
+    Place,
+    RecordingFact,
+    Tried,
+    Verification,
+)
 from grader.grading.reporting.verified import advice, described, render_verification, verification_to_json
 from grader.runtime.model.trace import Endpoint, GraphSnapshot, LogRecord, Message
 
 PLACE = Place("ada", "velocity_publisher", "alone")
 FIRST = LogRecord(3_200_000_000, "a.py", "INFO", "talker", "used 3", "a.py", 16)
-TIMED = Difference(Kind.TIME, 41, FIRST, replace(FIRST, t_ns=3_250_000_100), "a.py", "a.py", 16)
-AGAIN = Tried("again", "again, with nothing changed", State.SAME, compared=2)
-LOAD = Tried("load", "beside 4 busy loops", State.DIFFERENT, compared=2, different=((PLACE, TIMED),))
-USER = Tried("user", "as another user", State.NOT_TRIED, "only root can become another user")
+TIMED = Difference(DifferenceKind.TIME, 41, FIRST, replace(FIRST, t_ns=3_250_000_100), "a.py", "a.py", 16)
+AGAIN = Tried("again", "again, with nothing changed", ConditionState.SAME, compared=2)
+LOAD = Tried("load", "beside 4 busy loops", ConditionState.DIFFERENT, compared=2, different=((PLACE, TIMED),))
+USER = Tried("user", "as another user", ConditionState.NOT_TRIED, "only root can become another user")
 SAME = Verification(("ada",), (7,), "bubblewrap", 2, 1_234, (AGAIN, USER))
 DIFFERENT = replace(SAME, tried=(AGAIN, LOAD, USER))
 
@@ -61,8 +71,8 @@ def test_the_first_difference_is_shown_with_both_events() -> None:
 def test_what_the_wall_clock_decides_is_named() -> None:
     """Then nothing is verified."""
     why = "the node starts other processes"
-    nothing = replace(AGAIN, state=State.NOT_TRIED, why="there is nothing to compare", compared=0)
-    text = rendered(replace(SAME, events=0, tried=(nothing,), left_out=(LeftOut(PLACE, why),)))
+    nothing = replace(AGAIN, state=ConditionState.NOT_TRIED, why="there is nothing to compare", compared=0)
+    text = rendered(replace(SAME, events=0, tried=(nothing,), left_out=(LeftOutScenario(PLACE, why),)))
     assert "Not comparable event by event, because the wall clock decides:\n" in text
     assert f"  ada, velocity_publisher, alone: {why}\n" in text
     assert text.endswith("\nnot verified: see above what could not be compared\n")
@@ -80,8 +90,8 @@ def test_long_lists_are_cut() -> None:
 @pytest.mark.parametrize(
     ("difference", "beginning"),
     [
-        (replace(TIMED, kind=Kind.GRADER), "report it with the output of --json: no program caused it"),
-        (replace(TIMED, kind=Kind.CLOCK), "the work of the programs is at the limit of virtual time"),
+        (replace(TIMED, kind=DifferenceKind.GRADER), "report it with the output of --json: no program caused it"),
+        (replace(TIMED, kind=DifferenceKind.CLOCK), "the work of the programs is at the limit of virtual time"),
         (replace(TIMED, cause=Cause.ADDRESS), "use a name or number of your own"),
         (replace(TIMED, cause=Cause.PROCESSOR_TIME), "leave out the processor time"),
         (replace(TIMED, cause=Cause.KERNEL), "use time.time() or the clock of the node"),
@@ -94,7 +104,7 @@ def test_one_thing_to_do(difference: Difference, beginning: str) -> None:
 
 def test_a_program_that_differs_by_itself_is_not_reported() -> None:
     """Where nothing was changed, or that was not tried, it may be the program."""
-    for again in ((replace(AGAIN, state=State.DIFFERENT),), ()):
+    for again in ((replace(AGAIN, state=ConditionState.DIFFERENT),), ()):
         verification = replace(DIFFERENT, tried=(*again, LOAD))
         assert advice(verification, TIMED).startswith("find out where what a.py:16 shows comes from")
 
@@ -116,11 +126,11 @@ def test_hostile_texts_are_escaped() -> None:
         replace(FIRST, text=hostile, logger=hostile),
         Message(0, "/x", hostile, value),
         GraphSnapshot(0, (hostile,), (Endpoint("publisher", hostile, "t", hostile, 0, "reliable", "volatile"),)),
-        Fact("notes", hostile),
+        RecordingFact("notes", hostile),
         None,
     ):
         place = Place(hostile, "velocity_publisher", "alone")
-        found = Difference(Kind.CONTENT, 1, event, None, hostile, hostile, 1)
+        found = Difference(DifferenceKind.CONTENT, 1, event, None, hostile, hostile, 1)
         text = rendered(replace(SAME, submissions=(hostile,), tried=(replace(LOAD, different=((place, found),)),)))
         assert "\x1b" not in text
         assert not any(line.startswith("::") for line in text.splitlines())
@@ -129,7 +139,7 @@ def test_hostile_texts_are_escaped() -> None:
 def test_json_has_both_events_whole() -> None:
     """With the result as a word."""
     message = Message(1, "/x", "std_msgs/msg/Float32", {"data": float("nan")}, b"\x00\x01")
-    found = Difference(Kind.CONTENT, 1, message, None, cause=Cause.ADDRESS)
+    found = Difference(DifferenceKind.CONTENT, 1, message, None, cause=Cause.ADDRESS)
     data = json.loads(verification_to_json(replace(SAME, tried=(replace(LOAD, different=((PLACE, found),)), USER))))
     assert data["schema"] == "grader/verification/v1"
     assert (data["result"], data["scenarios"], data["events"]) == ("different", 2, 1_234)
@@ -148,7 +158,7 @@ def test_json_has_both_events_whole() -> None:
         (SAME, "equal"),
         (DIFFERENT, "different"),
         (replace(SAME, tried=(USER,)), "not_verified"),
-        (replace(SAME, tried=(AGAIN, replace(USER, state=State.FAILED))), "not_verified"),
+        (replace(SAME, tried=(AGAIN, replace(USER, state=ConditionState.FAILED))), "not_verified"),
         (replace(SAME, problems=("it failed",)), "not_verified"),
         (replace(DIFFERENT, problems=("it failed",)), "different"),
     ],

@@ -40,7 +40,8 @@ class Stage:
         self._pipe = pipe
         self._said: list[str] = []
         self._questions = 0
-        self.time = virtual.VirtualTime(self, self.fault)
+        self.time = virtual.VirtualTime(self)
+        self.time.install(self.fault)
 
     def say(self, text: object) -> None:
         """Note something with the virtual milliseconds since the start; a pause may end some microseconds late."""

@@ -6,8 +6,8 @@ import pytest
 
 from grader.runtime.interfaces.definitions import (
     MAXIMUM_DEFINITIONS,
-    Definition,
     DefinitionError,
+    DefinitionFile,
     FieldType,
     InterfacePackage,
     digest,
@@ -20,7 +20,7 @@ INSTALLED = {"std_msgs/msg/Header", "geometry_msgs/msg/Point"}
 
 
 def of(text: str, kind: str = "msg", name: str = "Foo") -> InterfacePackage:
-    return InterfacePackage("my_interfaces", (Definition(kind, name, text),))
+    return InterfacePackage("my_interfaces", (DefinitionFile(kind, name, text),))
 
 
 def refusal(*packages: InterfacePackage) -> DefinitionError:
@@ -161,27 +161,27 @@ def test_names_of_types_are_checked() -> None:
 def test_nested_arrays_that_no_program_can_create_are_refused() -> None:
     package = InterfacePackage(
         "deep",
-        tuple(Definition("msg", f"L{n}", f"L{n + 1}[100] a\n" if n < 8 else "int32 a\n") for n in range(9)),
+        tuple(DefinitionFile("msg", f"L{n}", f"L{n + 1}[100] a\n" if n < 8 else "int32 a\n") for n in range(9)),
     )
     assert "more than 1000000 values" in refusal(package).problem
 
 
 def test_messages_nested_too_deeply_are_refused() -> None:
     package = InterfacePackage(
-        "deep", tuple(Definition("msg", f"L{n}", f"L{n + 1} a\n" if n < 99 else "int32 a\n") for n in range(100))
+        "deep", tuple(DefinitionFile("msg", f"L{n}", f"L{n + 1} a\n" if n < 99 else "int32 a\n") for n in range(100))
     )
     assert "nested more than" in refusal(package).problem
 
 
 def test_types_of_one_file_name_are_refused() -> None:
-    package = InterfacePackage("twice", (Definition("msg", "Foo", ""), Definition("msg", "FOO", "")))
+    package = InterfacePackage("twice", (DefinitionFile("msg", "Foo", ""), DefinitionFile("msg", "FOO", "")))
     assert "upper and lower case" in refusal(package).problem
 
 
 def test_too_many_definitions_are_refused() -> None:
-    many = tuple(Definition("msg", f"M{n}", "") for n in range(MAXIMUM_DEFINITIONS + 1))
+    many = tuple(DefinitionFile("msg", f"M{n}", "") for n in range(MAXIMUM_DEFINITIONS + 1))
     assert str(MAXIMUM_DEFINITIONS) in refusal(InterfacePackage("many", many)).problem
 
 
 def test_unknown_types_are_no_matter_for_a_single_definition() -> None:
-    read_definition("a", Definition("msg", "Foo", "b/Bar c\n"))
+    read_definition("a", DefinitionFile("msg", "Foo", "b/Bar c\n"))

@@ -13,8 +13,8 @@ from samples import SHARE, installed_packages, share_without
 from grader.runtime.domains import shared_domains
 from grader.runtime.interfaces.build import BuiltInterfaces, build
 from grader.runtime.interfaces.definitions import (
-    Definition,
     DefinitionError,
+    DefinitionFile,
     InterfacePackage,
     find_packages,
     shipped_packages,
@@ -253,7 +253,7 @@ def test_works_in_processes_forked_after_its_first_use(built: BuiltInterfaces) -
 
 
 def test_a_package_is_built_once_and_no_half_built_one_is_left(tmp_path: Path) -> None:
-    package = InterfacePackage("mine", (Definition("msg", "Foo", "std_msgs/Header header\nint32 MAX=3\n"),))
+    package = InterfacePackage("mine", (DefinitionFile("msg", "Foo", "std_msgs/Header header\nint32 MAX=3\n"),))
     first = build([package], tmp_path, [SHARE])
     time_of = (first.python / "mine" / "msg" / "_foo.py").stat().st_mtime_ns
     assert build([package], tmp_path, [SHARE]) == first
@@ -280,9 +280,9 @@ print(build(find_packages(Path({str(tmp_path / "mine")!r})), Path({str(tmp_path 
 
 
 def test_packages_can_build_on_built_ones(tmp_path: Path) -> None:
-    first = build([InterfacePackage("base", (Definition("msg", "Foo", "int32 a\n"),))], tmp_path, [SHARE])
-    upper = InterfacePackage("upper", (Definition("msg", "Bar", "base/Foo[2] foos\n"),))
-    copied = InterfacePackage("base", (Definition("msg", "Foo", "int64 other\n"),))
+    first = build([InterfacePackage("base", (DefinitionFile("msg", "Foo", "int32 a\n"),))], tmp_path, [SHARE])
+    upper = InterfacePackage("upper", (DefinitionFile("msg", "Bar", "base/Foo[2] foos\n"),))
+    copied = InterfacePackage("base", (DefinitionFile("msg", "Foo", "int64 other\n"),))
     second = build([upper, copied], tmp_path, [SHARE, first.share])
     assert second.names == ("upper",)
     printed = run("from upper.msg import Bar; print(Bar())", second, first)
@@ -292,12 +292,12 @@ def test_packages_can_build_on_built_ones(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("package", "definition", "problem"),
     [
-        ("numpy", Definition("msg", "Foo", ""), "an installed Python module"),
-        ("mine", Definition("msg", "Foo", "int32 builtins\nint32 b\n"), "Python cannot load it"),
+        ("numpy", DefinitionFile("msg", "Foo", ""), "an installed Python module"),
+        ("mine", DefinitionFile("msg", "Foo", "int32 builtins\nint32 b\n"), "Python cannot load it"),
     ],
 )
 def test_what_python_could_not_load_is_refused(
-    tmp_path: Path, package: str, definition: Definition, problem: str
+    tmp_path: Path, package: str, definition: DefinitionFile, problem: str
 ) -> None:
     with pytest.raises(DefinitionError, match=problem):
         build([InterfacePackage(package, (definition,))], tmp_path, [SHARE])
@@ -305,5 +305,5 @@ def test_what_python_could_not_load_is_refused(
 
 
 def test_an_installed_package_is_left_to_the_installation(tmp_path: Path) -> None:
-    package = InterfacePackage("std_msgs", (Definition("msg", "String", "int32 a\n"),))
+    package = InterfacePackage("std_msgs", (DefinitionFile("msg", "String", "int32 a\n"),))
     assert build([package], tmp_path, [SHARE]).names == ()

@@ -25,7 +25,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from grader.runtime.model.errors import RecordingError
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.recording.bag import Least, read_bag
+from grader.runtime.recording.bag import BagMinimum, read_bag
 from grader.runtime.stimuli.recorded import Recording, TimedMessage, window
 
 OWN = ROOT / "rubrics" / "exercise_2" / "odometry"
@@ -69,7 +69,7 @@ def drive(count: int = 60, period_ns: int = NS_PER_S // 10) -> list[tuple[int, b
 
 def read_odometry(path: Path) -> Recording:
     """Read the odometry in a recording that has to last for 5 s."""
-    return read_bag(path, "/odom", TYPE, least=Least(messages=20, span_ns=5 * NS_PER_S))
+    return read_bag(path, "/odom", TYPE, least=BagMinimum(messages=20, span_ns=5 * NS_PER_S))
 
 
 def write_bag(

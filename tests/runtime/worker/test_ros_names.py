@@ -21,7 +21,7 @@ from grader.runtime.message_classes import interface_class, message_class
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import Trace
 from grader.runtime.session import RecordingSession
-from grader.runtime.worker.discovery import is_claim
+from grader.runtime.worker.claims import is_claim
 from grader.runtime.worker.observer import PARTICIPANTS
 from grader.runtime.worker.ros_names import LONGEST, LONGEST_NODE, asked, is_name, is_node_name, listed
 

@@ -13,7 +13,7 @@ from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB
 from grader.runtime.model.trace import Endpoint, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer
 from grader.runtime.worker import trace_recorder as module
-from grader.runtime.worker.observer import Taken
+from grader.runtime.worker.core import Taken
 from grader.runtime.worker.trace_recorder import TraceRecorder
 
 REST = "the rest was ignored"

@@ -43,12 +43,13 @@ from grader.runtime.model.trace import (
     OutputLine,
 )
 from grader.runtime.stimuli.recorded import PlannedRecording
-from grader.runtime.worker import discovery, trace_recorder
+from grader.runtime.worker import core, discovery, trace_recorder
 from grader.runtime.worker import virtual_runner as module
-from grader.runtime.worker.observer import Observer, Taken
+from grader.runtime.worker.core import Taken
+from grader.runtime.worker.delay import HOPELESS_NS
+from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.virtual_runner import VirtualRunner
-from grader.runtime.worker.workload import HOPELESS_NS
 
 
 @pytest.fixture(autouse=True)
@@ -292,7 +293,7 @@ def test_too_many_messages_end_the_run_with_a_mark() -> None:
 
 def test_too_many_wake_ups_end_the_run_with_a_mark(monkeypatch: pytest.MonkeyPatch) -> None:
     """A process that never lets time pass is not stepped for ever."""
-    monkeypatch.setattr(module, "STEPS", 50)
+    monkeypatch.setattr(core, "STEPS", 50)
 
     def restless(me: ScriptedStudent, world: World) -> Program:
         while True:
@@ -317,8 +318,8 @@ def player(mine: str, theirs: str, *, serves: bool = False, last: int = 1_000, c
 
 def test_nodes_that_answer_each_other_without_end_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """After some messages at one instant each takes time, and after many more the run ends, however busy a node is."""
-    monkeypatch.setattr(module, "HOPS", 4)
-    monkeypatch.setattr(module, "MOST_HOPS", 8)
+    monkeypatch.setattr(core, "HOPS", 4)
+    monkeypatch.setattr(core, "MOST_HOPS", 8)
     slow = player("/a", "/b", serves=True, cost_ns=HOPELESS_NS // 3)
     run = Run(slow, player("/b", "/a"), stop_when_unfit=True)
     assert [m.t_ns / MS for m in run.trace.messages()] == [10, 10, 10, 10, 10, 10.25, 10.5, 10.75, 11]
@@ -329,8 +330,8 @@ def test_nodes_that_answer_each_other_without_end_end_the_run(monkeypatch: pytes
 
 def test_a_process_that_hears_itself_after_each_rest_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is woken for its own message, and then lets time pass on its own until it sends the next: that is a rest."""
-    monkeypatch.setattr(module, "HOPS", 4)
-    monkeypatch.setattr(module, "MOST_HOPS", 8)
+    monkeypatch.setattr(core, "HOPS", 4)
+    monkeypatch.setattr(core, "MOST_HOPS", 8)
 
     def program(me: ScriptedStudent, world: World) -> Program:
         claims = world.have(me.name, claim("publisher", "/x"), claim("subscription", "/x"))
@@ -348,15 +349,15 @@ def test_a_process_that_hears_itself_after_each_rest_goes_on(monkeypatch: pytest
 
 def test_wake_ups_are_counted_against_the_time_that_has_passed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A node that rests between them may wake up as often as the scenario is long."""
-    monkeypatch.setattr(module, "STEPS", 5)
-    monkeypatch.setattr(module, "STEPS_HZ", 1000)
+    monkeypatch.setattr(core, "STEPS", 5)
+    monkeypatch.setattr(core, "STEPS_HZ", 1000)
     assert not Run(saying(*(idle(ms) for ms in range(1, 900)), idle())).trace.marks("limit")
     assert Run(saying(*(idle(ms / 4) for ms in range(1, 900)), idle())).trace.marks("limit")
 
 
 def test_nodes_may_answer_each_other_for_a_while_at_one_instant(monkeypatch: pytest.MonkeyPatch) -> None:
     """A rest begins the count again."""
-    monkeypatch.setattr(module, "HOPS", 4)
+    monkeypatch.setattr(core, "HOPS", 4)
     run = Run(player("/a", "/b", serves=True, last=3), player("/b", "/a", last=2))
     assert [m.t_ns / MS for m in run.trace.messages()] == [10] * 5
     assert run.seen(Message) == []

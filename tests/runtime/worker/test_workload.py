@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from grader.runtime.worker import workload as module
-from grader.runtime.worker.workload import ARRIVAL_NS, LATE_AT_LEAST, LATE_SHARE, OUTRUN, Delay, Workload
+from grader.runtime.worker.delay import ARRIVAL_NS, LATE_AT_LEAST, LATE_SHARE, OUTRUN, Delay
+from grader.runtime.worker.workload import Workload
 
 MS = 1_000_000
 

@@ -6,7 +6,7 @@ import ast
 
 import pytest
 
-from grader.course.mutation.operators.program import Program
+from grader.course.mutation.operators.program import ParsedProgram
 from grader.course.mutation.operators.variants import VARIANTS, variants_of
 from grader.course.mutation.results import one_line_change
 
@@ -83,7 +83,7 @@ def test_every_rewriter_has_a_case_and_says_how_it_differs() -> None:
 @pytest.mark.parametrize("name", WRITTEN)
 def test_a_rewriter_writes_the_same_thing_otherwise(name: str) -> None:
     """What it writes is Python, has the parts it should, and lost nothing but what it replaced."""
-    text = VARIANTS[name](Program(NODE))
+    text = VARIANTS[name](ParsedProgram(NODE))
     ast.parse(text)
     if name == "reordered_methods":
         assert text.index("def tick") < text.index("def __init__")
@@ -105,7 +105,7 @@ def test_a_program_that_gives_nothing_to_vary_has_no_variants() -> None:
 def test_fields_of_messages_and_imports_keep_their_names() -> None:
     """They are not the program's own."""
     source = "from a import b\n\n\ndef f(msg):\n    data = b(data=msg.data)\n    return data\n"
-    text = VARIANTS["renamed_variables"](Program(source))
+    text = VARIANTS["renamed_variables"](ParsedProgram(source))
     assert one_line_change(source, text) == (
         "data = b(data=msg.data) ¶ return data => data_x = b(data=msg.data) ¶ return data_x"
     )
@@ -114,13 +114,13 @@ def test_fields_of_messages_and_imports_keep_their_names() -> None:
 def test_a_variable_and_a_method_of_one_name_are_two_things() -> None:
     """Each is renamed where it is meant, also through a variable that holds the object."""
     source = "class A:\n    def b(self):\n        b = self.b()\n        return b\n\n\nx = A()\nx.b(b=1)\ny.b()\n"
-    assert VARIANTS["renamed_methods"](Program(source)) == source.replace("def b", "def do_b").replace(
+    assert VARIANTS["renamed_methods"](ParsedProgram(source)) == source.replace("def b", "def do_b").replace(
         "self.b", "self.do_b"
     ).replace("x.b", "x.do_b")
-    assert "def b(self)" in VARIANTS["renamed_variables"](Program(source))
+    assert "def b(self)" in VARIANTS["renamed_variables"](ParsedProgram(source))
 
 
 def test_a_timer_that_the_program_keeps_is_no_loop() -> None:
     """Its name may be used elsewhere."""
     source = NODE.replace("        self.create_timer", "        self.timer = self.create_timer")
-    assert VARIANTS["loop_in_thread"](Program(source)) == source
+    assert VARIANTS["loop_in_thread"](ParsedProgram(source)) == source

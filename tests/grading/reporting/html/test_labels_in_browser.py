@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 from report_samples import criterion, exercise, report
 
-from grader.grading.model.chart import Chart, Level, Moment, Panel, Series, Tone
+from grader.grading.model.chart import Chart, Level, Panel, Series, Tone, VerticalLine
 from grader.grading.model.exercise import Outcome
 from grader.grading.reporting.html.render import render_html
 
@@ -31,7 +31,12 @@ CHART = Chart(
     "time",
     "s",
     (Panel("speed", "m/s", (Series("x", ((0.0, 0.0), (24.0, 9.0))),), levels=(Level(0.5, "a"), Level(0.52, "b"))),),
-    (Moment(6.0, "/odom begins"), Moment(22.3, "/odom ends"), Moment(23.0, "exception", Tone.BAD), Moment(24.0, "end")),
+    (
+        VerticalLine(6.0, "/odom begins"),
+        VerticalLine(22.3, "/odom ends"),
+        VerticalLine(23.0, "exception", Tone.BAD),
+        VerticalLine(24.0, "end"),
+    ),
     until_s=24.0,
 )
 

@@ -24,18 +24,18 @@ from report_samples import (
 )
 
 from grader.grading.model.chart import (
-    Case,
     Chart,
     Column,
     Excerpt,
     GraphFigure,
-    Moment,
     Panel,
     Playback,
     Series,
     SourceFile,
     Stage,
+    Stretch,
     TopicValues,
+    VerticalLine,
 )
 from grader.grading.model.report import Report, Reproduction
 from grader.grading.reporting.html.assets import bundle
@@ -52,8 +52,8 @@ def pictured(text: str = "fine") -> Report:
         "time",
         "s",
         (Panel(text, "m", (Series(text, ((0.0, 1.0), (1.0, float("nan"))), texts=(text, text)),), lanes=(text,)),),
-        (Moment(0.5, text),),
-        (Case(0.0, 0.5, text),),
+        (VerticalLine(0.5, text),),
+        (Stretch(0.0, 0.5, text),),
     )
     ends = tuple(replace(e, node=text, topic=f"/{text}", type=text) for e in both_ways().endpoints[:1])
     graph = replace(both_ways(), nodes=(text,), endpoints=ends)
