@@ -8,7 +8,9 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -18,9 +20,8 @@ from sandboxes import USER, unreachable, user_start
 from verifying import differences, program, verified, written
 
 from grader.cli.main import app
-from grader.grading.app import conditions as module
 from grader.grading.app import verify as verifying
-from grader.grading.app.conditions import LOOPS, VerifyCondition, conditions
+from grader.grading.app.conditions import LOOPS, VerifyCondition, conditions, surroundings
 from grader.grading.model.conditions import CONDITIONS, SANDBOXES, USUAL
 from grader.grading.model.verification import ConditionState
 from grader.runtime.model.errors import EnvironmentFault
@@ -259,20 +260,20 @@ print(json.dumps({"isolation": "x", "said": said}))
 @pytest.fixture
 def started(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[VerifyCondition], dict[str, Any]]:
     """Start the stand-in under a condition, and return what it said."""
-    monkeypatch.setattr(verifying, "PROGRAM", (sys.executable, "-c", SAYS))
     monkeypatch.setenv("GRADER_SEED_KEY", "a key that nobody else may read")
     tmp_path.chmod(0o755)
 
     def start(condition: VerifyCondition) -> dict[str, Any]:
-        (line,) = verifying._recorded(tmp_path, [], condition, "bubblewrap")
+        (line,) = verifying._recorded(tmp_path, [], condition, "bubblewrap", (sys.executable, "-c", SAYS))
         said: dict[str, Any] = line["said"]
         return said
 
     return start
 
 
-def made(name: str, isolation: str = "landlock") -> VerifyCondition:
-    (condition,) = conditions([name], isolation)
+def made(name: str, isolation: str = "landlock", **changes: Any) -> VerifyCondition:
+    """Return a condition, in surroundings that differ from those here in some ways."""
+    (condition,) = conditions([name], isolation, replace(surroundings(), **changes))
     return condition
 
 
@@ -311,41 +312,35 @@ def test_no_loop_is_left(started: Callable[[VerifyCondition], dict[str, Any]]) -
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
-def test_another_user(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_another_user(tmp_path: Path) -> None:
     """With a home of its own; a program that this user cannot start is named."""
     tmp_path.chmod(0o755)
     says = 'cat > /dev/null; echo "{\\"said\\": \\"$(id -u) $(stat -c %u "$HOME")\\", \\"isolation\\": \\"x\\"}"'
-    monkeypatch.setattr(verifying, "PROGRAM", ("/bin/sh", "-c", says))
-    monkeypatch.setattr(module, "_unreachable", lambda user: "")
     with tempfile.TemporaryDirectory() as name:  # every user can enter what is above it
         Path(name).chmod(0o755)
-        condition = made("user")
-        (line,) = verifying._recorded(Path(name), [], condition, "none")
+        condition = made("user", python="/bin/true")
+        (line,) = verifying._recorded(Path(name), [], condition, "none", ("/bin/sh", "-c", says))
+    assert condition.not_tried == ""
     assert line["said"] == f"{condition.user} {condition.user}"
     assert condition.user != 0
-    monkeypatch.undo()
-    monkeypatch.setattr(sys, "executable", "/nowhere/python")
-    assert made("user").not_tried == f"user {made('user').user} cannot execute /nowhere/python" or "cannot execute" in (
-        made("user").not_tried
-    )
+    lacking = made("user", python="/nowhere/python")
+    assert lacking.not_tried == f"user {lacking.user} cannot execute /nowhere/python"
+    assert made("user", python="/bin/false").not_tried.endswith(" cannot read what /bin/false needs")
 
 
-def test_what_this_machine_cannot_make_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_this_machine_cannot_make_is_named() -> None:
     """With the reason."""
-    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {3})
-    monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    assert made("processors").not_tried == "there is one processor only"
-    assert made("user").not_tried == "only root can become another user"
+    assert made("processors", processors=(3,)).not_tried == "there is one processor only"
+    assert made("user", is_root=False).not_tried == "only root can become another user"
 
     def cannot(name: str) -> Any:
         raise EnvironmentFault(f"isolation {name}: expected bubblewrap, found none")
 
-    monkeypatch.setattr(module, "isolation_from_name", cannot)
     for name in SANDBOXES:
-        assert made(name, "none").not_tried == "expected bubblewrap, found none"
-    monkeypatch.setattr(module, "isolation_from_name", lambda name: type("Tier", (), {"can_fork": False}))
-    assert made("executed").not_tried == "in the sandbox landlock, each is executed anyway"
-    assert not made("together").executes
+        assert made(name, "none", tier=cannot).not_tried == "expected bubblewrap, found none"
+    forkless = SimpleNamespace(can_fork=False)
+    assert made("executed", tier=lambda _: forkless).not_tried == "in the sandbox landlock, each is executed anyway"
+    assert not made("together", tier=lambda _: forkless).executes
 
 
 def test_no_sandbox_is_tried_that_holds_less_unless_it_is_named() -> None:
@@ -357,7 +352,7 @@ def test_no_sandbox_is_tried_that_holds_less_unless_it_is_named() -> None:
             isolation_from_name(name)
         except EnvironmentFault:
             continue
-        found = next(one for one in conditions([], "none") if one.name == name)
+        found = next(one for one in conditions([], "none", surroundings()) if one.name == name)
         asked = made(name, "none")
         if found.not_tried:
             assert "does not contain" in found.not_tried or asked.not_tried
@@ -367,7 +362,7 @@ def test_no_sandbox_is_tried_that_holds_less_unless_it_is_named() -> None:
 
 def test_the_sandbox_of_the_first_recording_is_no_other_condition() -> None:
     """It would only be recorded again."""
-    assert [one.name for one in conditions(["again", "landlock"], "landlock")] == ["again"]
+    assert [one.name for one in conditions(["again", "landlock"], "landlock", surroundings())] == ["again"]
 
 
 # --- failures ---------------------------------------------------------------------------------------------------------
