@@ -1,20 +1,29 @@
-"""Fixtures that tests of several folders use: sessions for recordings, and folders."""
+"""Fixtures that tests of several folders use: sessions for recordings, and folders.
+
+Every run of pytest loads this module, so a fixture imports what it needs.
+"""
+
+from __future__ import annotations
 
 import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
-from hostile import staging
-from sandboxes import make_submission
 
-from grader.runtime.session import RecordingSession, open_session
+if TYPE_CHECKING:
+    from grader.runtime.session import RecordingSession
 
 
 @pytest.fixture(scope="module")
 def studio() -> Iterator[RecordingSession]:
     """The strongest sandbox of this machine, with warm workers."""
+    from hostile import staging
+
+    from grader.runtime.session import open_session
+
     with open_session("auto") as studio:
         yield staging(studio)
 
@@ -22,6 +31,10 @@ def studio() -> Iterator[RecordingSession]:
 @pytest.fixture(scope="module")
 def one_worker() -> Iterator[RecordingSession]:
     """The strongest sandbox of this machine, with one worker."""
+    from hostile import staging
+
+    from grader.runtime.session import open_session
+
     with open_session("auto", 1) as studio:
         yield staging(studio)
 
@@ -29,6 +42,8 @@ def one_worker() -> Iterator[RecordingSession]:
 @pytest.fixture
 def submission() -> Iterator[Path]:
     """A folder that students' processes may see."""
+    from sandboxes import make_submission
+
     folder = make_submission()
     yield folder
     shutil.rmtree(folder)

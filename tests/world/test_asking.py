@@ -88,7 +88,7 @@ def load_corridor() -> type[Simulation]:
 def test_a_simulated_robot_drives_by_what_a_node_says(ros: World) -> None:
     """Its state is in the test's process: the robot stops half a metre before the wall, and goes on when it opens."""
     ros.run(ROOT / "examples/obstacle_stop/reference/obstacle_stop.py")
-    robot = ros.simulate(load_corridor()(wall=2.0, opens=20_000_000_000))
+    robot = ros.simulate(load_corridor()(wall=2.0, opens=20_000_000_000))  # type: ignore[call-arg]
     ros.advance(15.0)
     assert robot.x == pytest.approx(1.5, abs=0.2)  # type: ignore[attr-defined]
     ros.wait_until(lambda: robot.x > 2.5, timeout=20.0)  # type: ignore[attr-defined]

@@ -9,7 +9,8 @@ from decided import grade_until_decided
 from places import TESTS
 
 from grader.grading.app.request import GradeRequest
-from grader.grading.model.report import Outcome, Report
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Report
 from grader.grading.rubrics.loader import read_rubric
 
 HERE = TESTS / "packages"
