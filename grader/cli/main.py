@@ -35,7 +35,6 @@ from grader.cli.options import (
 from grader.cli.outputs import outputs_option
 from grader.cli.run_options import run_options
 from grader.grading.model.grading_options import GRADE, OBSERVE, GradingOptions
-from grader.grading.model.report import exit_code
 from grader.grading.reporting.formats import EVIDENCE, known
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import (
@@ -225,6 +224,7 @@ class _Grading:
     def once(self, started: float, session: RecordingSession | None = None) -> int:
         """Grade, in a session if one is given, and return the exit code; the user waits since `started`."""
         from grader.grading.app import start
+        from grader.grading.model.report import exit_code
         from grader.grading.reporting.audience import told
         from grader.grading.reporting.delivery import deliver, early_delivery
 

@@ -21,7 +21,6 @@ from grader.cli.options import (
     write_file,
 )
 from grader.cli.outputs import outputs_option
-from grader.grading.model.report import exit_code
 from grader.grading.reporting.formats import EVIDENCE, FORMATS, known
 
 if TYPE_CHECKING:
@@ -129,6 +128,7 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
     """Judge one submission, and deliver its report as grading does."""
     from grader.grading.app import rejudge
     from grader.grading.evidence.store import open_evidence
+    from grader.grading.model.report import exit_code
     from grader.grading.reporting.audience import told
     from grader.grading.reporting.delivery import deliver, prepared
 
