@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from grader.grading.app.grade import Progress
 from grader.grading.app.interface_packages import described
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.model import entry_points
+from grader.grading.model.report import Summary
 from grader.grading.reporting.formats import EVIDENCE, FORMATS, format_of
 from grader.grading.submissions.foreign_archives import install_command, is_installed
 from grader.runtime.machine import software, system, weaknesses
@@ -24,6 +25,7 @@ from grader.runtime.sandbox.choose import inspect_tiers, sandbox_memory
 from grader.runtime.sandbox.tiers import is_for_others, isolation_from_name
 from grader.runtime.supervisor.byte_code import byte_code
 from grader.runtime.supervisor.memory_groups import group_fact
+from grader.runtime.weaknesses import repaired_here
 
 #: Messages that the trial node sends, one every 0.1 s starting at 0.1 s, and how long it is observed.
 TRIAL_MESSAGES = 10
@@ -42,35 +44,54 @@ rclpy.spin(node)
 """
 
 
-def examine(progress: Progress) -> Checkup:
+#: Observes a node, as `observe` does.
+Look = Callable[[ObserveRequest, Progress], Summary]
+
+
+def examine(progress: Progress, find: Callable[[], RosInstallation] = find_ros) -> Checkup:
     """Find out what this machine can do; takes a few seconds."""
     progress("looking for ROS 2")
-    ros, lack = _ros()
-    facts = (*software(ros), *lack, *system(), *weaknesses(ros), _archives(), *_interfaces(ros), *_added())
+    ros, lack = _ros(find)
+    known = weaknesses(ros, repaired_here())
+    facts = (*software(ros), *lack, *system(), *known, _archives(), *_interfaces(ros), *_added())
     if ros is None:
         return Checkup(facts, None, (), "", "", Limits())
     progress("looking at the byte code")
     facts += (byte_code(ros.runtime), group_fact(), sandbox_memory(ros))
     progress("trying every sandbox")
-    tiers = inspect_tiers(ros)
+    return concluded(facts, inspect_tiers(ros), progress)
+
+
+def concluded(
+    facts: tuple[Fact, ...], tiers: tuple[TierReport, ...], progress: Progress, look: Look = observe
+) -> Checkup:
+    """Choose the tier that grading would use, and exchange messages in it.
+
+    Args:
+        facts: What is known of the machine.
+        tiers: What trying every tier has shown, the strongest first.
+        progress: Called at each step.
+        look: Observes the trial node.
+    """
     used = next((tier.name for tier in tiers if tier.usable), "")
-    facts += (_node_start(used or NO_SANDBOX),)
+    tier = used or NO_SANDBOX
+    facts += (node_start(tier, can_fork=isolation_from_name(tier).can_fork),)
     progress("exchanging messages")
-    exchange = _exchange(used or NO_SANDBOX, progress)
+    exchange = _exchange(tier, progress, look)
     return Checkup(facts, exchange, tiers, used, "" if used else _remedy(tiers), Limits())
 
 
-def _ros() -> tuple[RosInstallation | None, tuple[Fact, ...]]:
+def _ros(find: Callable[[], RosInstallation]) -> tuple[RosInstallation | None, tuple[Fact, ...]]:
     """Find the ROS installation, or report as a fact why it cannot be used."""
     try:
-        return find_ros(), ()
+        return find(), ()
     except EnvironmentFault as fault:
         return None, (Fact("ROS 2", fault.message.removeprefix("ROS 2: "), fits=False, remedy=fault.hint),)
 
 
-def _node_start(tier: str) -> Fact:
+def node_start(tier: str, *, can_fork: bool) -> Fact:
     """Report how students' nodes are started in a tier."""
-    if isolation_from_name(tier).can_fork:
+    if can_fork:
         return Fact("start of nodes", "each is forked from a process that has imported ROS")
     text = "each executes Python and imports ROS, which takes longer: to be forked"
     return Fact("start of nodes", f"{text} into {tier}, it needs Linux {'.'.join(map(str, ENTERABLE))} or newer")
@@ -137,7 +158,7 @@ def _remedy(tiers: Sequence[TierReport]) -> str:
     return next((tier.remedy for tier in ordered if tier.remedy), "")
 
 
-def _exchange(tier: str, progress: Progress) -> Exchange:
+def _exchange(tier: str, progress: Progress, look: Look) -> Exchange:
     """Observe the trial node the way a student's node is observed, and count its messages."""
     started = time.perf_counter()
     arrived, problem = 0, ""
@@ -145,7 +166,7 @@ def _exchange(tier: str, progress: Progress) -> Exchange:
         file = Path(folder) / "trial.py"
         file.write_text(TRIAL_NODE, encoding="utf-8")
         try:
-            summary = observe(ObserveRequest((file,), TRIAL_NS, isolation=tier), progress)
+            summary = look(ObserveRequest((file,), TRIAL_NS, isolation=tier), progress)
             arrived = sum(topic.messages for topic in summary.topics if topic.name == TRIAL_TOPIC)
             problem = "; ".join(fault.text for fault in summary.faults)
         except GraderError as error:
