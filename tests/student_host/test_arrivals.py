@@ -70,6 +70,7 @@ def announce(ledger: Any, subscription: Any, count: int = 1) -> None:
     ledger.await_arrivals([subscription])
 
 
+@pytest.mark.rule(11)
 def test_what_does_not_come_is_told(ledger: Any) -> None:
     """It may matter, and nobody can do anything about it but say so."""
     heard = Subscription("/odom")
