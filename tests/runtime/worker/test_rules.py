@@ -143,6 +143,22 @@ def test_a_message_is_recorded_before_whoever_hears_it_runs() -> None:
     ]
 
 
+@pytest.mark.rule(12)
+def test_every_eighth_message_in_a_row_is_settled_before_the_next_one() -> None:
+    """No queue has to hold more."""
+    ledger = Ledger()
+    assert [number for number in range(1, 25) if ledger.must_settle()] == [8, 16, 24]
+
+
+@pytest.mark.rule(13)
+def test_a_new_endpoint_is_reported_before_anything_is_sent() -> None:
+    """Also by another endpoint than the new one."""
+    ledger = Ledger()
+    assert not ledger.must_settle()
+    ledger.changed = True
+    assert ledger.must_settle()
+
+
 @pytest.mark.rule(13)
 @pytest.mark.usefixtures("patient")
 def test_a_process_goes_on_when_the_graph_shows_what_it_has_created() -> None:
