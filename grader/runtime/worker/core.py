@@ -39,7 +39,9 @@ class Process:
         name: The wanted file name, which identifies the process in traces.
         wake_ns: When it next wants to run, in nanoseconds of virtual time, or None.
         claims: Its endpoints, as it reports them.
-        renewed: Whether it has reported its endpoints since it was last told their counterparts.
+        told: The counterparts that it has to wait for: kind of endpoint -> name -> numbers of them.
+        renewed: Whether it has reported its endpoints since then.
+        sees_graph: Whether its program queries the graph, as it reports.
         arrivals: Messages that are on their way to it and not yet announced to it, by channel.
         unmatched: The channels of its endpoints that had too few counterparts when the wait for them timed out.
         nudged: Whether it has to run again at this instant, because its endpoints were matched.
@@ -50,7 +52,9 @@ class Process:
     name: str
     wake_ns: int | None = field(default=None, kw_only=True)
     claims: list[dict[str, Any]] = field(default_factory=list, kw_only=True)
+    told: dict[str, dict[str, list[int]]] = field(default_factory=dict, kw_only=True)
     renewed: bool = field(default=False, kw_only=True)
+    sees_graph: bool = field(default=False, kw_only=True)
     arrivals: dict[str, int] = field(default_factory=dict, kw_only=True)
     unmatched: frozenset[str] = field(default=frozenset(), kw_only=True)
     nudged: bool = field(default=False, kw_only=True)
