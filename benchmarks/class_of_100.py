@@ -24,7 +24,7 @@ from pathlib import Path
 from counting import counted, counts
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT / "tests"))
+sys.path.append(str(ROOT / "tests" / "support"))
 from sample_folders import folders_in  # where the test submissions are
 
 GRADE = str(Path(sys.executable).with_name("grade"))

@@ -8,8 +8,8 @@ Usage: python benchmarks/programs.py COUNT [--seed N] [--results FILE] [--jobs N
        wall clock as well, and compared within tolerances. With --reached, COUNT programs run without a sandbox in a
        copy of the grader that notes each function which is called, and the share of each module is printed.
 
-The tests run 200 programs (`tests/random_programs/`), which also hold the generator and the model. The exit code is 1
-if a program differs.
+The tests run 200 programs (`tests/runtime/random_programs/`), which also hold the generator and the model. The exit
+code is 1 if a program differs.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests" / folder) for folder in ("random_programs", "execution", "")]
+sys.path[:0] = [str(ROOT / "tests" / folder) for folder in ("runtime/random_programs", "support")]
 
 from hostile import staging
 from hypothesis import HealthCheck, Phase, given, seed, settings

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "classroom")]
+sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT / "tests" / "course" / "similarity")]
 
 import copies  # noqa: E402  beside the tests
 from sample_folders import folders_in  # noqa: E402  as above

@@ -21,7 +21,7 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "attacks")]
+sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT / "tests" / "attacks")]
 
 from arena import Arena
 from attack_rubric import publisher_rubric

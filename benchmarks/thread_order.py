@@ -1,7 +1,7 @@
 """Counts which thread goes on first in plain CPython, and compares it with the order in virtual time.
 
 Usage: python benchmarks/thread_order.py [REPEATS] [NAME...]
-       Runs each program of tests/student_host/thread_orders.py REPEATS times (200), without the grader, and prints the
+       Runs each program of tests/runtime/host/thread_orders.py REPEATS times (200), without the grader, and prints the
        orders by how often they came, most frequent first; `=` marks that of virtual time. What comes first is decided
        by 5 ms, CPython's switch interval, and by how fast the system wakes a thread: run it on an idle machine.
 """
@@ -16,7 +16,7 @@ import textwrap
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tests" / "student_host"))
+sys.path.insert(0, str(ROOT / "tests" / "runtime" / "host"))
 
 from thread_orders import IMPORTS, ORDERS
 

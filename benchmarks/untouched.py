@@ -21,7 +21,7 @@ import rclpy
 ROOT = Path(__file__).resolve().parent.parent
 FOLDERS = ("tests", "reference_solutions", "student_template", "examples", "benchmarks")
 #: Holds names, and no programs.
-NO_PROGRAMS = ("test_rclpy_names.py",)
+NO_PROGRAMS = ("test_ros_names_of_rclpy.py",)
 #: Wraps C++, and is experimental: not for programs.
 PRIVATE = ("impl", "experimental", "_")
 

@@ -32,7 +32,7 @@ from grader.grading.app.explain import explain_checks, explain_rubrics
 from grader.grading.judging.run_check import check_name
 from grader.grading.model.chart import Chart, Panel
 from grader.grading.model.exercise import Criterion, Exercise
-from grader.grading.model.report import CheckExplanation, CriterionExplanation, Parameter, Report
+from grader.grading.model.report import CheckExplanation, CheckParameter, CriterionExplanation, Report
 from grader.grading.reporting.html.render import render_html
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.loader import read_rubric
@@ -40,7 +40,7 @@ from grader.grading.rubrics.schema import rubric_schema
 from grader.runtime.model import quantities
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path += [str(ROOT / "tests"), str(ROOT / "tests" / "recorded")]
+sys.path.append(str(ROOT / "tests" / "support"))
 import archive  # noqa: E402  the recordings of the test submissions
 import sample_folders  # noqa: E402  where those are
 
@@ -222,7 +222,7 @@ def _check(e: CheckExplanation, pictures: Mapping[str, Chart]) -> str:
     return "\n\n".join(filter(None, lines))
 
 
-def _parameter(parameter: Parameter) -> str:
+def _parameter(parameter: CheckParameter) -> str:
     default = "required" if parameter.required else f"`{parameter.value}`"
     return f"| `{parameter.name}` | {default} | {_cell(parameter.meaning)} |"
 

@@ -12,6 +12,9 @@ from hypothesis import HealthCheck, settings
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import RosInstallation, find_ros
 
+#: Fixtures that tests in several folders use.
+pytest_plugins = ["browser_fixtures", "recording_fixtures"]
+
 #: The markers of tests that `-m fast` leaves out.
 NOT_FAST = ("ros", "browser", "sandbox", "slow", "long", "nightly")
 

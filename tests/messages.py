@@ -25,7 +25,12 @@ from ruamel.yaml import YAML
 
 ROOT = Path(__file__).resolve().parent.parent
 #: Files with reasons, hints and titles, and those with texts for pages.
-TABLES = ("tests/*/golden.yaml", "tests/*/*/golden.yaml", "tests/judging/diagnosis/*.yaml", "rubrics/*/rubric.yaml")
+TABLES = (
+    "tests/*/golden.yaml",
+    "tests/*/*/golden.yaml",
+    "tests/grading/judging/diagnosis/*.yaml",
+    "rubrics/*/rubric.yaml",
+)
 PAGES, SCRIPTS = "grader/**/templates/*.html", "grader/**/assets/*.js"
 #: What marks a string literal as text for people: two words in a row.
 _WORDS = re.compile(r"[A-Za-z]{2,}[,:;]? (?:[A-Za-z]|\{)|\} [a-z]{2,}")

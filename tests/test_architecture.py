@@ -224,6 +224,26 @@ def test_every_module_says_what_it_holds() -> None:
         assert ast.get_docstring(tree_of(path)), path
 
 
+def class_names(package: Path) -> dict[str, list[str]]:
+    """Return the modules that define a public class of each name."""
+    found: dict[str, list[str]] = {}
+    for path in sorted(package.rglob("*.py")):
+        for node in tree_of(path).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found.setdefault(node.name, []).append(path.relative_to(package).as_posix())
+    return found
+
+
+def test_a_name_of_a_class_has_one_meaning(tmp_path: Path) -> None:
+    """No two public classes of the grader have one name, so that each search finds one thing."""
+    shared = {name: places for name, places in class_names(PACKAGE).items() if len(places) > 1}
+
+    assert shared == {}
+    (tmp_path / "one.py").write_text("class Line: ...\nclass _Own: ...\n")
+    (tmp_path / "other.py").write_text("class Line: ...\nclass _Own: ...\n")
+    assert class_names(tmp_path) == {"Line": ["one.py", "other.py"]}
+
+
 #: Places on one person's machine; what students hand in may name any.
 AT_HOME = re.compile(r"(?<![\w.}])(/home/(?!log\b)\w|/root/|/Users/\w|[A-Z]:\\\\)")
 
@@ -292,3 +312,102 @@ def test_no_hint_rule_reads_the_evidence_of_reports() -> None:
         if isinstance(node, ast.Attribute) and node.attr == "evidence" and path.name != "__init__.py"
     ]
     assert reads == []
+
+
+TESTS = PACKAGE.parent / "tests"
+#: The folders of tests that lie as the code that they test.
+MIRRORED = ("cli", "course", "grading", "runtime", "world")
+#: Folders with tests, or with programs that look like tests, that have no counterpart.
+NO_COUNTERPART = {
+    "runtime/random_programs": "programs drawn at random, and a model of what all of the runtime must do with them",
+    "world/workspace/src/robot/test": "a package that is tested itself",
+}
+#: What shows that a test uses a part as its users do, without an import: it starts `grade`, or a pytest of its own.
+FROM_OUTSIDE = {"cli": r'with_name\("grade"\)', "world": r'"pytest"|\bpytester\b'}
+
+
+def parts_imported(path: Path) -> Iterator[str]:
+    """Yield what a test imports of the grader, with the names that it takes out of packages."""
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+    yield from imports_of(path)
+
+
+def misplaced(tests: Path) -> list[str]:
+    """Return which test modules lie in a folder that the package lacks, or have nothing to do with theirs.
+
+    A test module belongs to a folder if it imports something out of it, if its name holds that of the folder or of a
+    module in it, or if it uses the part from outside.
+    """
+    found = []
+    for path in sorted(path for part in MIRRORED for path in (tests / part).rglob("test_*.py")):
+        folder = path.parent.relative_to(tests)
+        if folder.as_posix() in NO_COUNTERPART:
+            continue
+        if not (PACKAGE / folder).is_dir():
+            found.append(f"{path.relative_to(tests)}: there is no grader/{folder}")
+            continue
+        package = ".".join(("grader", *folder.parts, ""))
+        modules = {folder.name, *(entry.stem for entry in (PACKAGE / folder).iterdir() if entry.name[0] not in "_.")}
+        named = any(re.search(rf"_{module}(?:_|$)", path.stem) for module in modules)
+        outside = FROM_OUTSIDE.get(folder.as_posix())
+        used = outside is not None and re.search(outside, path.read_text(encoding="utf-8"))
+        if not named and not used and not any(name.startswith(package) for name in parts_imported(path)):
+            found.append(
+                f"{path.relative_to(tests)}: neither imports {package[:-1]} nor has the name of a module in it"
+            )
+    return found
+
+
+def test_tests_lie_where_the_code_lies() -> None:
+    """What tests a module is found by the path of the module."""
+    assert misplaced(TESTS) == []
+    assert [folder for folder in NO_COUNTERPART if not list((TESTS / folder).glob("test_*.py"))] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("runtime/execution/test_plan.py", "from grader.runtime import plan", "there is no grader/runtime/execution"),
+        ("runtime/worker/test_marks.py", "import grader.grading.model.report", "neither imports grader.runtime.worker"),
+        (
+            "runtime/worker/test_marks.py",
+            "from grader.runtime.workers import x",
+            "neither imports grader.runtime.worker",
+        ),
+        ("runtime/worker/test_marks.py", "from grader.runtime.worker import runner", None),
+        ("runtime/worker/test_marks.py", "import grader.runtime.worker.runner", None),
+        ("runtime/worker/test_runner_marks.py", "import rclpy", None),
+        ("cli/test_marks.py", "import pytest", "neither imports grader.cli"),
+        ("cli/test_marks.py", 'GRADE = Path(sys.executable).with_name("grade")', None),
+    ],
+)
+def test_a_misplaced_test_is_found(name: str, text: str, said: str | None, tmp_path: Path) -> None:
+    """The rule can fail."""
+    path = tmp_path / name
+    path.parent.mkdir(parents=True)
+    path.write_text(text, encoding="utf-8")
+    assert [said is not None and said in one for one in misplaced(tmp_path)] == ([True] if said else [])
+
+
+#: Folders of modules that are tested elsewhere.
+TESTED_ELSEWHERE: dict[str, str] = {
+    "grading/judging/logs": "tests/grading/judging/checks: by the checks that read logs",
+    "runtime/interfaces/runtime": "tests/runtime/interfaces",
+    **dict.fromkeys(
+        (f"runtime/ros_packages/{path.name}" for path in (PACKAGE / "runtime/ros_packages").iterdir() if path.is_dir()),
+        "tests/runtime/ros_packages",
+    ),
+}
+
+
+def test_every_folder_of_code_has_tests() -> None:
+    """In the folder of the same path, or named above."""
+    folders = {path.parent.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py") if path.name != "__init__.py"}
+    without = {
+        folder.as_posix()
+        for folder in folders
+        if folder.parts and folder.parts[0] in MIRRORED and not list((TESTS / folder).glob("test_*.py"))
+    }
+    assert without <= set(TESTED_ELSEWHERE)

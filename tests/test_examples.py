@@ -11,7 +11,7 @@ import pytest
 from _pytest.mark import ParameterSet
 from archive import outcomes
 from click.testing import CliRunner
-from grading import grade_until_decided
+from decided import grade_until_decided
 from ruamel.yaml import YAML
 
 from grader.cli import main

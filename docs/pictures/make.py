@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, sync_playwright
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-sys.path.append(str(ROOT / "tests"))
+sys.path.append(str(ROOT / "tests" / "support"))
 from sample_folders import folder_of  # noqa: E402  where the test submissions are
 
 #: Whose files the report shows: right ones, but for these.

@@ -12,7 +12,7 @@ import click
 
 from grader.cli.completion import complete_exercise
 from grader.cli.options import PATH, RUBRIC
-from grader.grading.model.grading_options import OBSERVE, GradingOptions, Kind, Option, names, percent, rows
+from grader.grading.model.grading_options import OBSERVE, GradingOptions, Option, OptionKind, names, percent, rows
 from grader.runtime.model.scenario import ODOMETRY
 
 _Command = Callable[..., int]
@@ -56,7 +56,7 @@ def run_option(
     row, default = next((row, each.default) for each_name, row, each in rows(record) if each_name == name)
     attributes = _attributes(row, command, row.defaults.get(command, default), many=isinstance(default, tuple))
     option = click.option(row.flag, name, **attributes)
-    if row.kind is not Kind.BAG:
+    if row.kind is not OptionKind.BAG:
         return option
     older = click.option("--odom-bag", type=PATH, help=f"The same as {row.flag} {ODOMETRY}=PATH.")
     return lambda function: option(older(function))
@@ -67,10 +67,10 @@ def _attributes(row: Option, command: str, default: Any, *, many: bool) -> dict[
     found: dict[str, Any] = {"help": row.commands[command] or row.help, "multiple": many, **_PARSED.get(row.kind, {})}
     if row.metavar:
         found["metavar"] = row.metavar
-    if row.kind is Kind.CHOICE:
+    if row.kind is OptionKind.CHOICE:
         found["type"] = click.Choice(row.choices)
     if not many and default is not None:
-        found["default"] = percent(default) if row.kind is Kind.SHARE else default
+        found["default"] = percent(default) if row.kind is OptionKind.SHARE else default
         found["show_default"] = row.shows_default
     if row.environment and command in row.reads_environment:
         found |= {"envvar": row.environment, "show_envvar": command != OBSERVE}
@@ -105,13 +105,13 @@ def parse_share(ctx: click.Context, param: click.Parameter, value: str) -> float
 
 
 #: How the text of an option becomes its value.
-_PARSED: dict[Kind, dict[str, Any]] = {
-    Kind.EXERCISE: {"shell_complete": complete_exercise},
-    Kind.FLAG: {"is_flag": True},
-    Kind.COUNT: {"type": click.IntRange(min=0)},
-    Kind.SECONDS: {"type": click.FloatRange(min=1)},
-    Kind.SHARE: {"callback": parse_share},
-    Kind.PATH: {"type": PATH},
-    Kind.RUBRIC: {"type": RUBRIC},
-    Kind.BAG: {"callback": _parse_recordings},
+_PARSED: dict[OptionKind, dict[str, Any]] = {
+    OptionKind.EXERCISE: {"shell_complete": complete_exercise},
+    OptionKind.FLAG: {"is_flag": True},
+    OptionKind.COUNT: {"type": click.IntRange(min=0)},
+    OptionKind.SECONDS: {"type": click.FloatRange(min=1)},
+    OptionKind.SHARE: {"callback": parse_share},
+    OptionKind.PATH: {"type": PATH},
+    OptionKind.RUBRIC: {"type": RUBRIC},
+    OptionKind.BAG: {"callback": _parse_recordings},
 }

@@ -79,7 +79,7 @@ def command(  # noqa: PLR0913  one parameter an option
     from grader.grading.app.request import request_for
     from grader.grading.app.seeds import PRACTICE
     from grader.grading.app.verify import VerifyRequest, verify
-    from grader.grading.model.verification import State
+    from grader.grading.model.verification import ConditionState
     from grader.grading.reporting.verified import render_verification, verification_to_json
 
     how = request_for("", options, seed_key=key or PRACTICE, draw=draw)
@@ -93,7 +93,7 @@ def command(  # noqa: PLR0913  one parameter an option
         lambda page: render_verification(found, width=page.width, colour=page.colour),
         as_json=as_json,
     )
-    return {State.SAME: ALL_MET, State.DIFFERENT: NOT_ALL_MET}.get(found.state, UNDECIDED)
+    return {ConditionState.SAME: ALL_MET, ConditionState.DIFFERENT: NOT_ALL_MET}.get(found.state, UNDECIDED)
 
 
 def _keep(found: Verification, evidence: Path, text: str) -> None:

@@ -16,7 +16,7 @@ class LaunchFailedError(HarnessError):
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class StartProcesses:
     """Start the processes of a plan.
 
     Attributes:
@@ -71,7 +71,7 @@ class Serve:
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class CallService:
     """Send a request once its server is there; the answer says under which number it will be observed."""
 
     service: str
@@ -124,8 +124,9 @@ class Finish:
     """End the run with all its processes."""
 
 
-Command = Start | Advance | Publish | Serve | Call | SendGoal | Simulate | Interrupt | Kill | Finish
+Command = StartProcesses | Advance | Publish | Serve | CallService | SendGoal | Simulate | Interrupt | Kill | Finish
 #: Each command by its name on the wire.
 COMMANDS: Mapping[str, type] = {
-    kind.__name__: kind for kind in (Start, Advance, Publish, Serve, Call, SendGoal, Simulate, Interrupt, Kill, Finish)
+    kind.__name__: kind
+    for kind in (StartProcesses, Advance, Publish, Serve, CallService, SendGoal, Simulate, Interrupt, Kill, Finish)
 }

@@ -57,7 +57,7 @@ class LaunchFailed(AssertionError):  # noqa: N818 - the same
     """A launch file of the submission raised an exception."""
 
 
-class Line:
+class SupervisorLine:
     """The connection to the supervisor, which stands in for its recorder and for the worker that it lends."""
 
     def __init__(self, connection: socket.socket) -> None:
@@ -84,7 +84,7 @@ class Line:
         answer: dict[str, Any] = json.loads(line)
         return answer
 
-    def lend(self) -> Line:
+    def lend(self) -> SupervisorLine:
         """Return the worker, which is reached in the same way."""
         return self
 
@@ -97,7 +97,7 @@ class Line:
         answer: dict[str, Any] = self.ask({"tell": told})["told"]
         return answer
 
-    def take_back(self, _: Line, *, usable: bool) -> None:
+    def take_back(self, _: SupervisorLine, *, usable: bool) -> None:
         """Give the worker back."""
         self.ask({"back": usable})
 
@@ -111,7 +111,7 @@ class GradedWorld(World):
         options: Of the marker `ros`.
     """
 
-    def __init__(self, line: Line, job: TestJob, options: Mapping[str, Any]) -> None:
+    def __init__(self, line: SupervisorLine, job: TestJob, options: Mapping[str, Any]) -> None:
         seed = options.get("seed")
         session: Any = SimpleNamespace(recorder=line)
         plan = replace(job.plan, processes=(), starts=(), duration_ns=0, drawn_order=seed is not None)
@@ -187,7 +187,7 @@ class GradedWorld(World):
 class Plugin:
     """What pytest calls."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: SupervisorLine) -> None:
         self._line = line
         self._jobs: dict[str, TestJob] = {}
         self._mistake: dict[str, Any] = {}
@@ -323,7 +323,7 @@ def _mistake(error: BaseException, path: str, when: str | None = None) -> dict[s
 
 def main() -> None:
     """Run the tests of a file."""
-    line = Line(socket.socket(fileno=int(sys.argv[1])))
+    line = SupervisorLine(socket.socket(fileno=int(sys.argv[1])))
     arguments = ["-p", "no:cacheprovider", "-p", "no:faulthandler", "--import-mode=importlib", "-c", "pytest.ini"]
     pytest.main([*arguments, "--rootdir=.", sys.argv[2]], plugins=[Plugin(line)])
 

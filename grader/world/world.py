@@ -47,7 +47,18 @@ from grader.runtime.serialization import (
 from grader.runtime.session import RecordingSession
 from grader.runtime.simulation.loading import made
 from grader.runtime.simulation.participant import Moment, Simulation
-from grader.runtime.steps import Advance, Call, Command, Interrupt, Kill, Publish, SendGoal, Serve, Simulate, Start
+from grader.runtime.steps import (
+    Advance,
+    CallService,
+    Command,
+    Interrupt,
+    Kill,
+    Publish,
+    SendGoal,
+    Serve,
+    Simulate,
+    StartProcesses,
+)
 from grader.runtime.stimuli.goals import PlannedGoal
 from grader.runtime.supervisor.stepping import SteppedRun
 from grader.world import telling
@@ -257,7 +268,7 @@ class World:
             ),
         )
         self._programs[label] = started = Program(label, found.root, self._signal, self._catch_up)
-        self._perform(Start(self._plan_of(found, start, env or {}), settle=not self._plan.drawn_order))
+        self._perform(StartProcesses(self._plan_of(found, start, env or {}), settle=not self._plan.drawn_order))
         return started
 
     @_with_hint
@@ -276,7 +287,7 @@ class World:
         found, known = self._found_launch_file(file)
         given = tuple((name, str(value)) for name, value in (arguments or {}).items())
         start = PlannedStart(found.name, launch_arguments=given, known=known, provided=self._provided)
-        told = self._perform(Start(self._plan_of(found, start, {}), settle=not self._plan.drawn_order))
+        told = self._perform(StartProcesses(self._plan_of(found, start, {}), settle=not self._plan.drawn_order))
         return Launched([self._programs[name] for name in told["started"]], told["left_out"])
 
     #: Name and text of files that a launch file may need, beside those that lie around it.
@@ -489,7 +500,7 @@ class World:
         name = _absolute(name)
         interface, kind = type_of_part(request, "Request", name)
         since_ns, seen = self._begin_ns(), len(self._observations)
-        told = self._perform(Call(name, interface, plain_fields(request)))
+        told = self._perform(CallService(name, interface, plain_fields(request)))
 
         found = self._until(lambda: self._response(seen, name, told["client"]), since_ns + round(timeout * NS_PER_S))
         if found is not None:
@@ -797,11 +808,11 @@ class World:
         __tracebackhide__ = True
         if self._run.is_busy:
             raise RuntimeError("a function that answers for the test cannot let time pass or act on the programs")
-        if self._starting and not isinstance(command, (Start, Advance)):
+        if self._starting and not isinstance(command, (StartProcesses, Advance)):
             self._catch_up()
-        self._starting = isinstance(command, Start) and not command.settle
+        self._starting = isinstance(command, StartProcesses) and not command.settle
         told, observations = self._run.perform(command)
-        if isinstance(command, Start):
+        if isinstance(command, StartProcesses):
             for name in told["started"]:
                 self._programs.setdefault(name, Program(name, Path(command.plan.root), self._signal, self._catch_up))
         self._adopt(observations)

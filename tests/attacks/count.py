@@ -15,7 +15,7 @@ import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path[:0] = [str(Path(__file__).resolve().parent / folder) for folder in (".", "../support")]
 
 from arena import UNPRIVILEGED
 from attack_runs import Attack, read_attacks, run_unit, units

@@ -16,6 +16,7 @@ from arena import UNPRIVILEGED, Arena, Ran
 from attack_runs import HERE, read_attacks, run_unit, units
 from attack_verdicts import EARNS, objections
 
+from grader.grading.reporting.formats import FORMATS
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import find_ros
 from grader.runtime.sandbox.choose import inspect_tiers
@@ -202,6 +203,11 @@ BAD = {
     "markup on a platform": ("gradescope", b'{"output": "<iframe src=x>", "output_format": "html"}'),
     "not UTF-8": ("text", b"\xff"),
 }
+
+
+def test_the_reports_of_every_format_are_looked_at() -> None:
+    """By a reader that knows what hostile text could do in it."""
+    assert {*FORMATS, "csv"} == set(hostile_reports.READERS)
 
 
 @pytest.mark.parametrize(("format_", "content"), BAD.values(), ids=BAD)

@@ -77,7 +77,7 @@ def _connected(
         context = connect(place, jobs, warn)
         scheduler = context.__enter__()
     try:
-        yield lambda _: Watched(scheduler, where)
+        yield lambda _: GuardedScheduler(scheduler, where)
     finally:
         try:
             with entry_points.faults(f"{where} cannot be left", _REPORT):
@@ -86,7 +86,7 @@ def _connected(
             warn(fault.message)
 
 
-class Watched:
+class GuardedScheduler:
     """A scheduler of some package: whatever it does wrong is a failure of the machine, and never a mark."""
 
     def __init__(self, scheduler: ClassScheduler, where: str) -> None:

@@ -16,7 +16,7 @@ from libcst import ParserSyntaxError
 
 from grader.course.mutation.explained import Explained, Explanation, read_explained
 from grader.course.mutation.operators import mutants_of
-from grader.course.mutation.operators.program import Candidate, Program
+from grader.course.mutation.operators.program import Candidate, ParsedProgram
 from grader.course.mutation.operators.variants import variants_of
 from grader.course.mutation.results import (
     Fate,
@@ -199,7 +199,7 @@ def _sources(reference: Submission, exercise: Exercise) -> dict[str, str]:
         if name not in sources:
             raise RubricError(f"{reference.path}: expected {name} of {exercise.id} in it, found none that can be read")
         try:
-            Program(sources[name])
+            ParsedProgram(sources[name])
         except ParserSyntaxError as error:
             where = f"{reference.path}/{name}:{error.raw_line}"
             raise RubricError(f"{where}: expected a program that libcst can read, found another") from None

@@ -32,7 +32,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class ShownLine:
     """A line as a page shows it; number 0 marks a gap of omitted lines."""
 
     number: int
@@ -91,25 +91,25 @@ def _cells(handed: Handed, file: str, share: float) -> tuple[str, str, str, str]
     return csv_cell(handed.name), csv_cell(handed.label), csv_cell(file), f"{share:.2f}"
 
 
-def lines_of(side: Side) -> Sequence[Line]:
+def lines_of(side: Side) -> Sequence[ShownLine]:
     """Return the lines of a file with the similar ones marked; of a long file, only the lines near those."""
     texts = side.program.text.expandtabs(4).rstrip("\n").split("\n")
     alike = frozenset(side.alike)
     wanted = set(range(1, len(texts) + 1))
     if len(texts) > WHOLE:
         wanted &= {near for number in alike for near in range(number - _AROUND, number + _AROUND + 1)}
-    made: list[Line] = []
+    made: list[ShownLine] = []
     before = 0
     for number in sorted(wanted)[:MOST_LINES]:
         if number != before + 1:
             made.append(_gap(number - before - 1))
-        made.append(Line(number, shown(texts[number - 1], limit=_LINE_LIMIT), number in alike))
+        made.append(ShownLine(number, shown(texts[number - 1], limit=_LINE_LIMIT), number in alike))
         before = number
     return [*made, _gap(len(texts) - before)] if before < len(texts) else made
 
 
-def _gap(count: int) -> Line:
-    return Line(0, f"{count} lines not shown")
+def _gap(count: int) -> ShownLine:
+    return ShownLine(0, f"{count} lines not shown")
 
 
 @cache

@@ -15,7 +15,7 @@ from grader.runtime.compiled import compiled, state_of
 from grader.runtime.model.errors import RecordingError
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import ODOMETRY
-from grader.runtime.recording.bag import Define, Least, read_bag, topics_in
+from grader.runtime.recording.bag import BagMinimum, Define, read_bag, topics_in
 from grader.runtime.shipped import PACKAGE, shipped
 from grader.runtime.stimuli.recorded import RecordedStream, Recording
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Recordings = Mapping[RecordedStream, Recording]
 #: A recording that replaces another one has to be as long as that one, or this long: the part that is played is drawn,
 #: and a node that does something once a second has to be seen doing it.
-ENOUGH = Least(messages=20, span_ns=5 * NS_PER_S)
+ENOUGH = BagMinimum(messages=20, span_ns=5 * NS_PER_S)
 
 
 def read_recordings(request: GradeRequest, exercises: Iterable[Exercise]) -> Recordings:
@@ -75,7 +75,7 @@ def _recording(stream: RecordedStream, given: Sequence[tuple[str, Path]], define
     path = replacement(stream, given)
     if path is None:
         return own
-    least = Least(min(ENOUGH.messages, len(own.messages)), min(ENOUGH.span_ns, own.span_ns))
+    least = BagMinimum(min(ENOUGH.messages, len(own.messages)), min(ENOUGH.span_ns, own.span_ns))
     return read_bag(path, stream.topic, stream.type, least=least, define=define)
 
 

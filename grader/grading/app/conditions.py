@@ -45,7 +45,7 @@ TRIAL_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
+class VerifyCondition:
     """One condition, and how it is made."""
 
     name: str  # as `--condition` takes it
@@ -62,10 +62,10 @@ class Condition:
 
 
 #: The first recording, which the others are compared with.
-FIRST = Condition("first", "as grading records", variables={"PYTHONHASHSEED": HASH_SEEDS[0]})
+FIRST = VerifyCondition("first", "as grading records", variables={"PYTHONHASHSEED": HASH_SEEDS[0]})
 
 
-def conditions(names: Sequence[str], isolation: str) -> list[Condition]:
+def conditions(names: Sequence[str], isolation: str) -> list[VerifyCondition]:
     """Return the named conditions, in the order in which they are tried; all usual ones if none is named.
 
     Those that this machine or user cannot make say why. Testing the sandboxes may take some seconds.
@@ -78,32 +78,32 @@ def conditions(names: Sequence[str], isolation: str) -> list[Condition]:
     return [_sandbox(name, asked=name in names) if name in SANDBOXES else _MAKERS[name](isolation) for name in wanted]
 
 
-def _load(isolation: str) -> Condition:
+def _load(isolation: str) -> VerifyCondition:
     del isolation
     loops = LOOPS * len(os.sched_getaffinity(0))
-    return Condition(LOAD, f"beside {loops} busy loops", loops=loops)
+    return VerifyCondition(LOAD, f"beside {loops} busy loops", loops=loops)
 
 
-def _processors(isolation: str) -> Condition:
+def _processors(isolation: str) -> VerifyCondition:
     del isolation
     there = sorted(os.sched_getaffinity(0))
     lacks = "" if len(there) > 1 else "there is one processor only"
-    return Condition(PROCESSORS, "on one processor", lacks, processors=tuple(there[:1]))
+    return VerifyCondition(PROCESSORS, "on one processor", lacks, processors=tuple(there[:1]))
 
 
-def _executed(isolation: str) -> Condition:
+def _executed(isolation: str) -> VerifyCondition:
     forks = isolation_from_name(isolation).can_fork
     lacks = "" if forks else f"in the sandbox {isolation}, each is executed anyway"
-    return Condition(EXECUTED, "each program executed, not forked", lacks, executes=True)
+    return VerifyCondition(EXECUTED, "each program executed, not forked", lacks, executes=True)
 
 
-def _user(isolation: str) -> Condition:
+def _user(isolation: str) -> VerifyCondition:
     del isolation
     words = "as another user"
     if os.geteuid() != 0:
-        return Condition(USER, words, "only root can become another user")
+        return VerifyCondition(USER, words, "only root can become another user")
     user = some_user()
-    return Condition(USER, words, _unreachable(user), isolation="auto", user=user)
+    return VerifyCondition(USER, words, _unreachable(user), isolation="auto", user=user)
 
 
 def _unreachable(user: int) -> str:
@@ -125,24 +125,24 @@ def _unreachable(user: int) -> str:
     return "" if done.returncode == 0 else f"user {user} cannot read what {sys.executable} needs"
 
 
-def _sandbox(name: str, *, asked: bool) -> Condition:
+def _sandbox(name: str, *, asked: bool) -> VerifyCondition:
     """Return the condition of another sandbox; unless asked for, only one that holds completely is tried."""
     words = f"in the sandbox {name}"
     try:
         isolation_from_name(name)
         report = inspect_tier(name, find_ros())
     except EnvironmentFault as fault:
-        return Condition(name, words, fault.message.partition(": ")[2], isolation=name)
+        return VerifyCondition(name, words, fault.message.partition(": ")[2], isolation=name)
     open_ones = [found.name for found in missing(report.properties)]
     if report.usable or (asked and report.properties):
-        return Condition(name, words, isolation=name)
+        return VerifyCondition(name, words, isolation=name)
     lacks = f"it does not contain {', '.join(open_ones)} here" if open_ones else report.why
-    return Condition(name, words, lacks, isolation=name)
+    return VerifyCondition(name, words, lacks, isolation=name)
 
 
-def _together(isolation: str) -> Condition:
+def _together(isolation: str) -> VerifyCondition:
     forks = isolation_from_name(isolation).can_fork
-    return Condition(
+    return VerifyCondition(
         TOGETHER,
         "in another order, on one processor, elsewhere, with other hashes" + ", executed" * forks,
         reverses=True,
@@ -153,21 +153,23 @@ def _together(isolation: str) -> Condition:
     )
 
 
-def _always(condition: Condition) -> Callable[[str], Condition]:
+def _always(condition: VerifyCondition) -> Callable[[str], VerifyCondition]:
     """Return what makes a condition that every machine and user can make."""
     return lambda _: condition
 
 
 #: Makes a condition from the sandbox of the first recording.
-_MAKERS: Mapping[str, Callable[[str], Condition]] = {
-    AGAIN: _always(Condition(AGAIN, "again, with nothing changed")),
-    ORDER: _always(Condition(ORDER, "one scenario at a time, the last one first", reverses=True)),
+_MAKERS: Mapping[str, Callable[[str], VerifyCondition]] = {
+    AGAIN: _always(VerifyCondition(AGAIN, "again, with nothing changed")),
+    ORDER: _always(VerifyCondition(ORDER, "one scenario at a time, the last one first", reverses=True)),
     PROCESSORS: _processors,
     LOAD: _load,
     EXECUTED: _executed,
-    FOLDER: _always(Condition(FOLDER, "with another temporary folder", other_folder=True)),
-    ZONE: _always(Condition(ZONE, "in another time zone and language", variables=ELSEWHERE)),
-    HASHES: _always(Condition(HASHES, "with other hashes in the grader", variables={"PYTHONHASHSEED": HASH_SEEDS[1]})),
+    FOLDER: _always(VerifyCondition(FOLDER, "with another temporary folder", other_folder=True)),
+    ZONE: _always(VerifyCondition(ZONE, "in another time zone and language", variables=ELSEWHERE)),
+    HASHES: _always(
+        VerifyCondition(HASHES, "with other hashes in the grader", variables={"PYTHONHASHSEED": HASH_SEEDS[1]})
+    ),
     USER: _user,
     TOGETHER: _together,
 }

@@ -12,7 +12,7 @@ from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest
 from grader.grading.judging.run_check import check_name
 from grader.grading.model.exercise import Criterion, Exercise
-from grader.grading.model.report import CheckExplanation, CriterionExplanation, Parameter
+from grader.grading.model.report import CheckExplanation, CheckParameter, CriterionExplanation
 from grader.grading.rubrics.check_parameters import Manual, manual_of
 from grader.grading.rubrics.draws import First
 from grader.grading.rubrics.exercise_checks import known_checks
@@ -98,12 +98,12 @@ def _check(name: str, kind: type, used_by: Sequence[str]) -> CheckExplanation:
     return CheckExplanation(name, manual.summary, manual.details, parameters, tuple(used_by))
 
 
-def _parameter(field: Field[object], kind: type, manual: Manual, check: object | None) -> Parameter:
+def _parameter(field: Field[object], kind: type, manual: Manual, check: object | None) -> CheckParameter:
     """Describe a parameter with its value in a check, or with its default if no check is given."""
     annotation = get_type_hints(kind, include_extras=True)[field.name]
     value = field.default if check is None else getattr(check, field.name)
     text = "" if value is MISSING else _written(value, annotation)
-    return Parameter(field.name, text, manual.parameters.get(field.name, ""), value is MISSING)
+    return CheckParameter(field.name, text, manual.parameters.get(field.name, ""), value is MISSING)
 
 
 def _written(value: Any, annotation: object) -> str:

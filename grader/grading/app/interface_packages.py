@@ -49,7 +49,7 @@ _MOST_BYTES = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
-class Offer:
+class OfferedPackage:
     """A package that is not installed, and who brings it."""
 
     package: InterfacePackage
@@ -101,15 +101,15 @@ def packages_in(folders: Iterable[Path]) -> list[InterfacePackage]:
     return found
 
 
-def offers(rubric: Iterable[Path], course: Iterable[Path], ros: RosInstallation) -> list[Offer]:
+def offers(rubric: Iterable[Path], course: Iterable[Path], ros: RosInstallation) -> list[OfferedPackage]:
     """Return the packages in the folders of rubrics and of the class that are not installed.
 
     Raises DefinitionError, and RubricError for a package that several bring in different versions.
     """
-    found: dict[str, Offer] = {}
+    found: dict[str, OfferedPackage] = {}
     for origin, folders in ((RUBRIC, rubric), (CLASS, course)):
         for package in packages_in(dict.fromkeys(folders)):
-            known = found.setdefault(package.name, Offer(package, origin)).package
+            known = found.setdefault(package.name, OfferedPackage(package, origin)).package
             if digest([known]) != digest([package]):
                 text = f"interfaces: expected one package {package.name}, found two with other definitions"
                 raise RubricError(text, "give one of them another name")
@@ -239,7 +239,7 @@ def provide(
     mentioned |= _named_in([lent.text], names)
     named = [package for package in ready if package.name in mentioned]
     used = needed([*(offer.package for offer in given), *named], ready)
-    given += [Offer(package, GRADER) for package in used if package.name not in taken]
+    given += [OfferedPackage(package, GRADER) for package in used if package.name not in taken]
     brought = [BroughtPackage(offer.package.name, offer.origin, _digest([offer.package])) for offer in given]
     builds = [_copied(built(used, ros).prefix, session.folder)] if used else []
     others = [*used, *(package for package in ready if package not in used)]

@@ -31,7 +31,7 @@ COLLECT_AFTER = 200_000
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class WantedRecording:
     """One submission to record."""
 
     path: str  # of a folder that may be read
@@ -46,7 +46,7 @@ class Wanted:
 class Recordings:
     """What to record, and how."""
 
-    wanted: tuple[Wanted, ...]
+    wanted: tuple[WantedRecording, ...]
     isolation: str
     processors: tuple[int, ...] = ()  # the processors to run on; empty for all
     reverses: bool = False  # whether to record one scenario at a time, the last one first

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from grader.grading.judging.agreement import Difference, differences, sentence, start_of
+from grader.grading.judging.agreement import ClockDifference, differences, sentence, start_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import ClockKind, Trace
@@ -187,7 +187,7 @@ class _Checked:
         plan = shortened(self.job.plan, self.recorded, self.judge)
         return Job(f"{self.job.title}, checked on the wall clock", plan)
 
-    def compared(self, wall: Trace) -> tuple[Difference | None, bool]:
+    def compared(self, wall: Trace) -> tuple[ClockDifference | None, bool]:
         """Return the most obvious difference, and whether a busy machine prevented a comparison."""
         first_message_on = self.job.plan.first_message_on
         starts_ns = start_of(self.recorded, first_message_on), start_of(wall, first_message_on)
@@ -195,9 +195,9 @@ class _Checked:
         found = (*judged.lost, *differences(self.recorded, wall, first_message_on))
         return next(iter(found), None), bool(found and wall.harness_problem) or (judged.unsure and not found)
 
-    def disagreement(self, record: Record) -> tuple[Difference | None, bool]:
+    def disagreement(self, record: Record) -> tuple[ClockDifference | None, bool]:
         """Return a difference that occurred in repeated attempts, and whether the machine was too busy to find out."""
-        seen: list[Difference] = []
+        seen: list[ClockDifference] = []
         busy = 0
         while busy < BUSY_TIMES:
             (wall,) = record([self.again()])
@@ -229,7 +229,7 @@ def _unchecked(trace: Trace, *, suspect: bool) -> Trace:
 
 
 def _decided(
-    difference: Difference, jobs: Mapping[Key, Job], traces: Mapping[Key, Trace], record: Record
+    difference: ClockDifference, jobs: Mapping[Key, Job], traces: Mapping[Key, Trace], record: Record
 ) -> dict[Key, Trace]:
     """Record all scenarios of an exercise on the wall clock, which decides."""
     decided = {}

@@ -14,15 +14,15 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import IO, Any
 
-from grader.grading.app.conditions import FIRST, OTHER_FOLDER, Condition, conditions, own_home
+from grader.grading.app.conditions import FIRST, OTHER_FOLDER, VerifyCondition, conditions, own_home
 from grader.grading.app.grade import Progress, begun, read_exercises, wanted_files
-from grader.grading.app.recorded_again import Recordings, Wanted
+from grader.grading.app.recorded_again import Recordings, WantedRecording
 from grader.grading.app.request import GradeRequest, request_of, request_to_json
 from grader.grading.app.seeds import VARIABLE
 from grader.grading.evidence.store import Evidence, open_evidence, run_of
 from grader.grading.judging.repetition import events, first_difference
 from grader.grading.model.exercise import Exercise
-from grader.grading.model.verification import Difference, LeftOut, Place, State, Tried, Verification
+from grader.grading.model.verification import ConditionState, Difference, LeftOutScenario, Place, Tried, Verification
 from grader.grading.submissions.collected import shown
 from grader.grading.submissions.submission import collect_submission, stage_collected
 from grader.runtime.model.dataclass import dataclass
@@ -58,7 +58,7 @@ class _Subject:
     """One submission while it is verified."""
 
     name: str  # its path as the user typed it
-    wanted: Wanted
+    wanted: WantedRecording
     kept: Mapping[Key, Trace] = field(default_factory=dict)  # recordings that were kept as evidence
     sources: Mapping[str, str] = field(default_factory=dict)  # wanted file name -> its text
     first: dict[Key, _First] = field(default_factory=dict)
@@ -119,7 +119,7 @@ def verify(request: VerifyRequest, progress: Progress) -> Verification:
             scenarios=len(first),
             events=sum(each.events for _, each in first if each.is_comparable),
             tried=tuple(tried),
-            left_out=tuple(LeftOut(place, each.clock_reason) for place, each in first if each.clock_reason),
+            left_out=tuple(LeftOutScenario(place, each.clock_reason) for place, each in first if each.clock_reason),
             problems=(
                 *(f"{one.name}: {one.problem}" for one in subjects if one.problem),
                 *(f"{place.submission}, {place.scenario}: {each.problem}" for place, each in first if each.problem),
@@ -153,7 +153,7 @@ def _subject(request: VerifyRequest, path: str, into: Path, evidence: Evidence |
         interfaces=tuple(folder.absolute() for folder in how.interfaces),
     )
     given = json.dumps(request_to_json(asked, exercises))
-    wanted = Wanted(str(into), seed, given, tuple(str(rubric.absolute()) for rubric in how.rubrics))
+    wanted = WantedRecording(str(into), seed, given, tuple(str(rubric.absolute()) for rubric in how.rubrics))
     kept = run_of(evidence, exercises, verify=True).traces if evidence is not None else {}
     return _Subject(path, wanted, kept)
 
@@ -197,13 +197,13 @@ def _compared_with_evidence(subjects: Sequence[_Subject]) -> Tried:
     return counted.tried()
 
 
-def _tried(folder: Path, subjects: Sequence[_Subject], condition: Condition, isolation: str) -> Tried:
+def _tried(folder: Path, subjects: Sequence[_Subject], condition: VerifyCondition, isolation: str) -> Tried:
     """Record under a condition and compare with the first recordings."""
     counted = _Counted(condition.name, condition.words)
     comparable = [one for one in subjects if one.comparable]
     if condition.not_tried or not comparable:
         why = condition.not_tried or "there is nothing to compare"
-        return Tried(condition.name, condition.words, State.NOT_TRIED, why)
+        return Tried(condition.name, condition.words, ConditionState.NOT_TRIED, why)
     again = [replace(one, wanted=replace(one.wanted, scenarios=one.comparable)) for one in comparable]
     for line in _recorded(folder, again, condition, condition.isolation or isolation):
         if "problem" in line:
@@ -240,15 +240,21 @@ class _Counted:
 
     def tried(self) -> Tried:
         """Return the result."""
-        state = State.DIFFERENT if self.different else State.FAILED if self.problem else State.SAME
-        if state is State.SAME and not self.compared:
-            state = State.NOT_TRIED
+        state = (
+            ConditionState.DIFFERENT
+            if self.different
+            else ConditionState.FAILED
+            if self.problem
+            else ConditionState.SAME
+        )
+        if state is ConditionState.SAME and not self.compared:
+            state = ConditionState.NOT_TRIED
             self.problem = "there is nothing to compare"
         return Tried(self.name, self.words, state, self.problem, self.compared, tuple(self.different))
 
 
 def _recorded(
-    folder: Path, subjects: Sequence[_Subject], condition: Condition, isolation: str
+    folder: Path, subjects: Sequence[_Subject], condition: VerifyCondition, isolation: str
 ) -> Iterator[Mapping[str, Any]]:
     """Record submissions under a condition, and yield the lines of `grader.grading.app.recorded_again`.
 
@@ -288,7 +294,9 @@ def _recorded(
 
 
 @contextmanager
-def _started(condition: Condition, variables: Mapping[str, str], said: IO[str]) -> Iterator[subprocess.Popen[str]]:
+def _started(
+    condition: VerifyCondition, variables: Mapping[str, str], said: IO[str]
+) -> Iterator[subprocess.Popen[str]]:
     """Start the program that records, and end it with the block."""
     as_user: dict[str, Any] = {}
     if condition.user is not None:

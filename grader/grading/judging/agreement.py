@@ -58,7 +58,7 @@ class Aspect(str, Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class ClockDifference:
     """A difference between what a program did on two clocks: a rate in Hz, a number, a count or a word on each.
 
     Attributes:
@@ -88,7 +88,7 @@ class _Window:
         return [m for m in self.trace.messages(topic) if self.holds(m.t_ns)]
 
 
-def differences(virtual: Trace, wall: Trace, first_message_on: str = "") -> tuple[Difference, ...]:
+def differences(virtual: Trace, wall: Trace, first_message_on: str = "") -> tuple[ClockDifference, ...]:
     """Return the differences between two recordings, the most obvious first; empty if they agree.
 
     Args:
@@ -109,7 +109,7 @@ def start_of(trace: Trace, first_message_on: str) -> int:
     return messages[0].t_ns if messages else 0
 
 
-def sentence(difference: Difference, clock: ClockKind) -> str:
+def sentence(difference: ClockDifference, clock: ClockKind) -> str:
     """Return a sentence about a difference for the report's reason of a clock, given the first recording's clock."""
     name = difference.name[:200]
     first, second = (_shown(value, difference.aspect) for value in (difference.virtual, difference.wall))
@@ -151,16 +151,16 @@ def _shown(value: float | str, aspect: Aspect) -> str:
 # --- topics ---
 
 
-def _traffic(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+def _traffic(virtual: _Window, wall: _Window) -> Iterator[ClockDifference]:
     for topic in sorted({m.topic for m in (*virtual.trace.messages(), *wall.trace.messages())}):
         before, after = virtual.messages(topic), wall.messages(topic)
         lasting = any(m.t_ns >= virtual.start_ns + EDGE_NS for m in before)
         if len(before) >= FEW and lasting and not after:
-            yield Difference(Aspect.SILENT, topic, len(before), 0)
+            yield ClockDifference(Aspect.SILENT, topic, len(before), 0)
         elif len(after) >= FEW and not virtual.trace.messages(topic):
-            yield Difference(Aspect.SILENT, topic, 0, len(after))
+            yield ClockDifference(Aspect.SILENT, topic, 0, len(after))
         elif differ_in_count(len(before), len(after)) or _differ_in_rate(before, after):
-            yield Difference(Aspect.RATE, topic, *_rates(virtual, wall, before, after))
+            yield ClockDifference(Aspect.RATE, topic, *_rates(virtual, wall, before, after))
         elif min(len(before), len(after)) >= FEW:
             yield from _values(topic, before, after)
 
@@ -197,17 +197,17 @@ def _rates(virtual: _Window, wall: _Window, before: Sequence[Message], after: Se
     )
 
 
-def _values(topic: str, before: Sequence[Message], after: Sequence[Message]) -> Iterator[Difference]:
+def _values(topic: str, before: Sequence[Message], after: Sequence[Message]) -> Iterator[ClockDifference]:
     one, other = _columns(before), _columns(after)
     for path in sorted(one.keys() & other.keys()):
         first, second = one[path], other[path]
         if len(set(first)) == 1:
             odd = [value for value in second if not _alike(first[0], value)]
             if len(odd) > ODD_SHARE * len(second) + 1:
-                yield Difference(Aspect.VALUE, f"{topic} {path}", first[0], odd[0])
+                yield ClockDifference(Aspect.VALUE, f"{topic} {path}", first[0], odd[0])
                 return
         elif len(set(second)) == 1 and len(second) >= 2 * FEW and len(set(first[: len(second)])) > DECISIONS:
-            yield Difference(Aspect.CONSTANT, f"{topic} {path}", "", second[0])
+            yield ClockDifference(Aspect.CONSTANT, f"{topic} {path}", "", second[0])
             return
 
 
@@ -240,7 +240,7 @@ def _numbers(value: Mapping[str, object], above: str = "") -> list[tuple[str, fl
 # --- answers to stimuli ---
 
 
-def _answers(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+def _answers(virtual: _Window, wall: _Window) -> Iterator[ClockDifference]:
     inputs = sorted({d.topic for d in virtual.trace.of(Delivery)})
     outputs = sorted({m.topic for m in virtual.trace.messages()})
     for output in outputs if inputs else ():
@@ -249,7 +249,7 @@ def _answers(virtual: _Window, wall: _Window) -> Iterator[Difference]:
             pairs = _paired(_decided(virtual, given, output), _decided(wall, given, output))
             wrong = [(one, other) for one, other in pairs if not _alike(one, other)]
             if wrong:
-                yield Difference(Aspect.ANSWER, output, *wrong[0])
+                yield ClockDifference(Aspect.ANSWER, output, *wrong[0])
                 return
 
 
@@ -304,35 +304,35 @@ def _held(window: _Window, topic: str) -> list[tuple[int, int, Mapping[str, obje
 # --- services, logs, endpoints, ends ---
 
 
-def _exchanges(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+def _exchanges(virtual: _Window, wall: _Window) -> Iterator[ClockDifference]:
     for kind in (Request, Response):
         counts = [_sent(window, kind) for window in (virtual, wall)]
         for service in sorted(counts[0].keys() | counts[1].keys()):
             one, other = (count[service] for count in counts)
             if differ_in_count(one, other):
-                yield Difference(Aspect.CALLS, service, one, other)
+                yield ClockDifference(Aspect.CALLS, service, one, other)
 
 
 def _sent(window: _Window, kind: type[Request] | type[Response]) -> Counter[str]:
     return Counter(o.service for o in window.trace.of(kind) if o.sender == "student" and window.holds(o.t_ns))
 
 
-def _logs(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+def _logs(virtual: _Window, wall: _Window) -> Iterator[ClockDifference]:
     for process in sorted({r.process for r in (*virtual.trace.records(), *wall.trace.records())}):
         one, other = (sum(w.holds(r.t_ns) for r in w.trace.records(process)) for w in (virtual, wall))
         if differ_in_count(one, other):
-            yield Difference(Aspect.LOGS, process, one, other)
+            yield ClockDifference(Aspect.LOGS, process, one, other)
 
 
-def _endpoints(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+def _endpoints(virtual: _Window, wall: _Window) -> Iterator[ClockDifference]:
     early = [g for g in virtual.trace.graphs() if g.t_ns < virtual.stop_ns - EDGE_NS]
     lasting = {key for g in early for key in _keys(g)}
     ever = {key for g in virtual.trace.graphs() for key in _keys(g)}
     seen = {key for g in wall.trace.graphs() for key in _keys(g)}
     for kind, name, type_ in sorted(lasting - seen):
-        yield Difference(Aspect.ENDPOINT, f"the {kind} of {name} [{type_}]", "there", "not there")
+        yield ClockDifference(Aspect.ENDPOINT, f"the {kind} of {name} [{type_}]", "there", "not there")
     for kind, name, type_ in sorted(seen - ever):
-        yield Difference(Aspect.ENDPOINT, f"the {kind} of {name} [{type_}]", "not there", "there")
+        yield ClockDifference(Aspect.ENDPOINT, f"the {kind} of {name} [{type_}]", "not there", "there")
 
 
 def _keys(graph: GraphSnapshot) -> Iterator[tuple[str, str, str]]:
@@ -340,13 +340,13 @@ def _keys(graph: GraphSnapshot) -> Iterator[tuple[str, str, str]]:
     yield from ((s.kind, s.service, s.type) for s in graph.services)
 
 
-def _ends(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+def _ends(virtual: _Window, wall: _Window) -> Iterator[ClockDifference]:
     for process in sorted({f.process for w in (virtual, wall) for f in w.trace.faults()}):
         one, other = (_first(window, process) for window in (virtual, wall))
         if one is not None and one.t_ns < virtual.stop_ns - EDGE_NS and other is None:
-            yield Difference(Aspect.END, process, "failed", "kept running")
+            yield ClockDifference(Aspect.END, process, "failed", "kept running")
         elif other is not None and other.t_ns < wall.stop_ns and not faults_before_stop(virtual.trace, process):
-            yield Difference(Aspect.END, process, "kept running", "failed")
+            yield ClockDifference(Aspect.END, process, "kept running", "failed")
 
 
 def _first(window: _Window, process: str) -> Fault | None:

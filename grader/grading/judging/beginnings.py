@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
-from grader.grading.judging.agreement import Aspect, Difference
+from grader.grading.judging.agreement import Aspect, ClockDifference
 from grader.grading.judging.run_check import for_beginning, run_check
 from grader.grading.model.exercise import Criterion, Exercise
 from grader.runtime.model.dataclass import dataclass
@@ -38,7 +38,7 @@ class Comparison:
         unsure: Whether some criterion could not be judged in the second because the machine was too busy.
     """
 
-    lost: tuple[Difference, ...] = ()
+    lost: tuple[ClockDifference, ...] = ()
     unsure: bool = False
 
 
@@ -89,7 +89,7 @@ class BeginningJudge:
             for cut_ns in CUTS_NS
             if cut_ns < length_ns
         ]
-        lost: list[Difference] = []
+        lost: list[ClockDifference] = []
         unsure = False
         for whole, part in self._criteria:
             earned = self._credit(whole, first)
@@ -100,7 +100,7 @@ class BeginningJudge:
                 unsure = True
                 continue
             before, after = next((before, after) for before, after in judged if after is not None)
-            lost.append(Difference(Aspect.CRITERION, whole.title, _words(before), _words(after)))
+            lost.append(ClockDifference(Aspect.CRITERION, whole.title, _words(before), _words(after)))
         return Comparison(tuple(lost), unsure)
 
     def _judged(

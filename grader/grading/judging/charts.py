@@ -11,7 +11,7 @@ from grader.grading.judging.logs.outputs import printed_lines
 from grader.grading.judging.texts import clean
 from grader.grading.judging.values import Reading
 from grader.grading.judging.wording import listed, number, quote
-from grader.grading.model.chart import Band, Case, Chart, Level, Look, Moment, Panel, Point, Series, Tone
+from grader.grading.model.chart import Band, Chart, Level, Look, Panel, Point, Series, Stretch, Tone, VerticalLine
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import seconds, within
 from grader.runtime.model.trace import LogRecord, OutputLine, Request, Response, Trace
@@ -92,9 +92,9 @@ def compared_panels(
     return ((Panel(title, "", tuple(rows)), said),)
 
 
-def drawn_case(start_ns: int, stop_ns: int, label: str, tone: Tone = Tone.FAINT) -> Case:
+def drawn_case(start_ns: int, stop_ns: int, label: str, tone: Tone = Tone.FAINT) -> Stretch:
     """Return one of the cases that a check distinguishes, for `Drawing.cases`: a marked stretch of time."""
-    return Case(seconds(start_ns), seconds(stop_ns), label, tone)
+    return Stretch(seconds(start_ns), seconds(stop_ns), label, tone)
 
 
 @dataclass(slots=True)
@@ -176,16 +176,16 @@ _SAID_OF_MARKS = {
 _MOST_FAULTS, MOST_CASES = 5, 60
 
 
-def marked_moments(trace: Trace) -> list[Moment]:
+def marked_moments(trace: Trace) -> list[VerticalLine]:
     """Return when streams, servers and processes began and ended."""
     names = _SAID_OF_MARKS.items()
-    return [Moment(seconds(m.t_ns), f"{m.detail}{said}") for name, said in names for m in trace.marks(name)]
+    return [VerticalLine(seconds(m.t_ns), f"{m.detail}{said}") for name, said in names for m in trace.marks(name)]
 
 
-def time_chart(trace: Trace, id_: str, title: str, about: str, *panels: Panel, cases: Sequence[Case] = ()) -> Chart:
+def time_chart(trace: Trace, id_: str, title: str, about: str, *panels: Panel, cases: Sequence[Stretch] = ()) -> Chart:
     """Return a chart over time, with what began and ended in a trace, and its faults."""
     faults = [f for f in trace.faults() if f.t_ns <= trace.stop_ns]
     moments = marked_moments(trace)
-    moments += [Moment(seconds(f.t_ns), f.kind.value.replace("_", " "), Tone.BAD) for f in faults[:_MOST_FAULTS]]
+    moments += [VerticalLine(seconds(f.t_ns), f.kind.value.replace("_", " "), Tone.BAD) for f in faults[:_MOST_FAULTS]]
     shown, until_s = tuple(cases[:MOST_CASES]), seconds(trace.stop_ns)
     return Chart(id_, title, about, (), "time", "s", panels, tuple(moments), shown, until_s=until_s)

@@ -21,12 +21,12 @@ from grader.grading.model.chart import (
     Excerpt,
     Figure,
     GraphFigure,
-    Moment,
     Panel,
     Playback,
     SourceFile,
     Stage,
     Tone,
+    VerticalLine,
 )
 from grader.grading.model.exercise import Criterion, Exercise, Location, has, reads_sources
 from grader.grading.model.report import ExerciseReport
@@ -295,7 +295,7 @@ def timeline_chart(trace: Trace, processes: Sequence[str]) -> Chart:
         lanes.dots("fault", faults, Tone.BAD)
     about = _about(trace, processes)
     chart = time_chart(trace, "timeline", "Logs and faults over time", about, lanes.panel())
-    return replace(chart, moments=(*marked_moments(trace), Moment(seconds(trace.stop_ns), "end")))
+    return replace(chart, moments=(*marked_moments(trace), VerticalLine(seconds(trace.stop_ns), "end")))
 
 
 def _about(trace: Trace, processes: Sequence[str]) -> str:

@@ -35,7 +35,7 @@ from grader.grading.judging.values import (
     value_at,
 )
 from grader.grading.judging.wording import in_unit, listed, number, quote
-from grader.grading.model.chart import Band, Case, Chart, Level, Look, Panel, Series, Tone
+from grader.grading.model.chart import Band, Chart, Level, Look, Panel, Series, Stretch, Tone
 from grader.grading.model.exercise import NODE_GRAPH, has, named, roles_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
@@ -117,7 +117,7 @@ class Drawing:
     action: str = ""
     panels: tuple[tuple[Panel, str], ...] = ()
     processes: tuple[str, ...] = ()
-    cases: tuple[Case, ...] = ()
+    cases: tuple[Stretch, ...] = ()
     title: str = ""
 
 
@@ -211,9 +211,9 @@ def _title(came: Sequence[str], went: Sequence[str], asked: Sequence[str], proce
     return text[:1].upper() + text[1:]
 
 
-def _joined(cases: Sequence[Case]) -> list[Case]:
+def _joined(cases: Sequence[Stretch]) -> list[Stretch]:
     """Return the cases with neighbours of the same kind as one."""
-    joined: list[Case] = []
+    joined: list[Stretch] = []
     for case in cases:
         last = joined[-1] if joined else None
         if last and (last.label, last.tone) == (case.label, case.tone) and last.stop >= case.start:
@@ -223,7 +223,7 @@ def _joined(cases: Sequence[Case]) -> list[Case]:
     return joined
 
 
-def _cases_said(cases: Sequence[Case]) -> str:
+def _cases_said(cases: Sequence[Stretch]) -> str:
     if not cases:
         return ""
     said = [f"{quote(c.label, _TEXT_LENGTH)} from {c.start:.1f} s to {c.stop:.1f} s" for c in cases[:8]]
@@ -523,7 +523,7 @@ def delay_panel(what: str, lasted: Sequence[tuple[int, int]], within_ns: int | N
     return Panel(f"time to the {what}", unit, (dots,), levels=(level,)), said
 
 
-def _action_panels(trace: Trace, action: str) -> tuple[_Panels, list[Case]]:
+def _action_panels(trace: Trace, action: str) -> tuple[_Panels, list[Stretch]]:
     """Return what was sent to an action's server and what came from it, and each goal as a case."""
     goals = calls_of(trace, f"{action}/_action/send_goal", "grader")
     if not goals:
@@ -553,7 +553,7 @@ def _action_panels(trace: Trace, action: str) -> tuple[_Panels, list[Case]]:
     return [(lanes.panel(action), said), *numbers], _goal_cases(trace, goals, results)
 
 
-def _goal_cases(trace: Trace, goals: Sequence[Call], results: Sequence[Call]) -> list[Case]:
+def _goal_cases(trace: Trace, goals: Sequence[Call], results: Sequence[Call]) -> list[Stretch]:
     ends = {str(_uuid(r.request.value)): r.response for r in results if r.response}
     cases = []
     for place, goal in enumerate(goals, 1):

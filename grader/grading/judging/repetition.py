@@ -10,7 +10,7 @@ from itertools import zip_longest
 
 from grader.grading.judging.source import Source, argument, read, text_of
 from grader.grading.model.exercise import Location
-from grader.grading.model.verification import Cause, Difference, Fact, Kind
+from grader.grading.model.verification import Cause, Difference, DifferenceKind, RecordingFact
 from grader.runtime.model.trace import Fault, GraphSnapshot, LogRecord, Observation, OutputLine, Trace
 
 #: What can be compared by `==` and hashed.
@@ -55,7 +55,9 @@ def first_difference(first: Trace, other: Trace, sources: Mapping[str, str]) -> 
         sources: Wanted file name -> its text, to find lines and causes.
     """
     if is_comparable(first) != is_comparable(other):
-        return Difference(Kind.CLOCK, 0, Fact("clock", _clock(first)), Fact("clock", _clock(other)))
+        return Difference(
+            DifferenceKind.CLOCK, 0, RecordingFact("clock", _clock(first)), RecordingFact("clock", _clock(other))
+        )
     if not is_comparable(first):
         return None
     found = _first_event(events(first), events(other), {name: read(name, text) for name, text in sources.items()})
@@ -63,23 +65,23 @@ def first_difference(first: Trace, other: Trace, sources: Mapping[str, str]) -> 
         return found
     for kind, name, value in _FACTS:
         if value(first) != value(other):
-            sides = Fact(name, _shortened(value(first))), Fact(name, _shortened(value(other)))
+            sides = RecordingFact(name, _shortened(value(first))), RecordingFact(name, _shortened(value(other)))
             return Difference(kind, 0, sides[0], sides[1])
     return _first_snapshot(first.graphs(), other.graphs())
 
 
 #: What belongs to a recording besides its events. Notes tell what the grader met with, and suspicions only what it saw;
 #: files that a program wrote are lost if it does not report them in time when it is told to stop.
-_FACTS: tuple[tuple[Kind, str, Callable[[Trace], object]], ...] = (
-    (Kind.TIME, "end", lambda trace: trace.stop_ns),
-    (Kind.CONTENT, "starts", lambda trace: trace.starts),
-    (Kind.CONTENT, "left out", lambda trace: trace.left_out),
-    (Kind.CONTENT, "not started", lambda trace: trace.unstarted),
-    (Kind.CONTENT, "newer Python", lambda trace: trace.newer),
-    (Kind.CONTENT, "result of the test", lambda trace: trace.tested),
-    (Kind.GRADER, "written files", lambda trace: trace.written),
-    (Kind.GRADER, "notes", lambda trace: trace.notes),
-    (Kind.GRADER, "suspicious actions", lambda trace: trace.reached),
+_FACTS: tuple[tuple[DifferenceKind, str, Callable[[Trace], object]], ...] = (
+    (DifferenceKind.TIME, "end", lambda trace: trace.stop_ns),
+    (DifferenceKind.CONTENT, "starts", lambda trace: trace.starts),
+    (DifferenceKind.CONTENT, "left out", lambda trace: trace.left_out),
+    (DifferenceKind.CONTENT, "not started", lambda trace: trace.unstarted),
+    (DifferenceKind.CONTENT, "newer Python", lambda trace: trace.newer),
+    (DifferenceKind.CONTENT, "result of the test", lambda trace: trace.tested),
+    (DifferenceKind.GRADER, "written files", lambda trace: trace.written),
+    (DifferenceKind.GRADER, "notes", lambda trace: trace.notes),
+    (DifferenceKind.GRADER, "suspicious actions", lambda trace: trace.reached),
 )
 
 
@@ -107,7 +109,7 @@ def _first_event(
 def _first_snapshot(first: Sequence[GraphSnapshot], other: Sequence[GraphSnapshot]) -> Difference | None:
     for index, (one, two) in enumerate(zip_longest(first, other)):
         if one != two:
-            return Difference(Kind.GRADER, index + 1, one, two)
+            return Difference(DifferenceKind.GRADER, index + 1, one, two)
     return None
 
 
@@ -126,16 +128,20 @@ def _what(observation: Observation) -> _Key:
     return (type(observation).__name__, *fields.values(), *told)
 
 
-def _kind(first: Sequence[Observation], other: Sequence[Observation], index: int) -> Kind:
+def _kind(first: Sequence[Observation], other: Sequence[Observation], index: int) -> DifferenceKind:
     """Return the kind of the first difference, which is at an index."""
     rest, others = first[index:], other[index:]
     if not rest or not others:
-        return Kind.CONTENT
+        return DifferenceKind.CONTENT
     if _what(rest[0]) == _what(others[0]):
-        return Kind.TIME
+        return DifferenceKind.TIME
     at_once = [Counter(map(_key, _at_instant(side))) for side in (rest, others)]
     swapped = _key(rest[0]) in at_once[1] and _key(others[0]) in at_once[0]
-    return Kind.ORDER if swapped or Counter(map(_what, rest)) == Counter(map(_what, others)) else Kind.CONTENT
+    return (
+        DifferenceKind.ORDER
+        if swapped or Counter(map(_what, rest)) == Counter(map(_what, others))
+        else DifferenceKind.CONTENT
+    )
 
 
 def _at_instant(rest: Sequence[Observation]) -> Iterator[Observation]:

@@ -62,7 +62,7 @@ class Level:
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class VerticalLine:
     """A vertical line through all panels."""
 
     x: float
@@ -71,7 +71,7 @@ class Moment:
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class Stretch:
     """A stretch of the horizontal axis behind all panels: one of the cases that a check distinguishes."""
 
     start: float
@@ -106,8 +106,8 @@ class Chart:
     x_title: str  # title of the horizontal axis
     x_unit: str  # its unit
     panels: tuple[Panel, ...]  # its panels, from the top
-    moments: tuple[Moment, ...] = ()  # lines through all panels
-    cases: tuple[Case, ...] = ()  # stretches behind all panels
+    moments: tuple[VerticalLine, ...] = ()  # lines through all panels
+    cases: tuple[Stretch, ...] = ()  # stretches behind all panels
     square: bool = False  # whether both axes have the same scale
     scenario: str = ""  # the recording that it shows; empty if it shows none
     until_s: float | None = None  # when that recording ended, in seconds; None if the horizontal axis is not time

@@ -26,7 +26,7 @@ CLOCKS, SANDBOXES = ("virtual", "wall", "auto"), ("auto", *TIERS)
 _AS_IN_GRADE = "As in `grade`."
 
 
-class Kind(Enum):
+class OptionKind(Enum):
     """What an option is given, and how it is written."""
 
     TEXT = auto()
@@ -55,7 +55,7 @@ class Option:
 
     flag: str
     help: str
-    kind: Kind = Kind.TEXT
+    kind: OptionKind = OptionKind.TEXT
     metavar: str = ""
     choices: tuple[str, ...] = ()
     # Each command that has it -> its help there; empty for the usual one
@@ -81,7 +81,7 @@ class GradingOptions:
         (),
         "--exercise",
         "Grade only this exercise, named by its id, number or file; repeatable.",
-        kind=Kind.EXERCISE,
+        kind=OptionKind.EXERCISE,
         metavar="ID",
         commands={
             GRADE: "",
@@ -94,7 +94,7 @@ class GradingOptions:
         False,  # noqa: FBT003
         "--all",
         "Grade every exercise and project for which there is a file.",
-        kind=Kind.FLAG,
+        kind=OptionKind.FLAG,
         commands={GRADE: "", BATCH: "Grade every exercise and project for which a student has a file."},
         keyed=Keyed.RESULT,
     )
@@ -102,14 +102,14 @@ class GradingOptions:
         (),
         "--rubric",
         "Use this rubric; repeatable.",
-        kind=Kind.RUBRIC,
+        kind=OptionKind.RUBRIC,
         commands={GRADE: "", BATCH: "", VERIFY: ""},
     )
     seed: int | None = _row(  # of all drawn values; None derives it from the submission and a seed key
         None,
         "--seed",
         "Draw values from N, as a report names it.",
-        kind=Kind.COUNT,
+        kind=OptionKind.COUNT,
         metavar="N",
         commands={GRADE: "", BATCH: "Draw everybody's values from N.", VERIFY: ""},
         keyed=Keyed.RECORDING,
@@ -126,7 +126,7 @@ class GradingOptions:
         None,
         "--variant-key",
         "The course key that rubrics draw variants from.",
-        kind=Kind.PATH,
+        kind=OptionKind.PATH,
         metavar="FILE",
         commands={GRADE: "", BATCH: "The course key; the roster says which variant each student has.", VERIFY: ""},
         kept=True,
@@ -136,7 +136,7 @@ class GradingOptions:
         (),
         "--recording",
         "Play this recording on a topic, or on all topics of a message type, instead of the rubric's; repeatable.",
-        kind=Kind.BAG,
+        kind=OptionKind.BAG,
         metavar="TOPIC=BAG",
         commands={GRADE: "", BATCH: "", VERIFY: "", OBSERVE: ""},
         kept=True,
@@ -145,7 +145,7 @@ class GradingOptions:
         (),
         "--interfaces",
         "Build the interface packages (msg, srv, action) in this folder for the nodes; repeatable.",
-        kind=Kind.PATH,
+        kind=OptionKind.PATH,
         metavar="FOLDER",
         commands={GRADE: "", BATCH: "", VERIFY: "", OBSERVE: ""},
         kept=True,
@@ -154,7 +154,7 @@ class GradingOptions:
         "auto",
         "--clock",
         "The clock of the student's nodes; auto: virtual, or wall where virtual time does not work.",
-        kind=Kind.CHOICE,
+        kind=OptionKind.CHOICE,
         choices=CLOCKS,
         commands={GRADE: "", BATCH: _AS_IN_GRADE, OBSERVE: _AS_IN_GRADE},
         kept=True,
@@ -164,7 +164,7 @@ class GradingOptions:
         "auto",
         "--isolation",
         "auto: the strongest sandbox that holds here; none: run the student's code without one.",
-        kind=Kind.CHOICE,
+        kind=OptionKind.CHOICE,
         choices=SANDBOXES,
         commands={GRADE: "", BATCH: _AS_IN_GRADE, VERIFY: "", OBSERVE: _AS_IN_GRADE},
         environment=ISOLATION,
@@ -176,7 +176,7 @@ class GradingOptions:
         TIME_BUDGET_S,
         "--time-budget",
         "Limit of real time for all recordings of one submission; criteria left by then are not met.",
-        kind=Kind.SECONDS,
+        kind=OptionKind.SECONDS,
         metavar="SECONDS",
         shows_default=True,
         keyed=Keyed.RECORDING,
@@ -185,7 +185,7 @@ class GradingOptions:
         0.0,
         "--spot-checks",
         "Share of submissions to check on the wall clock too, drawn at random.",
-        kind=Kind.SHARE,
+        kind=OptionKind.SHARE,
         metavar="P%",
         commands={
             GRADE: "",
@@ -221,13 +221,13 @@ def option_words(options: GradingOptions) -> Iterator[str]:
 
 
 def _written(row: Option, value: Any) -> tuple[str, ...]:
-    if row.kind is Kind.FLAG:
+    if row.kind is OptionKind.FLAG:
         return (row.flag,)
-    if row.kind is Kind.SHARE:
+    if row.kind is OptionKind.SHARE:
         return row.flag, percent(value)
-    if row.kind is Kind.SECONDS:
+    if row.kind is OptionKind.SECONDS:
         return row.flag, f"{value:g}"
-    if row.kind is Kind.BAG:
+    if row.kind is OptionKind.BAG:
         name, path = value
         return ("--odom-bag", str(path)) if name == ODOMETRY else (row.flag, f"{name}={path}")
     return row.flag, str(value)
@@ -249,7 +249,7 @@ def options_to_json(options: GradingOptions) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, row, each in kept:
         value = getattr(options, name)
-        if row.kind is Kind.BAG:
+        if row.kind is OptionKind.BAG:
             bags = {key: str(path) for key, path in value}
             found["odom_bag"] = bags.pop(ODOMETRY, None)
             found |= {"recordings": bags} if bags else {}
@@ -268,7 +268,7 @@ def options_of_json(data: Mapping[str, Any], options: _Options) -> _Options:
     """Return the options with what evidence has kept of them; its values are those of some file, and converted."""
     given: dict[str, Any] = {}
     for name, row, each in rows(options):
-        if row.kind is Kind.BAG:
+        if row.kind is OptionKind.BAG:
             bag = data.get("odom_bag")
             bags = {**({ODOMETRY: bag} if bag is not None else {}), **data.get("recordings", {})}
             given[name] = tuple((str(key), Path(str(path))) for key, path in bags.items())
@@ -280,11 +280,13 @@ def options_of_json(data: Mapping[str, Any], options: _Options) -> _Options:
 
 
 def _converter(row: Option, default: object) -> Callable[[Any], Any]:
-    if row.kind in (Kind.PATH, Kind.RUBRIC):
+    if row.kind in (OptionKind.PATH, OptionKind.RUBRIC):
         return lambda value: Path(str(value))
-    if row.kind in (Kind.SECONDS, Kind.SHARE):
+    if row.kind in (OptionKind.SECONDS, OptionKind.SHARE):
         return float
-    return {Kind.COUNT: int, Kind.FLAG: bool}.get(row.kind, type(default) if isinstance(default, str) else str)
+    return {OptionKind.COUNT: int, OptionKind.FLAG: bool}.get(
+        row.kind, type(default) if isinstance(default, str) else str
+    )
 
 
 def key_values(options: GradingOptions, *, recordings: bool = False) -> dict[str, object]:
@@ -298,9 +300,9 @@ def with_paths(options: _Options, changed: Callable[[Path], Path]) -> _Options:
     given: dict[str, Any] = {}
     for name, row, _ in rows(options):
         value = getattr(options, name)
-        if row.kind is Kind.BAG:
+        if row.kind is OptionKind.BAG:
             given[name] = tuple((key, changed(path)) for key, path in value)
-        elif row.kind in (Kind.PATH, Kind.RUBRIC):
+        elif row.kind in (OptionKind.PATH, OptionKind.RUBRIC):
             given[name] = tuple(map(changed, value)) if isinstance(value, tuple) else value and changed(value)
     return replace(options, **given)
 

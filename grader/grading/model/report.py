@@ -248,7 +248,7 @@ class Summary:
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class CheckParameter:
     """One parameter of a check."""
 
     name: str  # as in rubrics
@@ -264,7 +264,7 @@ class CheckExplanation:
     name: str  # as in rubrics
     asks: str  # what it asks, in one sentence or two
     details: str  # how it measures that; may be empty
-    parameters: tuple[Parameter, ...]  # in order, with their defaults
+    parameters: tuple[CheckParameter, ...]  # in order, with their defaults
     used_by: tuple[str, ...]  # criteria that ask it, as `exercise/criterion`
 
 
@@ -308,7 +308,7 @@ class CriterionExplanation:
     check: str
     asks: str  # what the check asks
     details: str  # how the check measures that
-    parameters: tuple[Parameter, ...]  # with the values of the rubric
+    parameters: tuple[CheckParameter, ...]  # with the values of the rubric
 
 
 def exit_code(report: Report, min_score: Fraction | None) -> int:

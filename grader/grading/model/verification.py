@@ -9,7 +9,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.trace import Observation
 
 
-class Kind(str, Enum):
+class DifferenceKind(str, Enum):
     """In what two recordings of the same programs differ first."""
 
     TIME = "time"  # the same event at another time
@@ -28,7 +28,7 @@ class Cause(str, Enum):
     UNKNOWN = ""
 
 
-class State(str, Enum):
+class ConditionState(str, Enum):
     """What became of one condition."""
 
     SAME = "same"  # each compared scenario is the same, event by event
@@ -38,7 +38,7 @@ class State(str, Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Fact:
+class RecordingFact:
     """What belongs to a recording as a whole."""
 
     name: str  # such as `notes`
@@ -53,10 +53,10 @@ class Difference:
     that creates the publisher; 0 if it is not known.
     """
 
-    kind: Kind
+    kind: DifferenceKind
     number: int  # number of the event in the first recording, from 1; 0 for a fact
-    first: Observation | Fact | None  # what the first recording has
-    other: Observation | Fact | None  # what the recording under the condition has
+    first: Observation | RecordingFact | None  # what the first recording has
+    other: Observation | RecordingFact | None  # what the recording under the condition has
     process: str = ""  # file name of the process; empty if it is not known
     file: str = ""
     line: int = 0
@@ -78,14 +78,14 @@ class Tried:
 
     name: str  # such as `order`, as `--condition` takes it
     words: str  # what is different under it, as a phrase
-    state: State
+    state: ConditionState
     why: str = ""  # why it was not tried, or what failed; empty otherwise
     compared: int = 0  # how many scenarios were compared
     different: tuple[tuple[Place, Difference], ...] = ()  # the first difference of each scenario that differs
 
 
 @dataclass(frozen=True, slots=True)
-class LeftOut:
+class LeftOutScenario:
     """A scenario that is not comparable event by event, because the wall clock decides it."""
 
     place: Place
@@ -102,14 +102,14 @@ class Verification:
     scenarios: int  # how many scenarios the first recording has
     events: int  # how many events it has that are compared
     tried: tuple[Tried, ...]  # in the order in which they were tried
-    left_out: tuple[LeftOut, ...] = ()
+    left_out: tuple[LeftOutScenario, ...] = ()
     problems: tuple[str, ...] = field(default=())  # why a part of the first recording cannot be compared, as sentences
 
     @property
-    def state(self) -> State:
+    def state(self) -> ConditionState:
         """The result: different if anything differs, failed if nothing could be compared or a part failed."""
         states = {one.state for one in self.tried}
-        if State.DIFFERENT in states:
-            return State.DIFFERENT
-        failed = State.FAILED in states or bool(self.problems) or not any(one.compared for one in self.tried)
-        return State.FAILED if failed else State.SAME
+        if ConditionState.DIFFERENT in states:
+            return ConditionState.DIFFERENT
+        failed = ConditionState.FAILED in states or bool(self.problems) or not any(one.compared for one in self.tried)
+        return ConditionState.FAILED if failed else ConditionState.SAME

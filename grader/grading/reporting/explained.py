@@ -8,7 +8,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
 from grader.grading.model.exercise import Exercise, Variant, written
-from grader.grading.model.report import CheckExplanation, CriterionExplanation, Parameter, RuleExplanation, RuleTrial
+from grader.grading.model.report import (
+    CheckExplanation,
+    CheckParameter,
+    CriterionExplanation,
+    RuleExplanation,
+    RuleTrial,
+)
 from grader.grading.reporting.escape import json_value, markdown, markdown_code, shown
 
 EXPLANATION_SCHEMA = "grader/explanation/v1"
@@ -119,7 +125,7 @@ def _check(e: CheckExplanation, width: int) -> Iterator[str]:
     yield from _row("used by", ", ".join(e.used_by) or "no criterion here", width)
 
 
-def _parameters(parameters: Sequence[Parameter], width: int) -> Iterator[str]:
+def _parameters(parameters: Sequence[CheckParameter], width: int) -> Iterator[str]:
     given = [f"{p.name}: {shown(p.value) or ('(to be given)' if p.required else '')}" for p in parameters]
     column = min(max(map(len, given), default=0), _VALUE) + 2
     if parameters:

@@ -40,7 +40,7 @@ def draw_graph(graph: GraphSnapshot, *, width: int) -> list[str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class PossibleCall:
     """A client, and a server that it may call; either is `(nobody)` if there is none."""
 
     kind: str  # `service` or `action`
@@ -50,20 +50,20 @@ class Call:
     quarrel: str = ""  # what keeps calls from passing
 
 
-def call_edges(graph: GraphSnapshot) -> list[Call]:
+def call_edges(graph: GraphSnapshot) -> list[PossibleCall]:
     """Return every client of a service or action with each server that it may call or with nobody."""
     ends = [(kind, name, end) for end in graph.services for kind, name in _offered(end.service)]
     clients = [(kind, name, end) for kind, name, end in ends if end.kind == "client"]
     servers = [(kind, name, end) for kind, name, end in ends if end.kind == "service"]
     found = [
-        Call(kind, client.node, name, server.node, _policies_of(client, server))
+        PossibleCall(kind, client.node, name, server.node, _policies_of(client, server))
         for kind, name, client in clients
         for _, _, server in servers
         if (client.service, client.type) == (server.service, server.type)
     ]
     called, calling = {(c.name, c.server) for c in found}, {(c.client, c.name) for c in found}
-    found += [Call(kind, c.node, name, NOBODY) for kind, name, c in clients if (c.node, name) not in calling]
-    found += [Call(kind, NOBODY, name, s.node) for kind, name, s in servers if (name, s.node) not in called]
+    found += [PossibleCall(kind, c.node, name, NOBODY) for kind, name, c in clients if (c.node, name) not in calling]
+    found += [PossibleCall(kind, NOBODY, name, s.node) for kind, name, s in servers if (name, s.node) not in called]
     return list(dict.fromkeys(found))
 
 
@@ -86,7 +86,7 @@ def _offered(service: str) -> Iterator[tuple[str, str]]:
 _ARROWS = {"service": "{} ┄┄{}┄┄▶ {}", "action": "{} ══{}══▶ {}"}
 
 
-def _called(call: Call) -> list[str]:
+def _called(call: PossibleCall) -> list[str]:
     names = (shown(part, limit=_NAME_LIMIT) for part in (call.client, call.name, call.server))
     return [_ARROWS[call.kind].format(*names), *([f"  {call.quarrel}"] if call.quarrel else [])]
 
@@ -183,7 +183,7 @@ class _Drawing:
         if target != NOBODY:
             yield f"{topic} {_arrow(quarrel)} {self.node(target)}"
 
-    def call(self, call: Call) -> Iterator[str]:
+    def call(self, call: PossibleCall) -> Iterator[str]:
         """Yield the arrows from the client to the service or action and on to the server."""
         box = self._box(call.kind, call.name, '{{"', '"}}')
         if call.client != NOBODY:

@@ -10,7 +10,17 @@ from itertools import zip_longest
 from rich.text import Text
 
 from grader.grading.model.report import JsonObject
-from grader.grading.model.verification import Cause, Difference, Fact, Kind, LeftOut, Place, State, Tried, Verification
+from grader.grading.model.verification import (
+    Cause,
+    ConditionState,
+    Difference,
+    DifferenceKind,
+    LeftOutScenario,
+    Place,
+    RecordingFact,
+    Tried,
+    Verification,
+)
 from grader.grading.reporting.escape import json_value, shown
 from grader.grading.reporting.page import Page
 from grader.runtime.model.quantities import NS_PER_S, counted
@@ -29,24 +39,24 @@ from grader.runtime.model.trace import (
 )
 
 SCHEMA = "grader/verification/v1"
-_WORDS: Mapping[State, str] = {
-    State.SAME: "same",
-    State.DIFFERENT: "DIFFERENT",
-    State.NOT_TRIED: "not tried",
-    State.FAILED: "FAILED",
+_WORDS: Mapping[ConditionState, str] = {
+    ConditionState.SAME: "same",
+    ConditionState.DIFFERENT: "DIFFERENT",
+    ConditionState.NOT_TRIED: "not tried",
+    ConditionState.FAILED: "FAILED",
 }
-_STYLES: Mapping[State, str] = {
-    State.SAME: "green",
-    State.DIFFERENT: "bold red",
-    State.NOT_TRIED: "dim",
-    State.FAILED: "yellow",
+_STYLES: Mapping[ConditionState, str] = {
+    ConditionState.SAME: "green",
+    ConditionState.DIFFERENT: "bold red",
+    ConditionState.NOT_TRIED: "dim",
+    ConditionState.FAILED: "yellow",
 }
-_KINDS: Mapping[Kind, str] = {
-    Kind.TIME: "time: the same event at another moment",
-    Kind.ORDER: "order: the same events, one before the other",
-    Kind.CONTENT: "content: another event",
-    Kind.CLOCK: "clock: virtual time works for the programs in one recording only",
-    Kind.GRADER: "only what the grader saw: the programs did the same",
+_KINDS: Mapping[DifferenceKind, str] = {
+    DifferenceKind.TIME: "time: the same event at another moment",
+    DifferenceKind.ORDER: "order: the same events, one before the other",
+    DifferenceKind.CONTENT: "content: another event",
+    DifferenceKind.CLOCK: "clock: virtual time works for the programs in one recording only",
+    DifferenceKind.GRADER: "only what the grader saw: the programs did the same",
 }
 _COLUMN = max(map(len, _WORDS.values())) + 2
 #: Longest text of an event, in characters; of a longer one, what surrounds the first difference is shown.
@@ -63,7 +73,10 @@ def render_verification(verification: Verification, *, width: int, colour: bool)
     for one in verification.tried:
         page.put(_line(one), prefix=Text(f"  {_WORDS[one.state]:{_COLUMN}}", style=_STYLES[one.state]))
     for problem in verification.problems:
-        page.put(shown(problem), prefix=Text(f"  {_WORDS[State.FAILED]:{_COLUMN}}", style=_STYLES[State.FAILED]))
+        page.put(
+            shown(problem),
+            prefix=Text(f"  {_WORDS[ConditionState.FAILED]:{_COLUMN}}", style=_STYLES[ConditionState.FAILED]),
+        )
     if verification.left_out:
         page.blank()
         page.put("Not comparable event by event, because the wall clock decides:")
@@ -87,7 +100,7 @@ def _head(verification: Verification) -> str:
 
 
 def _line(one: Tried) -> str:
-    if one.state is State.DIFFERENT:
+    if one.state is ConditionState.DIFFERENT:
         return f"{one.words}: {len(one.different)} of {counted(one.compared, 'scenario')}"
     return f"{one.words}: {shown(one.why)}" if one.why else one.words
 
@@ -144,10 +157,10 @@ def _cut(text: str, start: int) -> str:
     return f"{'...' if start else ''}{piece}{'...' if start + _LONGEST < len(text) else ''}"
 
 
-def _words(event: Observation | Fact | None) -> str:
+def _words(event: Observation | RecordingFact | None) -> str:
     if event is None:
         return "nothing more"
-    if isinstance(event, Fact):
+    if isinstance(event, RecordingFact):
         return shown(event.text, limit=10 * _LONGEST)
     return f"{_time(event.t_ns)}  {shown(_content(event), limit=10 * _LONGEST)}"
 
@@ -187,13 +200,13 @@ def _fields(value: Mapping[str, object]) -> str:
 
 def advice(verification: Verification, difference: Difference) -> str:
     """Return one thing to do about a difference."""
-    if difference.kind is Kind.GRADER:
+    if difference.kind is DifferenceKind.GRADER:
         return "report it with the output of --json: no program caused it"
-    if difference.kind is Kind.CLOCK:
+    if difference.kind is DifferenceKind.CLOCK:
         return "the work of the programs is at the limit of virtual time: make it shorter, or grade with --clock wall"
     if difference.cause is not Cause.UNKNOWN:
         return _CAUSES[difference.cause]
-    changed_nothing = any(one.name == "again" and one.state is State.SAME for one in verification.tried)
+    changed_nothing = any(one.name == "again" and one.state is ConditionState.SAME for one in verification.tried)
     if changed_nothing:
         return "report it with the output of --json: nothing differs without this condition, and it must not matter"
     what = f"what {shown(difference.file)}:{difference.line} shows" if difference.line else "the values that differ"
@@ -209,11 +222,11 @@ _CAUSES: Mapping[Cause, str] = {
 
 
 def _conclusion(verification: Verification) -> str:
-    tried = [one for one in verification.tried if one.state in (State.SAME, State.DIFFERENT)]
-    if verification.state is State.DIFFERENT:
-        differing = [one for one in tried if one.state is State.DIFFERENT]
+    tried = [one for one in verification.tried if one.state in (ConditionState.SAME, ConditionState.DIFFERENT)]
+    if verification.state is ConditionState.DIFFERENT:
+        differing = [one for one in tried if one.state is ConditionState.DIFFERENT]
         return f"different: under {len(differing)} of {counted(len(tried), 'condition')}"
-    if verification.state is State.SAME:
+    if verification.state is ConditionState.SAME:
         return f"the same under {counted(len(tried), 'condition')}"
     return "not verified: see above what could not be compared"
 
@@ -238,7 +251,7 @@ def verification_to_json(verification: Verification) -> str:
 
 
 def _results(verification: Verification) -> str:
-    return {State.SAME: "equal", State.DIFFERENT: "different"}.get(verification.state, "not_verified")
+    return {ConditionState.SAME: "equal", ConditionState.DIFFERENT: "different"}.get(verification.state, "not_verified")
 
 
 def _tried(one: Tried) -> JsonObject:
@@ -265,7 +278,7 @@ def _difference(found: Difference) -> JsonObject:
     }
 
 
-def _event(event: Observation | Fact | None) -> JsonObject | None:
+def _event(event: Observation | RecordingFact | None) -> JsonObject | None:
     if event is None:
         return None
     data = asdict(event)
@@ -274,5 +287,5 @@ def _event(event: Observation | Fact | None) -> JsonObject | None:
     return {"is": "graph" if isinstance(event, GraphSnapshot) else type(event).__name__.lower(), **data}
 
 
-def _left_out(one: LeftOut) -> JsonObject:
+def _left_out(one: LeftOutScenario) -> JsonObject:
     return {**asdict(one.place), "why": one.why}

@@ -26,7 +26,7 @@ from .shadows import ROS_PARTS, Around
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
-from .written import Written, flush_open_files
+from .written import WrittenFiles, flush_open_files
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -128,7 +128,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     home = os.environ.get("HOME", "")
     kept = tuple(os.path.join(home, name) for name in ("log", ".cache", ".config"))
     # Where a program runs in place, whoever started it finds its files there, among as many others as there may be.
-    written = Written(() if request["in_place"] else (request["root"], os.getcwd(), home), kept)
+    written = WrittenFiles(() if request["in_place"] else (request["root"], os.getcwd(), home), kept)
     ending = play(request, describer, link, install_ros)
     try:
         ending |= clean_up(request["root"], time, watchdog)

@@ -15,7 +15,7 @@ from typing import Any
 FILES, FILE_BYTES, ALL_BYTES, ENTRIES = 20, 64 << 10, 256 << 10, 2_000
 
 
-class Written:
+class WrittenFiles:
     """Compares the files in the folders that a program writes to with those that were there before.
 
     Args:

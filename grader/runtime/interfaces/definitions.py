@@ -65,7 +65,7 @@ class DefinitionError(GraderError):
 
 
 @dataclass(frozen=True)
-class Definition:
+class DefinitionFile:
     """One file: its kind (`msg`, `srv` or `action`), the name of the type, and the text."""
 
     kind: str
@@ -78,7 +78,7 @@ class InterfacePackage:
     """A package of definitions, in the order of their kinds and names."""
 
     name: str
-    definitions: tuple[Definition, ...]
+    definitions: tuple[DefinitionFile, ...]
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ Value = bool | int | float | str
 
 
 @dataclass(frozen=True)
-class Member:
+class FieldOrConstant:
     """A field with its default value, or a constant with its value."""
 
     type: FieldType
@@ -120,8 +120,8 @@ class Member:
 class Section:
     """A message, or one of the parts of a service or action."""
 
-    fields: tuple[Member, ...]
-    constants: tuple[Member, ...]
+    fields: tuple[FieldOrConstant, ...]
+    constants: tuple[FieldOrConstant, ...]
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class Interface:
     """A definition that has been read: one section for a message, two for a service, three for an action."""
 
     package: str
-    definition: Definition
+    definition: DefinitionFile
     sections: tuple[Section, ...]
 
     @property
@@ -142,13 +142,13 @@ class Interface:
         """The file in the package."""
         return _file(self.definition)
 
-    def members(self) -> Iterator[Member]:
+    def members(self) -> Iterator[FieldOrConstant]:
         """All fields, of all sections."""
         for section in self.sections:
             yield from section.fields
 
 
-def _file(definition: Definition) -> str:
+def _file(definition: DefinitionFile) -> str:
     return f"{definition.kind}/{definition.name}.{definition.kind}"
 
 
@@ -221,7 +221,7 @@ def _package_name(home: Path) -> str:
     return name
 
 
-def _definitions(home: Path, root: Path) -> Iterator[Definition]:
+def _definitions(home: Path, root: Path) -> Iterator[DefinitionFile]:
     for kind in KINDS:
         for path in sorted((home / kind).glob(f"*.{kind}")):
             if not _is_inside(path, root):
@@ -235,7 +235,7 @@ def _definitions(home: Path, root: Path) -> Iterator[Definition]:
                 raise DefinitionError(
                     home.name, f"{kind}/{path.name}", 0, "it is not UTF-8", "save it as UTF-8"
                 ) from None
-            yield Definition(kind, path.stem, text)
+            yield DefinitionFile(kind, path.stem, text)
 
 
 def digest(packages: Collection[InterfacePackage]) -> str:
@@ -279,7 +279,7 @@ def read(packages: Collection[InterfacePackage], installed: Collection[str]) -> 
     return interfaces
 
 
-def _unknown_type(interface: Interface, member: Member, known: Collection[str]) -> DefinitionError:
+def _unknown_type(interface: Interface, member: FieldOrConstant, known: Collection[str]) -> DefinitionError:
     messages = [name for name in known if "/msg/" in name]
     near = difflib.get_close_matches(member.type.base, messages, n=1, cutoff=0.75)
     local = member.type.base.startswith(f"{interface.package}/")
@@ -323,7 +323,7 @@ def _check_sizes(own: dict[str, Interface]) -> None:
         size(interface)
 
 
-def read_definition(package: str, definition: Definition) -> Interface:
+def read_definition(package: str, definition: DefinitionFile) -> Interface:
     """Read one definition; types of other files are not looked up. Raises DefinitionError."""
     file = _file(definition)
     if not _TYPE_NAME.fullmatch(definition.name):
@@ -353,8 +353,8 @@ class _Reader:
         self._line = 0
 
     def section(self, lines: list[tuple[int, str]]) -> Section:
-        fields: dict[str, Member] = {}
-        constants: dict[str, Member] = {}
+        fields: dict[str, FieldOrConstant] = {}
+        constants: dict[str, FieldOrConstant] = {}
         for self._line, text in lines:
             if not text:
                 continue
@@ -402,7 +402,7 @@ class _Reader:
         fix = f"did you mean {usual or near[0]}?" if usual or near else _FIX_TYPE
         raise self._error(f"{base!r} is not a type", fix)
 
-    def _field(self, type_: FieldType, rest: str) -> Member:
+    def _field(self, type_: FieldType, rest: str) -> FieldOrConstant:
         name, _, default = rest.partition(" ")
         if not _PACKAGE_NAME.fullmatch(name):
             raise self._error(
@@ -410,9 +410,11 @@ class _Reader:
             )
         if keyword.iskeyword(name):
             raise self._error(f"{name!r} is a word of Python", "choose another name")
-        return Member(type_, name, self._default(type_, default.strip()) if default.strip() else None, self._line)
+        return FieldOrConstant(
+            type_, name, self._default(type_, default.strip()) if default.strip() else None, self._line
+        )
 
-    def _constant(self, type_: FieldType, rest: str) -> Member:
+    def _constant(self, type_: FieldType, rest: str) -> FieldOrConstant:
         name, _, value = rest.partition("=")
         name = name.rstrip()
         if not _CONSTANT_NAME.fullmatch(name):
@@ -421,7 +423,7 @@ class _Reader:
             )
         if not type_.primitive or type_.array or type_.string_bound:
             raise self._error("a constant cannot have this type", "use a number, a bool or a string")
-        return Member(type_, name, self._value(type_.base, value.strip(), None), self._line)
+        return FieldOrConstant(type_, name, self._value(type_.base, value.strip(), None), self._line)
 
     def _default(self, type_: FieldType, text: str) -> Value | tuple[Value, ...]:
         if not type_.primitive:

@@ -16,14 +16,21 @@ from pathlib import Path
 from typing import Any
 
 from grader.runtime.interfaces.build import build
-from grader.runtime.interfaces.definitions import Definition, DefinitionError, InterfacePackage, digest, find_packages
+from grader.runtime.interfaces.definitions import (
+    DefinitionError,
+    DefinitionFile,
+    InterfacePackage,
+    digest,
+    find_packages,
+)
 
 
 def main() -> None:
     """Build what the request on standard input asks for, and print the answer."""
     request = json.load(sys.stdin)
     others = [
-        InterfacePackage(name, tuple(Definition(*d) for d in definitions)) for name, definitions in request["others"]
+        InterfacePackage(name, tuple(DefinitionFile(*d) for d in definitions))
+        for name, definitions in request["others"]
     ]
     try:
         answer = answer_to(Path(request["submission"]), Path(request["into"]), others, request)

@@ -45,7 +45,7 @@ Define = Callable[[str], "str | None"]
 
 
 @dataclass(frozen=True, slots=True)
-class Least:
+class BagMinimum:
     """The fewest messages and the shortest time that a recording has to have."""
 
     messages: int = 1
@@ -53,7 +53,7 @@ class Least:
 
 
 def read_bag(
-    path: Path, topic: str, type_: str, *, least: Least | None = None, define: Define | None = None
+    path: Path, topic: str, type_: str, *, least: BagMinimum | None = None, define: Define | None = None
 ) -> Recording:
     """Read the messages of a topic, without writing any file next to the recording.
 
@@ -67,7 +67,7 @@ def read_bag(
     Raises:
         RecordingError: The recording is missing, unreadable, damaged or too short, or has no messages of the type.
     """
-    least = least or Least()
+    least = least or BagMinimum()
     source = _source(path)
     with _plainly_named(source) as plain:
         found, raw = _read(path, plain, topic, type_)

@@ -61,7 +61,7 @@ DEPTH = 8
 _ZERO: Mapping[str, Any] = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}
 
 
-class Unknown(ValueError):  # noqa: N818 - named after what the type or the bytes are
+class UnknownType(ValueError):  # noqa: N818 - named after what the type or the bytes are
     """A message has a type without a known definition, or its bytes do not match the type."""
 
 
@@ -78,7 +78,7 @@ def definition(interface: str, brought: Mapping[str, Definition]) -> Definition:
 @lru_cache(maxsize=256)
 def _common(interface: str) -> Definition:
     if interface not in _store().fielddefs:
-        raise Unknown(interface)
+        raise UnknownType(interface)
     text, _ = _store().generate_msgdef(interface, ros_version=2)
     return Definition(text, _store().hash_rihs01(interface))
 
@@ -92,13 +92,13 @@ def check_readable(message: Message | Delivery, brought: Mapping[str, Definition
     interface = message.type
     if interface in brought:
         if not message.value:
-            raise Unknown(interface)
+            raise UnknownType(interface)
         return
     _common(interface)
     try:
         _store().deserialize_cdr(message.cdr, interface)
     except Exception as error:  # a malformed message may fail anywhere in the generated decoder
-        raise Unknown(interface) from error
+        raise UnknownType(interface) from error
 
 
 def encode(interface: str, value: Mapping[str, Any]) -> bytes:
@@ -107,13 +107,13 @@ def encode(interface: str, value: Mapping[str, Any]) -> bytes:
     try:
         return bytes(_store().serialize_cdr(_built(interface, value), interface))
     except Exception as error:  # values that a message cannot hold fail anywhere in the generated encoder
-        raise Unknown(interface) from error
+        raise UnknownType(interface) from error
 
 
 def _built(interface: str, value: Mapping[str, Any], depth: int = 0) -> Any:
     _, fields = _store().fielddefs[interface]
     if depth > DEPTH or not value.keys() <= {name for name, _ in fields}:
-        raise Unknown(interface)
+        raise UnknownType(interface)
     return _store().types[interface](**{name: _field(kind, value.get(name), depth) for name, kind in fields})
 
 
@@ -122,7 +122,7 @@ def _field(kind: tuple[Nodetype, Any], value: Any, depth: int) -> Any:
     if node == Nodetype.NAME:
         return _built(detail, {} if value is None else value, depth + 1)
     if node != Nodetype.BASE:
-        raise Unknown(str(detail))
+        raise UnknownType(str(detail))
     return _ZERO.get(detail[0], 0) if value is None else value
 
 
@@ -189,9 +189,9 @@ def _message(message: Message | Delivery, brought: Mapping[str, Definition]) -> 
             check_readable(message, brought)
             return Shown(t_ns, message.topic, message.type, publisher, message.cdr, exact=True)
         if not message.value:
-            raise Unknown(message.type)  # its content was not kept; zeros would pass for it
+            raise UnknownType(message.type)  # its content was not kept; zeros would pass for it
         return Shown(t_ns, message.topic, message.type, publisher, encode(message.type, message.value))
-    except Unknown:
+    except UnknownType:
         value = {
             "publisher": publisher,
             "topic": message.topic,
@@ -206,7 +206,7 @@ def _check_name(topic: str) -> None:
     """Raise Unknown for an invalid ROS topic, or one that looks like the grader's own."""
     plain_name = topic.isascii() and topic.isprintable() and topic.startswith("/") and len(topic) < 256
     if not plain_name or topic == ROSOUT or topic.startswith("/grader/"):
-        raise Unknown(topic)
+        raise UnknownType(topic)
 
 
 def _log(record: LogRecord) -> Shown:

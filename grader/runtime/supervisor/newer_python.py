@@ -33,7 +33,7 @@ MODULE = "grader.runtime.supervisor.newer_syntax"
 MOST_SAID = 64
 LIMITS: Mapping[str, object] = {"memory": 1 << 30, "output": MOST_SAID, "processor": 30}
 #: What came to the modules of the standard library that programs use, by the version that it came with. A class has
-#: the name that messages of Python give it. `tests/execution/test_newer_python.py` compares with typeshed.
+#: the name that messages of Python give it. `tests/runtime/supervisor/test_newer_python.py` compares with typeshed.
 NEW_NAMES: Mapping[Version, Mapping[str, str]] = {
     (3, 11): {
         "asyncio": "Barrier BrokenBarrierError Runner TaskGroup Timeout timeout timeout_at",

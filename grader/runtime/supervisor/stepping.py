@@ -11,7 +11,7 @@ from grader.runtime.plan import Plan
 from grader.runtime.recording.codec import to_json
 from grader.runtime.recording.packed import observations_from_json
 from grader.runtime.steps import Command, Finish, LaunchFailedError
-from grader.runtime.supervisor.supervisor import TRIES, Recorder, Worker, WorkerLostError
+from grader.runtime.supervisor.supervisor import TRIES, Recorder, WorkerLostError, WorkerProcess
 
 #: Answers a question of the worker, while virtual time stands still.
 Answer = Callable[[Mapping[str, Any]], Any]
@@ -48,7 +48,7 @@ class SteppedRun:
         self.notes: list[str] = []
         self._worker = self._lent(plan, TRIES)
 
-    def _lent(self, plan: Plan, tries: int) -> Worker:
+    def _lent(self, plan: Plan, tries: int) -> WorkerProcess:
         """Return a worker that has begun the run; one that has died while it was idle is replaced."""
         worker = self._recorder.lend()
         try:

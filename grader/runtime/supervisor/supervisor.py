@@ -103,7 +103,7 @@ class WorkerLostError(HarnessError):
         self.late = late
 
 
-class Worker(ABC):
+class WorkerProcess(ABC):
     """A running worker and the socket to it.
 
     Args:
@@ -295,7 +295,7 @@ def _without_recording(plan: Plan, mistake: Any) -> Trace:
     return Trace(plan.scenario, ClockKind(plan.clock), stop_ns=0, observations=(), author_mistake=found)
 
 
-class ExecutedWorker(Worker):
+class ExecutedWorker(WorkerProcess):
     """A worker in a sandbox of its own; it may make forks of itself there before it runs anything.
 
     Args:
@@ -386,7 +386,7 @@ class ExecutedWorker(Worker):
         self._line.close()  # last, so that a thread waiting for an answer is woken by the end of the worker
 
 
-class ForkedWorker(Worker):
+class ForkedWorker(WorkerProcess):
     """A fork of a worker in the same sandbox, made before that one has run anything."""
 
     def __init__(self, line: socket.socket, domains: Iterator[int]) -> None:
@@ -472,8 +472,8 @@ class Recorder:
         self._executes = executes
         self._runtime = runtime
         self._domains = _Shared(domains)
-        self._idle: queue.LifoQueue[Worker | None] = queue.LifoQueue()  # a warm worker first
-        self._alive: list[Worker] = []
+        self._idle: queue.LifoQueue[WorkerProcess | None] = queue.LifoQueue()  # a warm worker first
+        self._alive: list[WorkerProcess] = []
         self._lock = threading.Lock()
         self.ended_ns = 0
         self._closed = False
@@ -504,7 +504,7 @@ class Recorder:
 
     def _fill(self, count: int) -> None:
         """Fill so many places, which nobody else can take before, with a worker and forks of it; empty if it fails."""
-        workers: Sequence[Worker | None] = [None] * count
+        workers: Sequence[WorkerProcess | None] = [None] * count
         try:
             executed = self._start(forks=count - 1)
             workers = (*executed.forked, executed)  # the last one is the next to be taken, and is ready first
@@ -515,7 +515,7 @@ class Recorder:
     def _prepare(self, plans: Sequence[Plan]) -> None:
         """Start a worker with forks if none is busy and plans lack workers; forks share its memory and its starter."""
         with self._lock:
-            idle: list[Worker | None] = []
+            idle: list[WorkerProcess | None] = []
             with contextlib.suppress(queue.Empty):
                 while True:
                     idle.append(self._idle.get_nowait())
@@ -530,14 +530,14 @@ class Recorder:
             self._close(worker)
         self._fill(self._count)
 
-    def lend(self, plan: Plan | None = None) -> Worker:
+    def lend(self, plan: Plan | None = None) -> WorkerProcess:
         """Return a worker for one user, who gives it back; one more is started if all are in use.
 
         Args:
             plan: What it has to suit; None for a plan without interface packages.
         """
-        others: list[Worker | None] = []
-        found: Worker | None = None
+        others: list[WorkerProcess | None] = []
+        found: WorkerProcess | None = None
         with contextlib.suppress(queue.Empty):
             while found is None:
                 worker = self._idle.get_nowait()
@@ -553,7 +553,7 @@ class Recorder:
             self._idle.put(worker)
         return found or self._pool.submit(self._start).result()
 
-    def take_back(self, worker: Worker, *, usable: bool) -> None:
+    def take_back(self, worker: WorkerProcess, *, usable: bool) -> None:
         """Keep a worker for the next user, or end it and leave its place empty."""
         if not usable:
             self._discard(worker)
@@ -657,13 +657,13 @@ class Recorder:
             self._alive += [worker, *worker.forked]
             return worker
 
-    def _discard(self, worker: Worker | None) -> None:
+    def _discard(self, worker: WorkerProcess | None) -> None:
         with self._lock:
             if worker in self._alive and worker is not None:
                 self._alive.remove(worker)
                 self._close(worker)
 
-    def _close(self, worker: Worker) -> None:
+    def _close(self, worker: WorkerProcess) -> None:
         # The kernel never credits this time: the parents that would reap these processes die with them.
         self.ended_ns += worker.used_ns()
         worker.close()

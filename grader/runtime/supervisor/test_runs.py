@@ -32,7 +32,7 @@ from grader.runtime.plan import Plan
 from grader.runtime.recording.codec import from_json, to_json
 from grader.runtime.shipped import PACKAGE
 from grader.runtime.supervisor.real_time_budget import RealTimeBudget
-from grader.runtime.supervisor.supervisor import TRIES, Recorder, Worker, WorkerLostError
+from grader.runtime.supervisor.supervisor import TRIES, Recorder, WorkerLostError, WorkerProcess
 
 Key = TypeVar("Key", bound=Hashable)
 #: The module that runs pytest; it is started, and never imported here.
@@ -195,7 +195,7 @@ class _TestRun:
     notes: list[str] = field(default_factory=list)
     now_ns: int = 0
     unsuitable: str = ""
-    worker: Worker | None = None
+    worker: WorkerProcess | None = None
     problem: str = ""
     over: threading.Event = field(default_factory=threading.Event)
     is_worth_another: bool = False

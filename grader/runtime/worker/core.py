@@ -73,7 +73,7 @@ class Play:
 
 
 @dataclass(frozen=True, slots=True)
-class Run(Generic[P]):
+class RunProcess(Generic[P]):
     """Let a process run until it has nothing left to do at this instant, and handle what it reports meanwhile.
 
     Attributes:
@@ -109,7 +109,7 @@ class Limit:
     why: str
 
 
-Command: TypeAlias = Play | Run[P] | Receive[P] | Retry | Limit
+Command: TypeAlias = Play | RunProcess[P] | Receive[P] | Retry | Limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,7 +240,7 @@ class Core(Generic[P]):
                 yield Limit(f"the nodes answered each other {MOST_HOPS:,} times without a pause")
         starts = bool(self._agenda.starts_ns.pop(process.name, 0))
         self._free_until_ns = self._quiet_until(process)
-        yield Run(process, self._free_until_ns, arrivals, starts)
+        yield RunProcess(process, self._free_until_ns, arrivals, starts)
         self._steps += 1
         most = STEPS + STEPS_HZ * self.now_ns // NS_PER_S
         if self._steps >= most:

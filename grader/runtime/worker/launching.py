@@ -92,7 +92,7 @@ ONLY_LOOKING = frozenset({"rviz2", "rqt", "rqt_gui", "rqt_graph", "rqt_plot", "r
 
 
 @dataclass(frozen=True, slots=True)
-class Launched:
+class EvaluatedLaunch:
     """What a launch file describes.
 
     Attributes:
@@ -118,17 +118,17 @@ class Launched:
     harness_problem: str = ""
 
 
-def evaluated(student: NodeProcess, plan: Plan) -> Launched:
+def evaluated(student: NodeProcess, plan: Plan) -> EvaluatedLaunch:
     """Wait until a process has evaluated a launch file, and return what it describes."""
     report, why = _description(student)
     if report is None:
         kind = FaultKind.KILLED if student.stopped else FaultKind.HUNG if why else FaultKind.EXITED
-        return Launched(fault=Fault(0, student.name, kind, why or _ENDED))
+        return EvaluatedLaunch(fault=Fault(0, student.name, kind, why or _ENDED))
     if graders := graders_fault(student.name, report.get("fault")):
-        return Launched(harness_problem=graders)
+        return EvaluatedLaunch(harness_problem=graders)
     # The grader's own fault was looked for first: it is not the launch file's.
     if "fault" in report:
-        return Launched(fault=reported_fault(student.name, 0, report["fault"], plan.limits, student.places))
+        return EvaluatedLaunch(fault=reported_fault(student.name, 0, report["fault"], plan.limits, student.places))
     return _launched(student.name, report, plan, student.places)
 
 
@@ -159,7 +159,7 @@ def _description(student: NodeProcess) -> tuple[dict[str, Any] | None, str]:
         time.sleep(LOOK_S)
 
 
-def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) -> Launched:
+def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) -> EvaluatedLaunch:
     root, known = Path(plan.root), dict(plan.start_of(name).known)
     left_out: list[str] = []
     unstarted: list[tuple[str, str]] = []
@@ -170,7 +170,7 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
             unstarted.append((text, only))
         else:
             (notes if _is_harmless(words) else left_out).append(text)
-    made = Launched()
+    made = EvaluatedLaunch()
     for node in _dicts(report.get("nodes"), NODES):
         package, wanted = _text(node.get("package")), _text(node.get("executable"))
         # Reported by a process that the student's code shares: only a package that is there is named.
@@ -188,7 +188,7 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
             if known_package or near:
                 text = _not_found(package, wanted, found, executables(root, plan.projects), near)
                 file, _, line = where.rpartition(":")
-                return Launched(
+                return EvaluatedLaunch(
                     fault=Fault(0, name, FaultKind.EXCEPTION, text, file if line else "", int(line or 0)),
                     left_out=tuple(left_out),
                     unstarted=tuple(unstarted),
@@ -204,16 +204,21 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
         made = _added(made, name, node, found, where, known)
         if problem := made.starts[-1].problem:
             fault = Fault(0, name, FaultKind.KILLED, problem)
-            return Launched(fault=fault, left_out=tuple(left_out), unstarted=tuple(unstarted))
+            return EvaluatedLaunch(fault=fault, left_out=tuple(left_out), unstarted=tuple(unstarted))
     if not made.processes and not left_out and not unstarted:
         text = "describes no node"
-        return Launched(fault=Fault(0, name, FaultKind.EXITED, text), notes=tuple(notes))
+        return EvaluatedLaunch(fault=Fault(0, name, FaultKind.EXITED, text), notes=tuple(notes))
     return replace(made, left_out=tuple(left_out), unstarted=tuple(unstarted), notes=tuple(notes))
 
 
 def _added(  # noqa: PLR0913  what one node consists of
-    made: Launched, launch: str, node: Mapping[str, Any], found: Executable, where: str, known: Mapping[str, str]
-) -> Launched:
+    made: EvaluatedLaunch,
+    launch: str,
+    node: Mapping[str, Any],
+    found: Executable,
+    where: str,
+    known: Mapping[str, str],
+) -> EvaluatedLaunch:
     """Return the processes with one more."""
     assert found.file is not None
     # Criteria know processes by the files that the rubric asks for; two of the same get numbers.
@@ -313,7 +318,7 @@ def _texts(value: Any) -> tuple[str, ...]:
     return tuple(_text(one) for one in value[:ARGUMENTS]) if isinstance(value, list) else ()
 
 
-def expanded(plan: Plan, launched: Mapping[str, Launched]) -> Plan:
+def expanded(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> Plan:
     """Return a plan with the processes of launch files in the place of these."""
     processes: list[tuple[str, str]] = []
     starts = [start for start in plan.starts if start.process not in launched]
@@ -338,14 +343,14 @@ def expanded(plan: Plan, launched: Mapping[str, Launched]) -> Plan:
     )
 
 
-def unstarted(plan: Plan, launched: Mapping[str, Launched]) -> Trace:
+def unstarted(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> Trace:
     """Return the trace of a scenario with a launch file from which nothing can be started."""
     faults = tuple(made.fault for made in launched.values() if made.fault is not None)
     trace = Trace(plan.scenario, ClockKind(plan.clock), stop_ns=plan.duration_ns, observations=faults)
     return renamed(trace, launched)
 
 
-def renamed(trace: Trace, launched: Mapping[str, Launched]) -> Trace:
+def renamed(trace: Trace, launched: Mapping[str, EvaluatedLaunch]) -> Trace:
     """Return a trace in which processes go by the names that a rubric uses, and which tells what was left out."""
     labels = {process: label for made in launched.values() for process, label in made.labels}
     left_out = tuple(one for made in launched.values() for one in made.left_out)

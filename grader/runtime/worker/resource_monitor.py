@@ -29,7 +29,7 @@ from grader.runtime.usage import (
     threads_starved_ns,
     usage,
 )
-from grader.runtime.worker.socket_memory import MANY_DESCRIPTORS, Held, SocketMemory, descriptors
+from grader.runtime.worker.socket_memory import MANY_DESCRIPTORS, KernelMemory, SocketMemory, descriptors
 from grader.runtime.worker.student_process import NodeProcess
 
 #: The polling interval, and the number of polls between two searches for new child processes.
@@ -101,7 +101,7 @@ class ResourceMonitor:
         self._budget = budget
         self._families: dict[int, set[int]] = {}
         self._sockets = SocketMemory(shared=shares_network)
-        self._held: dict[int, Held] = {}
+        self._held: dict[int, KernelMemory] = {}
         self._last_pid = ""
         self._started_ns = time.monotonic_ns()
         # What this process has filled and used before is not due to these nodes.
@@ -187,7 +187,7 @@ class ResourceMonitor:
         """Stop what has reached a limit, and return the memory of the processes and of this one in bytes."""
         used_bytes = 0
         for student in self._students:
-            held = self._held.get(student.process.pid, Held())
+            held = self._held.get(student.process.pid, KernelMemory())
             used = usage(self._families.get(student.process.pid, ()))
             used = replace(used, memory_bytes=used.memory_bytes + held.memory_bytes)
             # Sockets before memory, in which they are counted too: the limit that is named is the one to do something
@@ -265,7 +265,7 @@ class ResourceMonitor:
             student.stop(why, self._families.get(student.process.pid, set()))
 
 
-def _held_too_much(held: Held) -> str:
+def _held_too_much(held: KernelMemory) -> str:
     """Describe the limit that sockets and pipes have reached; empty if they reached none."""
     if held.memory_bytes > IN_SOCKETS_BYTES:
         return f"stopped at {size(IN_SOCKETS_BYTES)} of memory in sockets and pipes"

@@ -37,7 +37,7 @@ _LINK = re.compile(r"(socket|pipe):\[(\d+)\]")
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class KernelMemory:
     """What some processes hold in the kernel: sockets and pipes, and the memory in them."""
 
     sockets: int = 0
@@ -64,7 +64,7 @@ class SocketMemory:
         used, connections, orphans = map(int, found.groups())
         return used >= MANY_SOCKETS, connections + orphans > 0
 
-    def look(self, families: Iterable[Collection[int]], *, tcp: bool) -> list[Held]:
+    def look(self, families: Iterable[Collection[int]], *, tcp: bool) -> list[KernelMemory]:
         """Return what each family of processes holds.
 
         Args:
@@ -83,7 +83,7 @@ class SocketMemory:
             pipes = len(own) - len(sockets)
             # A kernel without this interface tells of no socket: each may be full.
             in_sockets = sum(bytes_of.get(inode, 0) for inode in sockets) if bytes_of else SOCKET_BYTES * len(sockets)
-            found.append(Held(len(sockets), pipes, in_sockets + nobodys + PIPE_BYTES * pipes))
+            found.append(KernelMemory(len(sockets), pipes, in_sockets + nobodys + PIPE_BYTES * pipes))
         return found
 
 

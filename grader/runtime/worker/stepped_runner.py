@@ -16,7 +16,18 @@ from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import Fault, FaultKind, Mark, Observation
 from grader.runtime.plan import Plan
 from grader.runtime.simulation.participant import Moment, Output, Simulation
-from grader.runtime.steps import Advance, Call, Command, Interrupt, Kill, Publish, SendGoal, Serve, Simulate, Start
+from grader.runtime.steps import (
+    Advance,
+    CallService,
+    Command,
+    Interrupt,
+    Kill,
+    Publish,
+    SendGoal,
+    Serve,
+    Simulate,
+    StartProcesses,
+)
 from grader.runtime.stimuli.calls import AddClients, Ask, PlannedCall, PlannedCalls
 from grader.runtime.stimuli.events import Disappear, TopicEvent
 from grader.runtime.stimuli.goals import goal_call
@@ -103,13 +114,13 @@ class SteppedRunner(Runner):
         match command:
             case Advance():
                 self._advance(command.to_ns, until_news=command.until_news)
-            case Start():
+            case StartProcesses():
                 return self._begin_processes(command)
             case Publish():
                 self._publish(command)
             case Serve():
                 self._serve(command.service, command.type)
-            case Call():
+            case CallService():
                 return self._call(command)
             case SendGoal():
                 return self._send_goal(command)
@@ -185,7 +196,7 @@ class SteppedRunner(Runner):
 
     # ------------------------------------------------------------- processes
 
-    def _begin_processes(self, command: Start) -> dict[str, Any]:
+    def _begin_processes(self, command: StartProcesses) -> dict[str, Any]:
         started: list[NodeProcess] = []
         left_out: list[str] = []
         for student, delay_ns in self._start(command.plan, left_out):
@@ -264,7 +275,7 @@ class SteppedRunner(Runner):
         answer = self._ask({"ask": "service", "service": service, "request": request, "now_ns": now_ns})
         return answer if isinstance(answer, dict) else None
 
-    def _call(self, command: Call) -> dict[str, Any]:
+    def _call(self, command: CallService) -> dict[str, Any]:
         now_ns = self._time_ns()
         calls = PlannedCalls(command.service, command.type, now_ns, NS_PER_S, 1, (command.request,))
         check_fields(calls, command.service)

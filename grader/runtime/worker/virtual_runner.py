@@ -13,7 +13,7 @@ from grader.runtime.plan import Plan
 from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.stimuli.server import AddServer, RemoveServer
 from grader.runtime.worker.claims import ORDINARY_END, counts, is_claim, passes
-from grader.runtime.worker.core import Arriving, Command, Core, Limit, Play, Receive, Retry, Run, Taken, senders
+from grader.runtime.worker.core import Arriving, Command, Core, Limit, Play, Receive, Retry, RunProcess, Taken, senders
 from grader.runtime.worker.discovery import Discovery
 from grader.runtime.worker.ending import ending
 from grader.runtime.worker.observer import Observer
@@ -59,7 +59,7 @@ class VirtualRunner(Runner):
             match command:
                 case Play():
                     self._do(command.event, self._core.now_ns)
-                case Run():
+                case RunProcess():
                     self._step(command)
                 case Receive():
                     self._receive(command)
@@ -100,7 +100,7 @@ class VirtualRunner(Runner):
     def _interrupt(self, student: NodeProcess) -> None:
         self._carry_out(self._core.run(student))
 
-    def _step(self, run: Run[NodeProcess]) -> None:
+    def _step(self, run: RunProcess[NodeProcess]) -> None:
         """Send a process the time and the messages on their way to it, and handle its reports."""
         student, now_ns, epoch_ns = run.process, self._core.now_ns, self._plan.epoch_ns
         if run.starts:

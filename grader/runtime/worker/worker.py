@@ -46,7 +46,7 @@ from grader.runtime.worker.bare_start import BareProcess, bare_arguments
 from grader.runtime.worker.beside import files_beside, is_loose, whole_submission
 from grader.runtime.worker.conversation import Conversation
 from grader.runtime.worker.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
-from grader.runtime.worker.launching import Launched, evaluated, expanded, renamed, unstarted
+from grader.runtime.worker.launching import EvaluatedLaunch, evaluated, expanded, renamed, unstarted
 from grader.runtime.worker.notes import Places
 from grader.runtime.worker.output_watch import OutputWatch
 from grader.runtime.worker.resource_monitor import Budget, ResourceMonitor
@@ -221,7 +221,7 @@ class Worker:
         return not self._isolation.shares_network and has_connections()
 
     def _record(self, plan: Plan, domain: int, budget: Budget) -> Trace:
-        launched: dict[str, Launched] = {}
+        launched: dict[str, EvaluatedLaunch] = {}
         started_ns = time.monotonic_ns()
         for name, file in plan.processes:
             if is_launch_file(name):
@@ -234,7 +234,7 @@ class Worker:
         recorded = self._record_processes(expanded(plan, launched), domain, budget.after(started_ns))
         return renamed(recorded, launched)
 
-    def _evaluate(self, plan: Plan, name: str, file: str, domain: int, budget: Budget) -> Launched:
+    def _evaluate(self, plan: Plan, name: str, file: str, domain: int, budget: Budget) -> EvaluatedLaunch:
         """Return what a launch file describes, which a process in a sandbox of its own evaluates."""
         start = plan.start_of(name)
         packages = [(project.name, project.folder) for project in plan.projects]

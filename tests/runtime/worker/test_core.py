@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from grader.runtime.host import virtual
+from grader.runtime.host import originals, virtual
 from grader.runtime.host.clock import AHEAD_NS, EPOCH_NS, LATE_NS, LOOK_NS, TASKS_AT_ONCE, VirtualClock
 from grader.runtime.host.scheduler import GreenThread, Scheduler
 from grader.runtime.host.virtual import STOPPING_NS, VirtualTime
@@ -31,7 +31,7 @@ from grader.runtime.worker.core import (
     Process,
     Receive,
     Retry,
-    Run,
+    RunProcess,
     Taken,
 )
 from grader.runtime.worker.delay import HOPELESS_NS, Delay
@@ -42,7 +42,7 @@ FLOAT, INT = "std_msgs/msg/Float32", "std_msgs/msg/Int32"
 CALLS = PlannedCalls("/ask", "std_srvs/srv/Trigger", 0, 0, 1, ({}, {}))
 
 #: What a process does when it runs: it tells the core what has happened.
-Does = Callable[[Run[Process]], object]
+Does = Callable[[RunProcess[Process]], object]
 
 
 class Played:
@@ -60,7 +60,7 @@ class Played:
         self.agenda = Agenda(due, {name: at * MS for name, at in (starts_ms or {}).items()}, end_ms * MS)
         self.core = Core(self.processes, self.agenda, **options)
         self.done: list[str] = []
-        self.runs: list[Run[Process]] = []
+        self.runs: list[RunProcess[Process]] = []
         self.does: dict[str, Does] = {}
         self.during: Callable[[Command[Process]], object] = lambda command: None
 
@@ -72,10 +72,11 @@ class Played:
         for command in commands:
             self.done.append(f"{self.core.now_ns / MS:g} {self.words(command)}")
             self.during(command)
-            if isinstance(command, Run):
+            if isinstance(command, RunProcess):
                 self.runs.append(command)
                 self.core.waits(command.process, None)  # unless it does something else
-                self.does.get(command.process.name, lambda run: None)(command)
+                if does := self.does.get(command.process.name):
+                    does(command)
         return self.done
 
     def whole(self) -> list[str]:
@@ -100,7 +101,7 @@ class Played:
                 event = command.event
                 what = event.call.index if isinstance(event, Ask) else getattr(event, "topic", "")
                 return f"{type(event).__name__} {what}"
-            case Run():
+            case RunProcess():
                 return " ".join([command.process.name, *(f"{n} {c}" for c, n in command.arrivals.items())])
             case Receive():
                 return f"{command.process.name} receives {dict(command.arrivals)}"
@@ -143,11 +144,9 @@ class Host:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, *answers: dict[str, Any]) -> None:
         self.used_ns = 0
         self.killed: list[int] = []
-        originals = SimpleNamespace(
-            **{**vars(virtual.originals), "processor_ns": lambda: self.used_ns, "sleep": lambda _: None}
-        )
-        originals.kill = lambda pid, signal: self.killed.append(signal)
-        monkeypatch.setattr(virtual, "originals", originals)
+        replaced = SimpleNamespace(**{**vars(originals), "processor_ns": lambda: self.used_ns, "sleep": lambda _: None})
+        replaced.kill = lambda pid, signal: self.killed.append(signal)
+        monkeypatch.setattr(virtual, "originals", replaced)
         self.answers = list(answers)
         self.reports: list[dict[str, Any]] = []
         self.time = VirtualTime(self)  # type: ignore[arg-type]
@@ -243,7 +242,7 @@ def test_the_time_that_a_process_has_reached_is_adopted_but_not_beyond_what_it_w
     run.wakes("b", 70)
     reached_ms = []
 
-    def goes_on(_: Run[Process]) -> None:
+    def goes_on(_: RunProcess[Process]) -> None:
         for at in (40, 10**6):
             run.core.reached(at * MS)
             reached_ms.append(run.core.now_ns / MS)
@@ -410,7 +409,7 @@ def test_stimuli_come_before_the_processes_of_their_instant() -> None:
     run.wakes("b", 100)
 
     def causes(command: Command[Process]) -> None:
-        if isinstance(command, Run) and command.process.name == "a" and run.core.now_ns:
+        if isinstance(command, RunProcess) and command.process.name == "a" and run.core.now_ns:
             run.agenda.later(stop(100, "/z"))
 
     run.during = causes
@@ -458,7 +457,7 @@ def test_one_process_runs_at_a_time_and_the_first_of_the_plan_first() -> None:
 
     def alone(command: Command[Process]) -> None:
         assert not under_way
-        if isinstance(command, Run):
+        if isinstance(command, RunProcess):
             under_way.append(command.process.name)
 
     run.during = alone
@@ -501,7 +500,7 @@ def test_nodes_that_answer_each_other_without_a_rest_end_the_run() -> None:
     def note(command: Command[Process]) -> None:
         if isinstance(command, Limit):
             run.agenda.end_by(run.core.now_ns)
-        elif isinstance(command, Run) and command.arrivals:
+        elif isinstance(command, RunProcess) and command.arrivals:
             times.append(run.core.now_ns)
 
     run.during = note
@@ -519,7 +518,7 @@ def test_time_that_a_process_lets_pass_in_its_own_step_is_a_rest() -> None:
     answering(run)
     answers = run.does["a"]
 
-    def rests(one: Run[Process]) -> None:
+    def rests(one: RunProcess[Process]) -> None:
         run.core.reached(run.core.now_ns + MS)
         answers(one)
 
@@ -536,7 +535,7 @@ def test_an_instant_at_which_nothing_is_left_to_do_is_a_rest() -> None:
     answering(run)
     answers = run.does["a"]
 
-    def rests_after_some(one: Run[Process]) -> None:
+    def rests_after_some(one: RunProcess[Process]) -> None:
         if len(run.runs) % HOPS:
             answers(one)
         else:

@@ -23,7 +23,7 @@ _SAME = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class StudentMark:
     """What one person of the class gets."""
 
     name: str  # of the person, as the gradebook has it; hostile
@@ -36,7 +36,7 @@ class Mark:
 class Marks:
     """The marks of a class."""
 
-    marks: tuple[Mark, ...]
+    marks: tuple[StudentMark, ...]
     max_score: float | None  # maximum points; None if the reports differ
     left_out: tuple[str, ...]  # who handed something in but has no mark to upload, and why; one line each
     withheld: tuple[str, ...] = ()  # criteria that the scores count, but that the rubric hides from students
@@ -74,7 +74,7 @@ def read_marks(results: Path) -> Marks:
     for student in read.students:
         if student.exported and student.score is not None:
             name = student.person or student.name or ""
-            marks.append(Mark(name, student.score, student.feedback or "", student.platform_ids))
+            marks.append(StudentMark(name, student.score, student.feedback or "", student.platform_ids))
         elif student.name is not None:
             why = f"no score: {student.status}" if student.score is None else "; ".join(student.remarks)
             left_out.append(f"{student.name}: {why}")
@@ -126,7 +126,7 @@ class Platform(Protocol):
 class Change:
     """A mark and what it would change on the platform."""
 
-    mark: Mark
+    mark: StudentMark
     account: int
     before: float | None  # the score on the platform; None if there is none
     feedback: str  # the feedback to send; empty if the student already has it
@@ -139,7 +139,7 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class PlatformComparison:
     """The marks of a class against what the platform has."""
 
     changes: tuple[Change, ...]  # everybody with an account, changed or not
@@ -151,7 +151,7 @@ def same(one: float | None, other: float | None) -> bool:
     return one is not None and other is not None and abs(one - other) < _SAME
 
 
-def compare(marks: Marks, platform: Platform, *, with_feedback: bool) -> Comparison:
+def compare(marks: Marks, platform: Platform, *, with_feedback: bool) -> PlatformComparison:
     """Find the account of everybody and what it lacks; only reads from the platform."""
     accounts, scores = platform.accounts(), platform.scores()
     found = [(mark, *_account_of(mark, accounts)) for mark in marks.marks]
@@ -169,10 +169,10 @@ def compare(marks: Marks, platform: Platform, *, with_feedback: bool) -> Compari
         if feedback and same(before, mark.score) and _plain(feedback) in map(_plain, platform.comments(account.key)):
             feedback = ""
         changes.append(Change(mark, account.key, before, feedback, by_name=bool(why)))
-    return Comparison(tuple(changes), tuple(unknown))
+    return PlatformComparison(tuple(changes), tuple(unknown))
 
 
-def _account_of(mark: Mark, accounts: Sequence[Account]) -> tuple[Account | None, str]:
+def _account_of(mark: StudentMark, accounts: Sequence[Account]) -> tuple[Account | None, str]:
     """Return the account of a person, and a reason if there is none for sure, or only the name tells it."""
     for kind, value in mark.ids.items():
         having = [account for account in accounts if fold_handle(account.ids.get(kind, "")) == fold_handle(value)]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from grader.course.classroom.uploading.marks import Change, Comparison, Marks, Platform, Sent, same
+from grader.course.classroom.uploading.marks import Change, Marks, Platform, PlatformComparison, Sent, same
 from grader.grading.reporting.escape import shown
 
 _NAME = 60
 
 
-def render_comparison(marks: Marks, platform: Platform, found: Comparison) -> str:
+def render_comparison(marks: Marks, platform: Platform, found: PlatformComparison) -> str:
     """Describe what an upload would change, person by person; people whose mark is already there are counted."""
     needed = [change for change in found.changes if change.needed]
     points = "" if platform.max_score is None else f" ({platform.max_score:g} points)"

@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 
 from grader.course.mutation.operators import flow, values, words
-from grader.course.mutation.operators.program import Candidate, Mutation, Program, short
+from grader.course.mutation.operators.program import Candidate, Mutation, ParsedProgram, short
 
-Operator = Callable[[Program], Iterator[Mutation]]
+Operator = Callable[[ParsedProgram], Iterator[Mutation]]
 #: Operator name -> operator; its docstring describes the mistake that it imitates.
 OPERATORS: Mapping[str, Operator] = {
     operator.__name__: operator
@@ -41,7 +41,7 @@ def mutants_of(source: str, file: str, operators: Mapping[str, Operator] = OPERA
 
     Mutants that are equivalent to the original or to an earlier mutant are skipped, and so are invalid programs.
     """
-    program = Program(source)
+    program = ParsedProgram(source)
     seen = {meaning(source)}
     counts: Counter[str] = Counter()
     found = []

@@ -12,7 +12,7 @@ from grader.course.mutation.operators.program import (
     LEVELS,
     Edit,
     Mutation,
-    Program,
+    ParsedProgram,
     called,
     short,
     without_comma,
@@ -44,7 +44,7 @@ def owner(function: cst.FunctionDef) -> str:
     return names[0] if names[:1] == ["self"] else function.name.value
 
 
-def alone(program: Program, node: cst.CSTNode) -> bool:
+def alone(program: ParsedProgram, node: cst.CSTNode) -> bool:
     """Whether a small statement stands on a line of its own."""
     line = program.enclosing(node, cst.SimpleStatementLine)
     return line is not None and len(line.body) == 1
@@ -55,42 +55,42 @@ _REPEATED = ("publish", "call_async", "call", *LEVELS)
 _ENTITIES = ("create_timer", "create_subscription")
 
 
-def missing_call(program: Program) -> Iterator[Mutation]:
+def missing_call(program: ParsedProgram) -> Iterator[Mutation]:
     """A call that is forgotten: publish, spin, init, super().__init__, create_timer, a log."""
     for node in program.all(cst.Expr):
         if isinstance(node.value, cst.Call) and alone(program, node):
             yield program.without(node)
 
 
-def missing_assignment(program: Program) -> Iterator[Mutation]:
+def missing_assignment(program: ParsedProgram) -> Iterator[Mutation]:
     """A value that is never set, a counter that never counts, a publisher that is never made."""
     for node in [*program.all(cst.Assign), *program.all(cst.AugAssign), *program.all(cst.AnnAssign)]:
         if alone(program, node) and not (isinstance(node, cst.AnnAssign) and node.value is None):
             yield program.without(node)
 
 
-def missing_import(program: Program) -> Iterator[Mutation]:
+def missing_import(program: ParsedProgram) -> Iterator[Mutation]:
     """An import that is forgotten."""
     for node in [*program.all(cst.Import), *program.all(cst.ImportFrom)]:
         if alone(program, node):
             yield program.without(node)
 
 
-def missing_return(program: Program) -> Iterator[Mutation]:
+def missing_return(program: ParsedProgram) -> Iterator[Mutation]:
     """A callback that does not return its response, a function that returns nothing."""
     for node in program.all(cst.Return):
         if node.value is not None:
             yield program.without(node)
 
 
-def missing_early_return(program: Program) -> Iterator[Mutation]:
+def missing_early_return(program: ParsedProgram) -> Iterator[Mutation]:
     """A `return`, `break` or `continue` that is forgotten: the function goes on."""
     bare = [node for node in program.all(cst.Return) if node.value is None]
     for node in [*bare, *program.all(cst.Break), *program.all(cst.Continue)]:
         yield program.without(node)
 
 
-def missing_parameter(program: Program) -> Iterator[Mutation]:
+def missing_parameter(program: ParsedProgram) -> Iterator[Mutation]:
     """A callback without the parameter that it is called with."""
     for function in program.callbacks:
         params = function.params.params
@@ -100,28 +100,28 @@ def missing_parameter(program: Program) -> Iterator[Mutation]:
             yield Mutation(function, detail, ((function.params, kept),))
 
 
-def callback_called(program: Program) -> Iterator[Mutation]:
+def callback_called(program: ParsedProgram) -> Iterator[Mutation]:
     """A callback that is called instead of passed: `self.tick()` for `self.tick`."""
     for call, callback in program.arguments("callback", *CREATORS):
         if not isinstance(callback, (cst.Lambda, cst.Call)):
             yield program.replacing(callback, cst.Call(callback), at=call)
 
 
-def timer_once(program: Program) -> Iterator[Mutation]:
+def timer_once(program: ParsedProgram) -> Iterator[Mutation]:
     """A callback that is called once instead of by a timer."""
     for call, callback in program.arguments("callback", "create_timer"):
         if isinstance(callback, (cst.Name, cst.Attribute)):
             yield program.replacing(call, cst.Call(callback))
 
 
-def spins_once(program: Program) -> Iterator[Mutation]:
+def spins_once(program: ParsedProgram) -> Iterator[Mutation]:
     """A node that spins once instead of until the end."""
     for call in program.calls("spin"):
         if isinstance(call.func, cst.Attribute):
             yield Mutation(call, "spin -> spin_once", ((call.func.attr, cst.Name("spin_once")),))
 
 
-def repeated_call(program: Program) -> Iterator[Mutation]:
+def repeated_call(program: ParsedProgram) -> Iterator[Mutation]:
     """A message, request or log that is sent twice."""
     for line in program.all(cst.SimpleStatementLine):
         if m.matches(line, m.SimpleStatementLine(body=[m.Expr(m.Call())])):
@@ -130,7 +130,7 @@ def repeated_call(program: Program) -> Iterator[Mutation]:
                 yield Mutation(line, f"twice {short(program.code(call))}", _twice(line))
 
 
-def repeated_entity(program: Program) -> Iterator[Mutation]:
+def repeated_entity(program: ParsedProgram) -> Iterator[Mutation]:
     """A second timer or subscription beside the first, with the same callback."""
     for line in program.all(cst.SimpleStatementLine):
         calls = [call for call in program.all(cst.Call, line) if called(call) in _ENTITIES]
@@ -142,7 +142,7 @@ def _twice(line: cst.SimpleStatementLine) -> tuple[Edit, ...]:
     return ((line, cst.FlattenSentinel([line, line.with_changes(leading_lines=())])),)
 
 
-def wrong_order(program: Program) -> Iterator[Mutation]:
+def wrong_order(program: ParsedProgram) -> Iterator[Mutation]:
     """Two neighbouring lines in the wrong order: used before it is made, sent before it is filled."""
     for block in program.all(cst.IndentedBlock):
         for one, other in zip(block.body, block.body[1:], strict=False):
@@ -152,7 +152,7 @@ def wrong_order(program: Program) -> Iterator[Mutation]:
                 yield Mutation(one, " after ".join(texts), edits)
 
 
-def _leads_to(program: Program, one: cst.SimpleStatementLine, other: cst.CSTNode) -> bool:
+def _leads_to(program: ParsedProgram, one: cst.SimpleStatementLine, other: cst.CSTNode) -> bool:
     """Whether a line depends on the one before it, which sets a name, fills a message, or starts ROS."""
     used = {program.code(node) for node in [*program.all(cst.Name, other), *program.all(cst.Attribute, other)]}
     made = {program.code(target.target) for target in program.all(cst.AssignTarget, one)}
@@ -168,22 +168,22 @@ def _leads_to(program: Program, one: cst.SimpleStatementLine, other: cst.CSTNode
 LATER = 10
 
 
-def exits_later(program: Program) -> Iterator[Mutation]:
+def exits_later(program: ParsedProgram) -> Iterator[Mutation]:
     """A program that ends after a while."""
     return (_after(function, LATER, "raise SystemExit", "exits") for function in program.callbacks)
 
 
-def crashes_on_third(program: Program) -> Iterator[Mutation]:
+def crashes_on_third(program: ParsedProgram) -> Iterator[Mutation]:
     """An error at the third call of a callback."""
     return (_after(function, 2, "raise RuntimeError('the third time')", "raises") for function in program.callbacks)
 
 
-def stops_later(program: Program) -> Iterator[Mutation]:
+def stops_later(program: ParsedProgram) -> Iterator[Mutation]:
     """A callback that stops working after a while."""
     return (_after(function, LATER, "return", "does nothing") for function in program.callbacks)
 
 
-def frozen_value(program: Program) -> Iterator[Mutation]:
+def frozen_value(program: ParsedProgram) -> Iterator[Mutation]:
     """A value or message that is created once and reused forever."""
     for function in program.callbacks:
         for assign in program.all(cst.Assign, function):
@@ -197,19 +197,19 @@ def frozen_value(program: Program) -> Iterator[Mutation]:
                 yield Mutation(call, f"once {short(program.code(value))}", _kept(program, function, value))
 
 
-def first_message_only(program: Program) -> Iterator[Mutation]:
+def first_message_only(program: ParsedProgram) -> Iterator[Mutation]:
     """A received message that is kept forever: only the first one counts."""
     kept = "{own}.first_heard = {message} = getattr({own}, 'first_heard', {message})"
     return _hearing(program, "keeps the first {message}", kept)
 
 
-def one_behind(program: Program) -> Iterator[Mutation]:
+def one_behind(program: ParsedProgram) -> Iterator[Mutation]:
     """A message that is used only when the next one arrives: always one behind."""
     put_off = "{own}.heard, {message} = {message}, getattr({own}, 'heard', {message})"
     return _hearing(program, "uses the {message} before", put_off)
 
 
-def _hearing(program: Program, detail: str, text: str) -> Iterator[Mutation]:
+def _hearing(program: ParsedProgram, detail: str, text: str) -> Iterator[Mutation]:
     """Yield the mutations that begin the callback of each subscription with a statement about its message."""
     for function in program.handed_to("create_subscription"):
         message = (parameters(function) or ["self"])[-1]
@@ -225,7 +225,7 @@ def _after(function: cst.FunctionDef, calls: int, then: str, word: str) -> Mutat
     return Mutation(function, f"{function.name.value} {word} after {calls} calls", at_top(function, counted, stop))
 
 
-def _kept(program: Program, function: cst.FunctionDef, value: cst.BaseExpression) -> tuple[Edit, ...]:
+def _kept(program: ParsedProgram, function: cst.FunctionDef, value: cst.BaseExpression) -> tuple[Edit, ...]:
     """Return the edit that makes an expression keep its first value."""
     own, name = owner(function), f"kept_{program.line(value)}"
     text = f"{own}.__dict__.setdefault('{name}', {program.code(value)})"
@@ -244,7 +244,7 @@ _BOUNDARIES: Mapping[type[cst.BaseCompOp], tuple[type[cst.BaseCompOp], ...]] = {
 }
 
 
-def comparison(program: Program) -> Iterator[Mutation]:
+def comparison(program: ParsedProgram) -> Iterator[Mutation]:
     """A limit on the wrong side, a reversed comparison, or equality instead of an inequality."""
     for node in program.all(cst.Comparison):
         if not _is_guard(program, node):
@@ -253,7 +253,7 @@ def comparison(program: Program) -> Iterator[Mutation]:
                     yield program.replacing(node, node.deep_replace(target.operator, other()))
 
 
-def swapped_branches(program: Program) -> Iterator[Mutation]:
+def swapped_branches(program: ParsedProgram) -> Iterator[Mutation]:
     """The branches of a condition swapped."""
     for node in program.all(cst.IfExp):
         yield program.swapping(node, node.body, node.orelse)
@@ -263,7 +263,7 @@ def swapped_branches(program: Program) -> Iterator[Mutation]:
             yield Mutation(branch, f"if {program.code(branch.test)}: branches swapped", edits)
 
 
-def constant_condition(program: Program) -> Iterator[Mutation]:
+def constant_condition(program: ParsedProgram) -> Iterator[Mutation]:
     """A condition that is missing or never true: the guarded code runs always or never."""
     tests = [branch.test for branch in program.all(cst.If)]
     tests += [choice.test for choice in program.all(cst.IfExp)]
@@ -274,7 +274,7 @@ def constant_condition(program: Program) -> Iterator[Mutation]:
                 yield program.replacing(test, value)
 
 
-def boolean(program: Program) -> Iterator[Mutation]:
+def boolean(program: ParsedProgram) -> Iterator[Mutation]:
     """True for False, `and` for `or`, a missing `not`."""
     for name in program.all(cst.Name):
         if name.value in ("True", "False"):
@@ -287,7 +287,7 @@ def boolean(program: Program) -> Iterator[Mutation]:
             yield program.replacing(negated, negated.expression)
 
 
-def loop_once(program: Program) -> Iterator[Mutation]:
+def loop_once(program: ParsedProgram) -> Iterator[Mutation]:
     """A loop that runs only once: `if` for `while`."""
     for loop in program.all(cst.While):
         if loop.orelse is None and not any((program.all(cst.Break, loop), program.all(cst.Continue, loop))):
@@ -295,7 +295,7 @@ def loop_once(program: Program) -> Iterator[Mutation]:
             yield Mutation(loop, f"while -> if {program.code(loop.test)}", ((loop, after),))
 
 
-def unhandled(program: Program) -> Iterator[Mutation]:
+def unhandled(program: ParsedProgram) -> Iterator[Mutation]:
     """An error that nobody catches."""
     for handler in program.all(cst.ExceptHandler):
         body = cst.IndentedBlock([cst.parse_statement("raise")])
@@ -303,6 +303,6 @@ def unhandled(program: Program) -> Iterator[Mutation]:
         yield Mutation(handler, f"except {' '.join(named.split())}: raise", ((handler.body, body),))
 
 
-def _is_guard(program: Program, node: cst.CSTNode) -> bool:
+def _is_guard(program: ParsedProgram, node: cst.CSTNode) -> bool:
     """Whether a condition is the `__main__` guard, which makes no difference to the grader."""
     return "__name__" in program.code(node)

@@ -50,7 +50,7 @@ class Candidate:
     detail: str = ""  # the change of a mutant, in one line
 
 
-class Program:
+class ParsedProgram:
     """A parsed program; raises libcst.ParserSyntaxError for one that is not valid Python."""
 
     def __init__(self, source: str) -> None:
@@ -218,7 +218,7 @@ def string(text: str) -> cst.SimpleString:
     return cst.SimpleString(f'"{escaped}"')
 
 
-def is_docstring(program: Program, node: cst.CSTNode) -> bool:
+def is_docstring(program: ParsedProgram, node: cst.CSTNode) -> bool:
     """Whether a string is a statement by itself."""
     return isinstance(next(program.above(node), None), cst.Expr)
 

@@ -7,7 +7,15 @@ from itertools import pairwise
 
 import libcst as cst
 
-from grader.course.mutation.operators.program import Mutation, Program, called, into, number, number_of, without_comma
+from grader.course.mutation.operators.program import (
+    Mutation,
+    ParsedProgram,
+    called,
+    into,
+    number,
+    number_of,
+    without_comma,
+)
 
 _SIBLINGS: Mapping[str, str] = {
     "x": "y",
@@ -24,7 +32,7 @@ _LONGER: Mapping[str, str] = {
 }
 
 
-def wrong_field(program: Program) -> Iterator[Mutation]:
+def wrong_field(program: ParsedProgram) -> Iterator[Mutation]:
     """The wrong one of two similar fields: x for y, linear for angular, orientation for position."""
     for node in program.all(cst.Attribute):
         other = _SIBLINGS.get(node.attr.value)
@@ -32,7 +40,7 @@ def wrong_field(program: Program) -> Iterator[Mutation]:
             yield Mutation(node, f"{program.code(node)} -> .{other}", ((node.attr, cst.Name(other)),))
 
 
-def wrong_part(program: Program) -> Iterator[Mutation]:
+def wrong_part(program: ParsedProgram) -> Iterator[Mutation]:
     """The twist of a message instead of its pose."""
     for node in program.all(cst.Attribute):
         text = program.code(node)
@@ -41,7 +49,7 @@ def wrong_part(program: Program) -> Iterator[Mutation]:
                 yield program.replacing(node, text.removesuffix(ending) + other)
 
 
-def swapped_arguments(program: Program) -> Iterator[Mutation]:
+def swapped_arguments(program: ParsedProgram) -> Iterator[Mutation]:
     """Two neighbouring arguments swapped."""
     for call in program.all(cst.Call):
         for one, other in pairwise(call.args):
@@ -49,7 +57,7 @@ def swapped_arguments(program: Program) -> Iterator[Mutation]:
                 yield program.swapping(call, one.value, other.value)
 
 
-def swapped_values(program: Program) -> Iterator[Mutation]:
+def swapped_values(program: ParsedProgram) -> Iterator[Mutation]:
     """Two neighbouring values in a text swapped."""
     for text in program.all(cst.FormattedString):
         values = [part for part in text.parts if isinstance(part, cst.FormattedStringExpression)]
@@ -57,7 +65,7 @@ def swapped_values(program: Program) -> Iterator[Mutation]:
             yield program.swapping(text, one.expression, other.expression)
 
 
-def missing_keyword(program: Program) -> Iterator[Mutation]:
+def missing_keyword(program: ParsedProgram) -> Iterator[Mutation]:
     """A missing field or setting: `Float32()` for `Float32(data=speed)`."""
     for call in program.all(cst.Call):
         for arg in call.args:
@@ -66,7 +74,7 @@ def missing_keyword(program: Program) -> Iterator[Mutation]:
                 yield program.replacing(call, call.with_changes(args=without_comma(kept)))
 
 
-def stale_field(program: Program) -> Iterator[Mutation]:
+def stale_field(program: ParsedProgram) -> Iterator[Mutation]:
     """A value assigned to a misspelt field: the field of the message stays unchanged."""
     for assign in program.all(cst.Assign):
         target = assign.targets[0].target
@@ -89,23 +97,23 @@ _OPERATORS: dict[type[cst.BaseBinaryOp], type[cst.BaseBinaryOp]] = {
 }
 
 
-def constant(program: Program) -> Iterator[Mutation]:
+def constant(program: ParsedProgram) -> Iterator[Mutation]:
     """A number that is off: by a tenth, or by one if it is an integer."""
     return _off(program, 1)
 
 
-def constant_less(program: Program) -> Iterator[Mutation]:
+def constant_less(program: ParsedProgram) -> Iterator[Mutation]:
     """A number that is off in the other direction."""
     return _off(program, -1)
 
 
-def _off(program: Program, side: int) -> Iterator[Mutation]:
+def _off(program: ParsedProgram, side: int) -> Iterator[Mutation]:
     for node, value in _numbers(program):
         off = value + side if isinstance(value, int) else value * (1 + 0.1 * side) or 0.1 * side
         yield program.replacing(node, number(off))
 
 
-def sign(program: Program) -> Iterator[Mutation]:
+def sign(program: ParsedProgram) -> Iterator[Mutation]:
     """A missing or superfluous minus sign."""
     for node, value in _numbers(program):
         above = next(program.above(node), None)
@@ -115,14 +123,14 @@ def sign(program: Program) -> Iterator[Mutation]:
             yield Mutation(node, into(program.code(node), f"-{program.code(node)}"), ((node, number(-value)),))
 
 
-def whole_number(program: Program) -> Iterator[Mutation]:
+def whole_number(program: ParsedProgram) -> Iterator[Mutation]:
     """An integer where a message needs a float: `0` for `0.0`."""
     for node, value in _numbers(program):
         if isinstance(value, float) and value.is_integer():
             yield program.replacing(node, str(int(value)))
 
 
-def arithmetic(program: Program) -> Iterator[Mutation]:
+def arithmetic(program: ParsedProgram) -> Iterator[Mutation]:
     """The wrong operation: plus for minus, times for divided by."""
     for node in program.all(cst.BinaryOperation):
         other = _OPERATORS.get(type(node.operator))
@@ -130,7 +138,7 @@ def arithmetic(program: Program) -> Iterator[Mutation]:
             yield program.replacing(node, node.with_changes(operator=other()))
 
 
-def missing_operand(program: Program) -> Iterator[Mutation]:
+def missing_operand(program: ParsedProgram) -> Iterator[Mutation]:
     """A forgotten factor, shift or conversion: one side of an operation is missing."""
     for node in program.all(cst.BinaryOperation):
         if not _of_texts(node):
@@ -138,7 +146,7 @@ def missing_operand(program: Program) -> Iterator[Mutation]:
             yield program.replacing(node, node.right)
 
 
-def missing_conversion(program: Program) -> Iterator[Mutation]:
+def missing_conversion(program: ParsedProgram) -> Iterator[Mutation]:
     """A forgotten conversion or function: `degrees(x)` becomes `x`; or the inverse function."""
     for call in program.calls("degrees", "radians", "sin", "cos", "round", "abs", "float", "int", "str", "max", "min"):
         if call.args:
@@ -153,7 +161,7 @@ def missing_conversion(program: Program) -> Iterator[Mutation]:
 _INEQUALITIES = (cst.GreaterThan, cst.LessThan, cst.GreaterThanEqual, cst.LessThanEqual)
 
 
-def cut_to_whole(program: Program) -> Iterator[Mutation]:
+def cut_to_whole(program: ParsedProgram) -> Iterator[Mutation]:
     """Numbers truncated to integers before they are compared or sent."""
     for comparison in program.all(cst.Comparison):
         if isinstance(comparison.comparisons[0].operator, _INEQUALITIES):
@@ -162,7 +170,7 @@ def cut_to_whole(program: Program) -> Iterator[Mutation]:
         yield program.replacing(value, f"float(int({program.code(value)}))")
 
 
-def counter_step(program: Program) -> Iterator[Mutation]:
+def counter_step(program: ParsedProgram) -> Iterator[Mutation]:
     """A counter with the wrong step, or counting backwards."""
     for node in program.all(cst.AugAssign):
         if isinstance(node.operator, (cst.AddAssign, cst.SubtractAssign)):
@@ -173,7 +181,7 @@ def counter_step(program: Program) -> Iterator[Mutation]:
             yield Mutation(node, f"step {into(text, f'-{text}')}", ((node.operator, other),))
 
 
-def _numbers(program: Program) -> Iterator[tuple[cst.CSTNode, float | int]]:
+def _numbers(program: ParsedProgram) -> Iterator[tuple[cst.CSTNode, float | int]]:
     """Yield the numbers of a program, without queue depths, which affect no mark."""
     depths = {profile for _, profile in program.arguments("qos_profile", "create_publisher", "create_subscription")}
     depths |= {arg.value for call in program.calls("QoSProfile") for arg in call.args}
@@ -189,7 +197,7 @@ def _of_texts(node: cst.BinaryOperation) -> bool:
     return isinstance(node.left, texts) or isinstance(node.right, texts)
 
 
-def _sent(program: Program) -> list[cst.BaseExpression]:
+def _sent(program: ParsedProgram) -> list[cst.BaseExpression]:
     """Return the values assigned to message fields that may be numbers, without literals and strings."""
     values = [
         arg.value
@@ -208,18 +216,18 @@ def _sent(program: Program) -> list[cst.BaseExpression]:
     ]
 
 
-def best_effort(program: Program) -> Iterator[Mutation]:
+def best_effort(program: ParsedProgram) -> Iterator[Mutation]:
     """A publisher or subscription with the sensor data profile, which may lose messages."""
     return _with_profile(program, "best effort", "qos_profile_sensor_data", "qos_profile_sensor_data")
 
 
-def transient_local(program: Program) -> Iterator[Mutation]:
+def transient_local(program: ParsedProgram) -> Iterator[Mutation]:
     """A publisher or subscription with transient local durability."""
     profile = "QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)"
     return _with_profile(program, "transient local", profile, "DurabilityPolicy, QoSProfile")
 
 
-def _with_profile(program: Program, word: str, profile: str, imported: str) -> Iterator[Mutation]:
+def _with_profile(program: ParsedProgram, word: str, profile: str, imported: str) -> Iterator[Mutation]:
     for call, given in program.arguments("qos_profile", "create_publisher", "create_subscription"):
         edits = ((given, cst.parse_expression(profile)), *program.importing(f"from rclpy.qos import {imported}"))
         yield Mutation(call, f"{called(call).removeprefix('create_')} {word}", edits)

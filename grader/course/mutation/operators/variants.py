@@ -12,7 +12,7 @@ from grader.course.mutation.operators.program import (
     CREATORS,
     Candidate,
     Edit,
-    Program,
+    ParsedProgram,
     argument,
     called,
     string,
@@ -21,19 +21,19 @@ from grader.course.mutation.operators.program import (
 from grader.course.mutation.operators.words import names
 
 
-def renamed_classes(program: Program) -> str:
+def renamed_classes(program: ParsedProgram) -> str:
     """Every class has another name."""
     names = {node.name.value for node in program.all(cst.ClassDef)}
     return _renamed(program, names, lambda name: f"My{name}")
 
 
-def renamed_functions(program: Program) -> str:
+def renamed_functions(program: ParsedProgram) -> str:
     """Every function outside classes has another name, `main` too."""
     names = {node.name.value for node in program.all(cst.FunctionDef) if program.enclosing(node, cst.ClassDef) is None}
     return _renamed(program, names, lambda name: f"run_{name}")
 
 
-def renamed_methods(program: Program) -> str:
+def renamed_methods(program: ParsedProgram) -> str:
     """Every method has another name."""
     methods = [node for node in program.all(cst.FunctionDef) if program.enclosing(node, cst.ClassDef)]
     names = {method.name.value for method in methods if not method.name.value.startswith("__")}
@@ -41,14 +41,14 @@ def renamed_methods(program: Program) -> str:
     return program.changed([*edits, *_of_own_objects(program, names, "do_")])
 
 
-def renamed_attributes(program: Program) -> str:
+def renamed_attributes(program: ParsedProgram) -> str:
     """Every attribute of the program's own objects has another name."""
     targets = [target.target for target in program.all(cst.AssignTarget)]
     names = {t.attr.value for t in targets if isinstance(t, cst.Attribute) and program.code(t.value) == "self"}
     return program.changed(_of_own_objects(program, names, "the_"))
 
 
-def renamed_variables(program: Program) -> str:
+def renamed_variables(program: ParsedProgram) -> str:
     """Every variable and every constant has another name."""
     targets = [target.target for target in program.all(cst.AssignTarget)]
     names = {target.value for target in targets if isinstance(target, cst.Name)}
@@ -58,7 +58,7 @@ def renamed_variables(program: Program) -> str:
     return _renamed(program, names, lambda name: f"{name}_{'X' if name.isupper() else 'x'}")
 
 
-def renamed_nodes(program: Program) -> str:
+def renamed_nodes(program: ParsedProgram) -> str:
     """The node has another name."""
     edits: list[Edit] = []
     for call in program.calls("__init__", "Node", "create_node"):
@@ -68,7 +68,7 @@ def renamed_nodes(program: Program) -> str:
     return program.changed(edits)
 
 
-def reordered_methods(program: Program) -> str:
+def reordered_methods(program: ParsedProgram) -> str:
     """The methods of each class are in reverse order."""
     edits: list[Edit] = []
     for node in program.all(cst.ClassDef):
@@ -77,14 +77,14 @@ def reordered_methods(program: Program) -> str:
     return program.changed([(old, new) for old, new in edits if old is not new])
 
 
-def reordered_constants(program: Program) -> str:
+def reordered_constants(program: ParsedProgram) -> str:
     """The constants of the file are in reverse order, unless one depends on another."""
     lines = [s for s in program.module.body if isinstance(s, cst.SimpleStatementLine)]
     plain = [s for s in lines if isinstance(s.body[0], cst.Assign) and not program.all(cst.Name, s.body[0].value)]
     return program.changed([(old, new) for old, new in zip(plain, reversed(plain), strict=True) if old is not new])
 
 
-def _renamed(program: Program, names: Iterable[str], rename: Callable[[str], str]) -> str:
+def _renamed(program: ParsedProgram, names: Iterable[str], rename: Callable[[str], str]) -> str:
     """Rename plain names, except as keyword arguments and attributes."""
     wanted = set(names) - _not_ours(program)
     edits: list[Edit] = []
@@ -97,7 +97,7 @@ def _renamed(program: Program, names: Iterable[str], rename: Callable[[str], str
     return program.changed(edits)
 
 
-def _of_own_objects(program: Program, names: Collection[str], prefix: str) -> list[Edit]:
+def _of_own_objects(program: ParsedProgram, names: Collection[str], prefix: str) -> list[Edit]:
     """Return the edits that rename attributes of `self` and of objects of the program's own classes."""
     classes = {node.name.value for node in program.all(cst.ClassDef)}
     made = [a for a in program.all(cst.Assign) if isinstance(a.value, cst.Call) and called(a.value) in classes]
@@ -109,7 +109,7 @@ def _of_own_objects(program: Program, names: Collection[str], prefix: str) -> li
     ]
 
 
-def _not_ours(program: Program) -> set[str]:
+def _not_ours(program: ParsedProgram) -> set[str]:
     """Return the names of imports and parameters."""
     names = {alias.evaluated_alias or alias.evaluated_name.split(".")[0] for alias in program.all(cst.ImportAlias)}
     return names | {parameter.name.value for parameter in program.all(cst.Param)}
@@ -119,7 +119,7 @@ def _not_ours(program: Program) -> set[str]:
 _PLAIN = re.compile(r"(?:0?\d*(?:\.\d+)?[dfegs])?")
 
 
-def single_quotes(program: Program) -> str:
+def single_quotes(program: ParsedProgram) -> str:
     """Strings have single quotes."""
     doubled = [
         node
@@ -129,18 +129,18 @@ def single_quotes(program: Program) -> str:
     return program.changed([(node, cst.SimpleString(f"'{node.value[1:-1]}'")) for node in doubled])
 
 
-def windows_lines(program: Program) -> str:
+def windows_lines(program: ParsedProgram) -> str:
     """Lines end with CR LF."""
     return program.module.code.replace("\r\n", "\n").replace("\n", "\r\n")
 
 
-def other_topic_form(program: Program) -> str:
+def other_topic_form(program: ParsedProgram) -> str:
     """Absolute names of topics and services are relative, and relative ones absolute."""
     edits = [(node, string(name[1:] if name.startswith("/") else f"/{name}")) for node, name in names(program)]
     return program.changed([(old, new) for old, new in edits if "~" not in new.value])
 
 
-def keyword_arguments(program: Program) -> str:
+def keyword_arguments(program: ParsedProgram) -> str:
     """Publishers, timers and so on are created with keyword arguments."""
     edits: list[Edit] = []
     equal = cst.AssignEqual(cst.SimpleWhitespace(""), cst.SimpleWhitespace(""))
@@ -153,17 +153,17 @@ def keyword_arguments(program: Program) -> str:
     return program.changed(edits)
 
 
-def percent_format(program: Program) -> str:
+def percent_format(program: ParsedProgram) -> str:
     """Texts are formatted with `%` instead of f-strings."""
     return _formatted(program, lambda spec: f"%{spec or 's'}", _percent_text, "{} % ({},)")
 
 
-def format_method(program: Program) -> str:
+def format_method(program: ParsedProgram) -> str:
     """Texts are formatted with `.format` instead of f-strings."""
     return _formatted(program, lambda spec: f"{{:{spec}}}" if spec else "{}", str, "{}.format({})")
 
 
-def qos_object(program: Program) -> str:
+def qos_object(program: ParsedProgram) -> str:
     """The queue depth is given in a QoSProfile."""
     edits: list[Edit] = []
     for _, depth in program.arguments("qos_profile", "create_publisher", "create_subscription"):
@@ -172,7 +172,7 @@ def qos_object(program: Program) -> str:
     return _with_import(program, edits, "from rclpy.qos import QoSProfile")
 
 
-def lambda_callbacks(program: Program) -> str:
+def lambda_callbacks(program: ParsedProgram) -> str:
     """Callbacks of timers and subscriptions are lambdas."""
     edits: list[Edit] = []
     for call, callback in program.arguments("callback", "create_timer", "create_subscription"):
@@ -183,7 +183,7 @@ def lambda_callbacks(program: Program) -> str:
     return program.changed(edits)
 
 
-def executor(program: Program) -> str:
+def executor(program: ParsedProgram) -> str:
     """An executor object spins the node."""
     edits: list[Edit] = []
     for line in program.all(cst.SimpleStatementLine):
@@ -194,7 +194,7 @@ def executor(program: Program) -> str:
     return _with_import(program, edits, "from rclpy.executors import SingleThreadedExecutor")
 
 
-def loop_in_thread(program: Program) -> str:
+def loop_in_thread(program: ParsedProgram) -> str:
     """A loop with a sleep replaces the timer; a thread spins the node."""
     timers = program.calls("create_timer")
     lines = [line for line in program.all(cst.SimpleStatementLine) if _spun(program, line)]
@@ -215,14 +215,14 @@ def loop_in_thread(program: Program) -> str:
     return program.changed([(made, cst.parse_statement("pass")), (lines[0], loop), *imports])
 
 
-def without_guard(program: Program) -> str:
+def without_guard(program: ParsedProgram) -> str:
     """The `__main__` guard is missing, as in a module for a console script."""
     guards = [node for node in program.all(cst.If) if "__name__" in program.code(node.test)]
     has_main = any(node.name.value == "main" for node in program.all(cst.FunctionDef))
     return program.changed([(guard, cst.RemoveFromParent()) for guard in guards]) if has_main else _same(program)
 
 
-def _spun(program: Program, line: cst.SimpleStatementLine) -> str:
+def _spun(program: ParsedProgram, line: cst.SimpleStatementLine) -> str:
     """Return the name of the node that a line spins; empty for other lines."""
     small = line.body[0]
     if not isinstance(small, cst.Expr) or not isinstance(small.value, cst.Call):
@@ -232,7 +232,7 @@ def _spun(program: Program, line: cst.SimpleStatementLine) -> str:
     return program.code(call.args[0].value) if plain else ""
 
 
-def _formatted(program: Program, field: Callable[[str], str], text: Callable[[str], str], whole: str) -> str:
+def _formatted(program: ParsedProgram, field: Callable[[str], str], text: Callable[[str], str], whole: str) -> str:
     """Rewrite f-strings where possible: `field` writes a specification, `text` what is between, `whole` everything."""
     edits: list[Edit] = []
     for node in program.all(cst.FormattedString):
@@ -247,7 +247,7 @@ def _formatted(program: Program, field: Callable[[str], str], text: Callable[[st
     return program.changed(edits)
 
 
-def _is_plain(program: Program, part: cst.FormattedStringExpression) -> bool:
+def _is_plain(program: ParsedProgram, part: cst.FormattedStringExpression) -> bool:
     """Whether every style can format a field."""
     bare = part.conversion is None and part.equal is None
     return bare and _PLAIN.fullmatch(program.specification(part)) is not None
@@ -257,17 +257,17 @@ def _percent_text(text: str) -> str:
     return text.replace("%", "%%").replace("{{", "{").replace("}}", "}")
 
 
-def _with_import(program: Program, edits: Sequence[Edit], line: str) -> str:
+def _with_import(program: ParsedProgram, edits: Sequence[Edit], line: str) -> str:
     """Return the source after edits that need an import; the unchanged source if there are none."""
     return program.changed([*edits, *program.importing(line)]) if edits else _same(program)
 
 
-def _same(program: Program) -> str:
+def _same(program: ParsedProgram) -> str:
     return program.module.code
 
 
 #: Returns the source of a variant, or the unchanged source if there is nothing to vary.
-Rewriter = Callable[[Program], str]
+Rewriter = Callable[[ParsedProgram], str]
 #: Variant name -> its rewriter; the docstring describes the difference.
 VARIANTS: Mapping[str, Rewriter] = {
     rewriter.__name__: rewriter
@@ -282,7 +282,7 @@ VARIANTS: Mapping[str, Rewriter] = {
 
 def variants_of(source: str, file: str) -> tuple[Candidate, ...]:
     """Return the variants that differ from a program, in the order of the table."""
-    program = Program(source)
+    program = ParsedProgram(source)
     written = ((name, rewriter(program)) for name, rewriter in VARIANTS.items())
     return tuple(
         Candidate(f"{file}:{name}", file, name, text)

@@ -14,7 +14,7 @@ from grader.course.mutation.operators.program import (
     LEVELS,
     Edit,
     Mutation,
-    Program,
+    ParsedProgram,
     argument,
     called,
     into,
@@ -28,7 +28,7 @@ _WORD = re.compile(r"(?<![%{\\\w/~.])[A-Za-z]{3,}")
 _QUIET, _LOUD = "debug", "error"
 
 
-def print_instead(program: Program) -> Iterator[Mutation]:
+def print_instead(program: ParsedProgram) -> Iterator[Mutation]:
     """`print` instead of the logger."""
     default = cst.MaybeSentinel.DEFAULT
     for call in _logs(program):
@@ -36,7 +36,7 @@ def print_instead(program: Program) -> Iterator[Mutation]:
         yield program.replacing(call, cst.Call(cst.Name("print"), said))
 
 
-def log_level(program: Program) -> Iterator[Mutation]:
+def log_level(program: ParsedProgram) -> Iterator[Mutation]:
     """A log that nobody sees because it is for debugging, or one that cries for help."""
     for call in _logs(program):
         for level in (_QUIET, _LOUD):
@@ -44,7 +44,7 @@ def log_level(program: Program) -> Iterator[Mutation]:
                 yield program.replacing(call.func.attr, level, at=call)
 
 
-def log_every_message(program: Program) -> Iterator[Mutation]:
+def log_every_message(program: ParsedProgram) -> Iterator[Mutation]:
     """A report with each message instead of by a timer."""
     for callback in program.handed_to("create_subscription"):
         for timer in program.handed_to("create_timer"):
@@ -55,7 +55,7 @@ def log_every_message(program: Program) -> Iterator[Mutation]:
                 yield Mutation(callback, f"{callback.name.value} calls {timer.name.value}", ((last, added),))
 
 
-def text(program: Program) -> Iterator[Mutation]:
+def text(program: ParsedProgram) -> Iterator[Mutation]:
     """A misspelt word in a log, an answer or a format."""
     for node in program.all(cst.SimpleString):
         old = text_of(node)
@@ -74,7 +74,7 @@ def _misspelt(old: str) -> str:
     return old[: word.end() - 1] + old[word.end() :] if word else ""
 
 
-def rounding(program: Program) -> Iterator[Mutation]:
+def rounding(program: ParsedProgram) -> Iterator[Mutation]:
     """Too few digits in a text: `.0f` for `.3f`."""
     for part in program.all(cst.FormattedStringExpression):
         spec = program.specification(part)
@@ -87,13 +87,13 @@ def rounding(program: Program) -> Iterator[Mutation]:
             yield Mutation(node, into(old, after), ((node, string(after)),))
 
 
-def missing_value(program: Program) -> Iterator[Mutation]:
+def missing_value(program: ParsedProgram) -> Iterator[Mutation]:
     """A text without the value."""
     for part in program.all(cst.FormattedStringExpression):
         yield Mutation(part, f"no {short(program.code(part))}", ((part, cst.FormattedStringText("?")),))
 
 
-def _logs(program: Program) -> list[cst.Call]:
+def _logs(program: ParsedProgram) -> list[cst.Call]:
     """Return the calls of a logger: methods with these names whose first argument is a text."""
     found = [call for call in program.calls(*LEVELS) if isinstance(call.func, cst.Attribute) and call.args]
     return [call for call in found if "log" in program.code(call.func).lower()]
@@ -130,29 +130,29 @@ _STAMPED: Mapping[str, tuple[str, tuple[str, ...]]] = {
 }
 
 
-def topic_typo(program: Program) -> Iterator[Mutation]:
+def topic_typo(program: ParsedProgram) -> Iterator[Mutation]:
     """A misspelt topic or service: its last letter is missing."""
     return _renamed(program, lambda name: name[:-1] if len(name) > 2 else f"{name}s")
 
 
-def topic_namespace(program: Program) -> Iterator[Mutation]:
+def topic_namespace(program: ParsedProgram) -> Iterator[Mutation]:
     """A topic or service from another tutorial: the right name in a namespace, such as `/turtle1/cmd_vel`."""
     return _renamed(program, lambda name: f"/turtle1/{name.lstrip('/')}")
 
 
-def topic_private(program: Program) -> Iterator[Mutation]:
+def topic_private(program: ParsedProgram) -> Iterator[Mutation]:
     """A private name, `~/cmd_vel`."""
     return _renamed(program, lambda name: f"~/{name.lstrip('/')}")
 
 
-def topic_swapped(program: Program) -> Iterator[Mutation]:
+def topic_swapped(program: ParsedProgram) -> Iterator[Mutation]:
     """Two topics swapped: the node subscribes to the topic that it should publish, and the other way round."""
     for (one, name), (other, other_name) in combinations(names(program), 2):
         if name != other_name:
             yield Mutation(one, f"{name} <-> {other_name}", ((one, string(other_name)), (other, string(name))))
 
 
-def message_type(program: Program) -> Iterator[Mutation]:
+def message_type(program: ParsedProgram) -> Iterator[Mutation]:
     """Another message or service type with the same fields, imported and used in the whole file."""
     for imported, alias in _imported_types(program, _TWINS):
         package, twin = _TWINS[alias]
@@ -160,7 +160,7 @@ def message_type(program: Program) -> Iterator[Mutation]:
         yield Mutation(imported, into(alias, f"{package}.{twin}"), edits)
 
 
-def stamped_type(program: Program) -> Iterator[Mutation]:
+def stamped_type(program: ParsedProgram) -> Iterator[Mutation]:
     """The stamped variant of a type, with adapted fields: TwistStamped for Twist."""
     for imported, alias in _imported_types(program, _STAMPED):
         member, parts = _STAMPED[alias]
@@ -175,7 +175,7 @@ def stamped_type(program: Program) -> Iterator[Mutation]:
         yield Mutation(imported, into(alias, stamped), edits)
 
 
-def message_type_once(program: Program) -> Iterator[Mutation]:
+def message_type_once(program: ParsedProgram) -> Iterator[Mutation]:
     """A wrong type at only one publisher or subscription of a topic."""
     for call in program.calls(*CREATORS):
         given = argument(call, CREATORS[called(call)][0])
@@ -185,7 +185,7 @@ def message_type_once(program: Program) -> Iterator[Mutation]:
             yield Mutation(call, f"{called(call)} {into(given.value, twin)}", edits)
 
 
-def names(program: Program) -> list[tuple[cst.SimpleString, str]]:
+def names(program: ParsedProgram) -> list[tuple[cst.SimpleString, str]]:
     """Return the places that name topics and services, without duplicates."""
     found: dict[cst.SimpleString, str] = {}
     for call in program.calls(*_NAMED):
@@ -196,12 +196,12 @@ def names(program: Program) -> list[tuple[cst.SimpleString, str]]:
     return list(found.items())
 
 
-def _renamed(program: Program, rename: Callable[[str], str]) -> Iterator[Mutation]:
+def _renamed(program: ParsedProgram, rename: Callable[[str], str]) -> Iterator[Mutation]:
     for node, name in names(program):
         yield Mutation(node, into(name, rename(name)), ((node, string(rename(name))),))
 
 
-def _imported_types(program: Program, known: Collection[str]) -> Iterator[tuple[cst.ImportFrom, str]]:
+def _imported_types(program: ParsedProgram, known: Collection[str]) -> Iterator[tuple[cst.ImportFrom, str]]:
     for imported in program.all(cst.ImportFrom):
         if not isinstance(imported.names, cst.ImportStar):
             for alias in imported.names:
@@ -209,18 +209,18 @@ def _imported_types(program: Program, known: Collection[str]) -> Iterator[tuple[
                     yield imported, alias.name.value
 
 
-def _renamed_uses(program: Program, name: str, other: str) -> list[Edit]:
+def _renamed_uses(program: ParsedProgram, name: str, other: str) -> list[Edit]:
     """Return the edits that put another name wherever a name is used; attributes and imports keep theirs."""
     uses = [node for node in program.all(cst.Name) if node.value == name and not _is_attribute(program, node)]
     return [(node, cst.Name(other)) for node in uses if not _is_import(program, node)]
 
 
-def _is_attribute(program: Program, node: cst.Name) -> bool:
+def _is_attribute(program: ParsedProgram, node: cst.Name) -> bool:
     above = next(program.above(node), None)
     return isinstance(above, cst.Attribute) and above.attr is node
 
 
-def _is_import(program: Program, node: cst.CSTNode) -> bool:
+def _is_import(program: ParsedProgram, node: cst.CSTNode) -> bool:
     return any(isinstance(above, (cst.Import, cst.ImportFrom)) for above in program.above(node))
 
 
@@ -228,7 +228,7 @@ def _is_import(program: Program, node: cst.CSTNode) -> bool:
 _FACTORS = ("* 10", "/ 10", "* 1000", "/ 2", "* 2", "* 1.25", "* 0.75")
 
 
-def period(program: Program) -> Iterator[Mutation]:
+def period(program: ParsedProgram) -> Iterator[Mutation]:
     """A period that is wrong by a factor: ten, two, milliseconds for seconds, or a quarter."""
     for given in _periods(program):
         before = program.code(given)
@@ -237,7 +237,7 @@ def period(program: Program) -> Iterator[Mutation]:
             yield program.replacing(given, f"{inside} {factor}")
 
 
-def rate_as_period(program: Program) -> Iterator[Mutation]:
+def rate_as_period(program: ParsedProgram) -> Iterator[Mutation]:
     """The rate instead of the period, or the other way round."""
     for given in _periods(program):
         if isinstance(given, cst.BinaryOperation) and isinstance(given.operator, cst.Divide):
@@ -246,20 +246,20 @@ def rate_as_period(program: Program) -> Iterator[Mutation]:
             yield program.replacing(given, f"1 / ({program.code(given)})")
 
 
-def sleeping_callback(program: Program) -> Iterator[Mutation]:
+def sleeping_callback(program: ParsedProgram) -> Iterator[Mutation]:
     """A callback that sleeps and blocks everything else."""
     for function in program.callbacks:
         edits = (*program.importing("import time"), *at_top(function, "time.sleep(2.0)"))
         yield Mutation(function, f"{function.name.value} sleeps 2 s", edits)
 
 
-def busy_callback(program: Program) -> Iterator[Mutation]:
+def busy_callback(program: ParsedProgram) -> Iterator[Mutation]:
     """A callback with an infinite loop."""
     for function in program.callbacks[:1]:
         yield Mutation(function, f"{function.name.value} loops", at_top(function, "while True:\n    pass\n"))
 
 
-def _periods(program: Program) -> list[cst.BaseExpression]:
+def _periods(program: ParsedProgram) -> list[cst.BaseExpression]:
     """Return the expressions that define the periods of timers, rates and sleeps."""
     given = [*program.arguments("timer_period_sec", "create_timer"), *program.arguments("frequency", "create_rate")]
     slept = [call.args[0].value for call in program.calls("sleep") if len(call.args) == 1]

@@ -43,7 +43,7 @@ from grader.grading.judging.values import (
     value_at,
 )
 from grader.grading.judging.wording import listed, moment, number, quote, span
-from grader.grading.model.chart import Band, Case, Level, Tone
+from grader.grading.model.chart import Band, Level, Stretch, Tone
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
@@ -287,7 +287,7 @@ class Silence:
     def drawing(self, trace: Trace) -> Drawing:
         """Return the messages on the topic, with the window in which none may come."""
         start_ns, stop_ns = self._window(trace)
-        cases: tuple[Case, ...] = ()
+        cases: tuple[Stretch, ...] = ()
         if start_ns is not None and stop_ns is not None and start_ns < stop_ns:
             cases = (drawn_case(start_ns, stop_ns, "no message expected"),)
         lanes = Lanes()

@@ -10,7 +10,7 @@ from grader.grading.judging.findings import fault_hint, fault_sentence, first_fa
 from grader.grading.judging.logs.outputs import student_records, written
 from grader.grading.judging.plots import Drawing, Plot
 from grader.grading.judging.wording import moment, number, quote, span
-from grader.grading.model.chart import Case
+from grader.grading.model.chart import Stretch
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
@@ -73,7 +73,7 @@ class WaitsGracefully:
         """Return what came after the silence, with what the process wrote all the time."""
         came = trace.deliveries(self.topic)
         first_s = seconds(min(came[0].t_ns if came else trace.stop_ns, trace.stop_ns))
-        cases = (Case(0.0, first_s, f"nothing on {self.topic}"),)
+        cases = (Stretch(0.0, first_s, f"nothing on {self.topic}"),)
         return Drawing((Plot(self.topic, most=1),), processes=(self.process,), cases=cases)
 
     def _works(self, trace: Trace, first_ns: int) -> Finding:

@@ -429,7 +429,7 @@ def short(type_: str) -> str:
     return quote(type_.rpartition("/")[2], 40)
 
 
-def received(source: Source, function: Function | None) -> Received | None:
+def received(source: Source, function: Function | None) -> ReceivedMessage | None:
     """Return what the callback of a subscription receives; None for any other function."""
     if function is None:
         return None
@@ -437,12 +437,12 @@ def received(source: Source, function: Function | None) -> Received | None:
         if function in roots(source, item.callback):
             names = parameters(function)
             own = names[1:] if source.is_method(function) or names[:1] == ["self"] else names
-            return Received(own[0] if own else "", item.type, len(own), item)
+            return ReceivedMessage(own[0] if own else "", item.type, len(own), item)
     return None
 
 
 @dataclass(frozen=True, slots=True)
-class Received:
+class ReceivedMessage:
     """The message that a callback receives.
 
     Attributes:

@@ -1,0 +1,441 @@
+"""Looking at nodes without a rubric: the summary of a trace, its text and its JSON, and one real run."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.judging.summary import summarise
+from grader.grading.model.report import Summary
+from grader.grading.reporting.observed import render_summary, summary_to_json, without_libraries
+from grader.runtime.model.errors import SubmissionError
+from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
+from grader.runtime.model.trace import (
+    ClockKind,
+    Endpoint,
+    Fault,
+    FaultKind,
+    GraphSnapshot,
+    LogRecord,
+    Message,
+    Observation,
+    Offer,
+    OutputLine,
+    ServiceEnd,
+    Trace,
+)
+
+ROOT = Path(__file__).resolve().parents[3]
+FLOAT = "std_msgs/msg/Float32"
+
+
+def an_end(kind: str, topic: str = "/t", node: str = "/a") -> Endpoint:
+    return Endpoint(kind, topic, FLOAT, node, 0, "reliable", "volatile")
+
+
+def a_trace(*observations: Observation, stop_s: int = 10) -> Trace:
+    return Trace("observed", ClockKind.VIRTUAL, stop_s * NS_PER_S, tuple(observations))
+
+
+SERVED = (("client", "/a"), ("service", "/b"))
+
+
+def messages(count: int, period_ms: int = 100, value: Callable[[int], object] = float) -> list[Message]:
+    return [Message(n * period_ms * NS_PER_MS, "/t", FLOAT, {"data": value(n)}) for n in range(count)]
+
+
+def test_a_topic_is_described_by_its_pace_and_its_values() -> None:
+    """There are n - 1 gaps between n messages; numbers go by their dotted names, NaN is left out."""
+    odd = Message(NS_PER_S, "/t", FLOAT, {"data": float("nan"), "deep": {"x": 1, "flag": True, "list": [5]}})
+    graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
+    (topic,) = summarise(a_trace(graph, *messages(10), odd), ["a.py"], "none").topics
+    assert topic.pace is not None
+    assert (topic.messages, topic.first_s, topic.pace.rate_hz) == (11, 0.0, pytest.approx(10.0))
+    assert (topic.pace.min_s, topic.pace.max_s) == (pytest.approx(0.1), pytest.approx(0.1))
+    assert topic.ranges == {"data": (0.0, 9.0), "deep.x": (1.0, 1.0), "deep.list[]": (5.0, 5.0)}
+    assert topic.lengths == {"deep.list": (1, 1)}
+
+
+def test_texts_and_arrays_are_described() -> None:
+    """A text by its first different values, an array by its size and its elements; what is empty comes last."""
+    said = [
+        Message(
+            n * NS_PER_S, "/t", FLOAT, {"none": [], "words": f"w{n}", "ids": ["l", "r"], "zero": 0, "xs": [n] * (1 + n)}
+        )
+        for n in range(5)
+    ]
+    graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
+    text = render_summary(summarise(a_trace(graph, *said), ["a.py"], "none"))
+    assert [line.strip() for line in text.splitlines() if line.startswith("    ")][2:] == [
+        'words: "w0", "w1", "w2" and 2 more',
+        'ids[]: "l", "r"',
+        "ids: 2 elements",
+        "xs: 1 to 5 elements, 0 to 4",
+        "none: 0 elements",
+        "zero: 0",
+    ]
+    told = json.loads(summary_to_json(summarise(a_trace(graph, *said), ["a.py"], "none")))["topics"][0]
+    assert told["texts"]["words"] == {"values": ["w0", "w1", "w2", "w3", "w4"], "different": 5}
+    assert told["lengths"]["xs"] == [1, 5]
+
+
+def test_whole_numbers_are_shown_in_full() -> None:
+    """The seconds of a stamp differ in their last digits."""
+    graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
+    text = render_summary(summarise(a_trace(graph, *messages(3, value=lambda n: 1767225600 + n)), ["a.py"], "none"))
+    assert "data: 1767225600 to 1767225602\n" in text
+
+
+def test_the_graph_with_the_most_parts_is_drawn() -> None:
+    """Services count as well, and of equal ones the last."""
+    ends = tuple(ServiceEnd(kind, "/go", "std_srvs/srv/Trigger", node) for kind, node in SERVED)
+    graphs = (GraphSnapshot(0, (), ()), GraphSnapshot(1, ("/a", "/b"), (), ends), GraphSnapshot(2, (), ()))
+    assert "Graph:\n  /a ┄┄/go┄┄▶ /b\n" in render_summary(summarise(a_trace(*graphs), ["a.py"], "none"))
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_too_few_messages_have_no_pace(count: int) -> None:
+    """No division by nothing; also not for messages of one instant."""
+    graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
+    (topic,) = summarise(a_trace(graph, *messages(count)), ["a.py"], "none").topics
+    assert (topic.pace, topic.messages) == (None, count)
+    (topic,) = summarise(a_trace(graph, *messages(5, period_ms=0)), ["a.py"], "none").topics
+    assert topic.pace is None
+
+
+def test_the_text_says_what_was_seen() -> None:
+    """Nodes, topics, who is at which end, services and parameters, records; long lists are cut and counted."""
+    ends = (an_end("publisher"), an_end("subscription", node="/b"))
+    records = [LogRecord(n, "a.py", "INFO", "a", f"line {n}") for n in range(20)]
+    offers = [Offer(0, "a.py", "service", "/go", "std_srvs/srv/Trigger"), Offer(0, "a.py", "parameter", "/a:x", "1.5")]
+    trace = a_trace(GraphSnapshot(0, ("/a", "/b"), ends), *offers, *messages(3), *records)
+    text = render_summary(summarise(trace, ["a.py"], "none"))
+    for line in (
+        "a.py: 10.0 s on the virtual clock",
+        "published by /a (reliable, volatile)",
+        "subscribed by /b (reliable, volatile)",
+        "3 messages, the first at t = 0.000 s; average rate: 10.000 Hz",
+        "data: 0 to 2",
+        "service /go [std_srvs/srv/Trigger]",
+        "parameter /a:x = 1.5",
+        "/a ──/t──▶ /b",
+        "[INFO] [a]: line 0",
+        "and 8 more (--json shows them)",
+    ):
+        assert line in text
+
+
+def test_a_program_that_ends_in_peace_has_no_fault() -> None:
+    """A client that is done ends with exit code 0; any other end is a fault."""
+    done = Fault(NS_PER_S, "client.py", FaultKind.EXITED, "exited with code 0", exit_code=0)
+    text = render_summary(summarise(a_trace(done), ["client.py"], "none"))
+    assert "Ended:\n  t = 1.000 s client.py: exited with code 0\n" in text
+    assert "Faults" not in text
+    failed = replace(done, text="exited with code 3", exit_code=3)
+    text = render_summary(summarise(a_trace(done, failed), ["client.py"], "none"))
+    assert "Faults:\n  t = 1.000 s client.py: exited with code 3\n" in text
+
+
+def test_hostile_text_stays_text() -> None:
+    """Nothing a node says can steer the terminal, and the JSON stays valid UTF-8."""
+    record = LogRecord(0, "a.py", "INFO", "a", "\x1b[2J\u202e\udcff")
+    summary = summarise(a_trace(record), ["a.py"], "none")
+    assert not set("\x1b\u202e\udcff") & set(render_summary(summary))
+    assert json.loads(summary_to_json(summary).encode())["records"][0]["severity"] == "INFO"
+
+
+@pytest.mark.ros
+def test_nodes_are_observed_for_real() -> None:
+    """Both reference nodes of exercise 3 run together; what they do comes out as JSON and as text."""
+    grade = str(Path(sys.executable).with_name("grade"))
+    files = [str(ROOT / "reference_solutions" / name) for name in ("temperature_sensor.py", "fan_controller.py")]
+    command = [grade, "observe", *files, "--duration", "5"]
+    told = json.loads(subprocess.run([*command, "--json"], check=True, capture_output=True).stdout)
+    assert told["nodes"] == ["/fan_controller", "/temperature_sensor"]
+    assert [(t["name"], round(t["rate_hz"], 6)) for t in told["topics"]] == [("/fan_speed", 5.0), ("/temperature", 5.0)]
+    assert told["faults"] == []
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert "/temperature_sensor ──/temperature──▶ /fan_controller" in text
+
+
+@pytest.mark.ros
+def test_a_file_of_a_package_may_import_the_package(tmp_path: Path) -> None:
+    """As `ros2 run` lets it: by the name of the package, from wherever in it the file is."""
+    inner = tmp_path / "ws" / "src" / "two" / "two"
+    inner.mkdir(parents=True)
+    (inner.parent / "package.xml").write_text("<package><name>two</name></package>")
+    (inner / "__init__.py").touch()
+    (inner / "words.py").write_text("TEXT = 'from the package'\n")
+    node = inner / "speaker.py"
+    node.write_text(
+        "import rclpy\nfrom two.words import TEXT\n\n\ndef main():\n"
+        "    rclpy.init()\n    node = rclpy.create_node('speaker')\n    node.get_logger().info(TEXT)\n"
+        "    rclpy.spin(node)\n\n\nif __name__ == '__main__':\n    main()\n"
+    )
+    summary = observe(ObserveRequest((node,), NS_PER_S, clock="virtual"), lambda _: None)
+    assert ([r.text for r in summary.records], summary.faults) == (["from the package"], ())
+
+
+@pytest.mark.ros
+def test_a_traceback_begins_with_the_program(tmp_path: Path) -> None:
+    """As `python3 FILE` prints it, also where a module of the program fails while it is imported."""
+    file = tmp_path / "node.py"
+    for text, first in (("import rclpy\n1 / 0\n", "node.py"), ("import rclpy\nimport other\n", "node.py")):
+        file.write_text(text)
+        (tmp_path / "other.py").write_text("{}['x']\n")
+        lines = [o.text for o in observe(ObserveRequest((file,), NS_PER_S, clock="virtual"), lambda _: None).lines]
+        assert lines[:2] == ["Traceback (most recent call last):", f'  File "{first}", line 2, in <module>']
+        assert not any("grader" in line for line in lines)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+def test_a_class_that_needs_arguments_is_not_started(tmp_path: Path, clock: str) -> None:
+    """It is for other modules: `python3 FILE` does nothing, and nothing is the student's fault."""
+    file = tmp_path / "relay.py"
+    file.write_text(
+        "from rclpy.node import Node\nclass Relay(Node):\n"
+        "    def __init__(self, robot):\n        super().__init__(f'relay_{robot}')\n"
+    )
+    summary = observe(ObserveRequest((file,), NS_PER_S, clock=clock), lambda _: None)
+    assert [fault.text for fault in summary.faults] == ["exited with code 0"]
+    assert [note.split(",")[0] for note in summary.notes] == ["relay.py: nothing starts Relay"]
+
+
+def a_package(folder: Path, name: str, **files: str) -> None:
+    """Write a Python package with an entry point for each module; a name may have `__` for a folder."""
+    scripts = ", ".join(f"'{n.replace('__', '_')} = {name}.{n.replace('__', '.')}:main'" for n in files)
+    inner = folder / name / name
+    inner.mkdir(parents=True)
+    (inner.parent / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    (inner.parent / "setup.py").write_text(
+        f"from setuptools import setup\nsetup(name='{name}', entry_points={{'console_scripts': [{scripts}]}})\n"
+    )
+    for module, text in files.items():
+        path = inner / f"{module.replace('__', '/')}.py"
+        path.parent.mkdir(exist_ok=True)
+        (path.parent / "__init__.py").touch()
+        (inner / "__init__.py").touch()
+        path.write_text(text)
+
+
+LOGS = "import rclpy\n{}\ndef main():\n    rclpy.init()\n    rclpy.create_node('n').get_logger().info({})\n"
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("above", ["src", "anything", "src/repository"])
+@pytest.mark.parametrize("target", ["two/two/speaker.py", "two/speaker", "two/launch/all.launch.py"])
+def test_the_packages_beside_one_are_there(tmp_path: Path, above: str, target: str) -> None:
+    """As in a workspace that is built, whatever its folder is called and whatever is named."""
+    a_package(tmp_path / above, "one", words="TEXT = 'from the other package'\n")
+    a_package(tmp_path / above, "two", speaker=LOGS.format("from one.words import TEXT", "TEXT"))
+    launch = tmp_path / above / "two" / "launch" / "all.launch.py"
+    launch.parent.mkdir()
+    launch.write_text(
+        "from launch import LaunchDescription\nfrom launch_ros.actions import Node\n"
+        "def generate_launch_description():\n"
+        "    return LaunchDescription([Node(package='two', executable='speaker')])\n"
+    )
+    summary = observe(ObserveRequest((tmp_path / above / target,), NS_PER_S, clock="virtual"), lambda _: None)
+    assert [r.text for r in summary.records] == ["from the other package"]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("room", ["hall", "kitchen"])
+def test_the_file_that_is_named_runs(tmp_path: Path, room: str) -> None:
+    """A package may have two files of a name."""
+    a_package(tmp_path, "rooms", hall__main=LOGS.format("", "'hall'"), kitchen__main=LOGS.format("", "'kitchen'"))
+    file = tmp_path / "rooms" / "rooms" / room / "main.py"
+    summary = observe(ObserveRequest((file,), NS_PER_S, clock="virtual"), lambda _: None)
+    assert [r.text for r in summary.records] == [room]
+    assert [note for note in summary.notes if "not graded" in note] == []
+
+
+WORKSPACE = ROOT / "tests" / "packages" / "workspace"
+ROBOT = WORKSPACE / "src" / "robot"
+TARGETS = {
+    "a workspace": (WORKSPACE, ("robot/talker", "robot/listener"), ("/listener", "/talker")),
+    "a package": (ROBOT, ("robot/talker", "robot/listener"), ("/listener", "/talker")),
+    "an executable": (ROBOT / "talker", ("robot/talker",), ("/talker",)),
+    "a launch file": (
+        ROBOT / "launch" / "robot.launch.py",
+        ("robot.launch.py",),
+        ("/ears/listener", "/speaker"),
+    ),
+}
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(("path", "processes", "nodes"), TARGETS.values(), ids=TARGETS)
+def test_packages_are_observed(path: Path, processes: tuple[str, ...], nodes: tuple[str, ...]) -> None:
+    """Every layout that is graded, and the text says what ran."""
+    summary = observe(ObserveRequest((path,), 2 * NS_PER_S, clock="virtual"), lambda _: None)
+    assert (summary.processes, summary.nodes, summary.faults) == (processes, nodes, ())
+    assert render_summary(summary).startswith(f"{', '.join(processes)}: 2.0 s on the virtual clock\n")
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        (ROBOT / "talkr", "expected an executable (robot/talker or robot/listener), found none"),
+        (ROBOT / "launch", "expected a package or workspace with executables, found none"),
+        (ROBOT / "config" / "talker.yaml", "expected a .py file, found none"),
+    ],
+)
+def test_what_cannot_be_observed_is_told_what_is_there(path: Path, said: str) -> None:
+    """Nothing is started."""
+    with pytest.raises(SubmissionError) as raised:
+        observe(ObserveRequest((path,), NS_PER_S), lambda _: None)
+    assert raised.value.message == f"{path}: {said}"
+
+
+def test_a_file_that_is_none_is_one_line() -> None:
+    """Exit code 2, the name and what to do; nothing is started."""
+    grade = str(Path(sys.executable).with_name("grade"))
+    done = subprocess.run([grade, "observe", "nope.py"], check=False, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[0] == "error: nope.py: expected a .py file, found none"
+
+
+CLOCKS = pytest.mark.parametrize("clock", ["virtual", "wall"])
+TALKER = """
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Talker(Node):
+    def __init__(self):
+        super().__init__("talker")
+        self.pub = self.create_publisher(String, "said", 10)
+        self.create_timer(0.2, self.tick)
+
+    def tick(self):
+        self.pub.publish({sent})
+
+
+rclpy.init({given})
+rclpy.spin(Talker())
+"""
+
+LACKING = {
+    "rosbag2_py": "rosbag2_py is a package of ROS 2 that is not installed here: the program may be right where it is",
+    "nav2_msgs": "nav2_msgs is not installed here: give the folder with its definitions as --interfaces",
+}
+
+
+def seen(folder: Path, clock: str = "virtual", **files: str) -> Summary:
+    """Observe files for a second."""
+    folder.chmod(0o755)
+    for name, text in files.items():
+        (folder / f"{name}.py").write_text(text)
+    paths = tuple(folder / f"{name}.py" for name in files)
+    return observe(ObserveRequest(paths, NS_PER_S, clock=clock), lambda _: None)
+
+
+@pytest.mark.ros
+@CLOCKS
+def test_a_fault_has_the_hint_of_the_report(tmp_path: Path, clock: str) -> None:
+    """In the text and in JSON; the traceback shows the program's own lines."""
+    summary = seen(tmp_path, clock, node=TALKER.format(sent='"hello"', given=""))
+    text, told = render_summary(summary), json.loads(summary_to_json(summary))
+    hint = "this publisher sends String objects, not str: create one, set its fields and publish it"
+    assert f"    hint: {hint}\n" in text
+    assert [fault["hint"] for fault in told["faults"]] == [hint]
+    shown = [line for line in text.splitlines() if "stderr: " in line]
+    assert 'File "node.py", line 14, in tick' in "".join(shown)
+    assert any("calls in Python and ROS)" in line for line in shown)
+    assert not any("site-packages" in line or "and 1" in line for line in shown)
+
+
+@pytest.mark.ros
+@CLOCKS
+@pytest.mark.parametrize(("package", "hint"), LACKING.items())
+def test_a_package_that_is_not_installed_is_no_mistake(tmp_path: Path, clock: str, package: str, hint: str) -> None:
+    """Of those that ROS has, and of interfaces."""
+    assert seen(tmp_path, clock, node=f"import rclpy\nimport {package}\n").hints == (hint,)
+
+
+@pytest.mark.ros
+@CLOCKS
+@pytest.mark.parametrize("given", ["domain_id=7", "args=None"])
+def test_a_node_in_another_domain_is_told(tmp_path: Path, clock: str, given: str) -> None:
+    """Instead of nothing at all."""
+    before = "import os\nos.environ['ROS_DOMAIN_ID'] = '7'\n" if "domain" not in given else ""
+    summary = seen(tmp_path, clock, node=before + TALKER.format(sent="String()", given=given))
+    assert summary.nodes == ()
+    assert summary.notes == (
+        "node.py: the node /talker is in the ROS domain 7, where the grader does not see it; remove what sets "
+        "domain_id or ROS_DOMAIN_ID",
+    )
+
+
+@pytest.mark.ros
+@CLOCKS
+def test_two_nodes_of_one_name_are_told_apart_by_a_note(tmp_path: Path, clock: str) -> None:
+    """With the lines that give the name."""
+    text = TALKER.format(sent="String()", given="")
+    summary = seen(tmp_path, clock, one=text, two=text)
+    said = "one.py:9 and two.py:9: two nodes have the name /talker, and ROS cannot tell them apart"
+    assert [note.partition(": give")[0] for note in summary.notes] == [said]
+
+
+EVENTS = "rclpy.experimental.events_executor.EventsExecutor()"
+OUTSIDE = {
+    "subprocess.run([sys.executable, '-c', ''])": "node.py:11 starts another process, which runs in real time",
+    "signal.alarm(5)": "node.py:11 sets an alarm that rings in real time",
+    EVENTS: "node.py:11 makes an EventsExecutor, which waits in real time",
+}
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(("statement", "said"), OUTSIDE.items())
+def test_the_note_on_the_wall_clock_names_the_line(tmp_path: Path, statement: str, said: str) -> None:
+    """And what stands there."""
+    text = (
+        "import os\nimport signal\nimport subprocess\nimport sys\nimport rclpy\n"
+        "import rclpy.experimental.events_executor\n\n\ndef work():\n    rclpy.init()\n"
+        f"    {statement}\n\n\nwork()\nrclpy.spin(rclpy.create_node('n'))\n"
+    )
+    summary = seen(tmp_path, "auto", node=text)
+    reason = f"the node waits for something that is neither ROS nor time: {said}"
+    assert (summary.clock, summary.clock_reason) == (ClockKind.WALL, reason)
+    assert f"  note: recorded on the wall clock: {reason}\n" in render_summary(summary)
+    assert summary.faults == () or "alarm" in statement  # whose signal ends the program
+
+
+def test_output_that_only_looks_like_a_traceback_stays() -> None:
+    """Lines of standard output, and text that is indented without a call before it."""
+    texts = [
+        ("stdout", '  File "/usr/lib/python3/a.py", line 1, in f'),
+        ("stderr", "    indented"),
+        ("stderr", '  File "/usr/lib/python3/a.py", line 1, in f'),
+        ("stderr", "    g()"),
+        ("stderr", "    ^^^"),
+        ("stderr", "ValueError: x"),
+    ]
+    lines = [OutputLine(n, "a.py", stream, text) for n, (stream, text) in enumerate(texts)]
+    assert [line.text for line in without_libraries(lines)] == [
+        texts[0][1],
+        texts[1][1],
+        "  (1 call in Python and ROS)",
+        "ValueError: x",
+    ]
+
+
+SHARED = ROOT.parent / "shared" / "cases" / "fidelity"
+
+
+@pytest.mark.ros
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the programs of others are not here")
+@CLOCKS
+def test_services_of_others_are_in_the_graph(clock: str) -> None:
+    """Also of programs without a topic."""
+    files = (SHARED / "graph_server.py", SHARED / "graph_asks.py")
+    text = render_summary(observe(ObserveRequest(files, 2 * NS_PER_S, clock=clock), lambda _: None))
+    assert "Graph:\n  /asks ┄┄/ask┄┄▶ /server\n" in text

@@ -1,0 +1,473 @@
+"""`grade verify`: programs that repeat are told from those that do not, under conditions that really are made."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from sandboxes import USER, unreachable, user_start
+from verifying import GRADE, differences, program, verified, written
+
+from grader.cli.main import app
+from grader.grading.app import conditions as module
+from grader.grading.app import verify as verifying
+from grader.grading.app.conditions import LOOPS, VerifyCondition, conditions
+from grader.grading.model.conditions import CONDITIONS, SANDBOXES, USUAL
+from grader.grading.model.verification import ConditionState
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.ros_installation import RosInstallation
+from grader.runtime.sandbox.tiers import isolation_from_name
+
+#: What differs from run to run, and the cause that is found; none where the text tells nothing.
+DIFFERING = {
+    "address": (program(each='self.get_logger().info(f"sent by {id(object())}")'), "address"),
+    "shown_object": (program(each="self.get_logger().info(str(self.executor))"), "address"),
+    "set_of_objects": (
+        program(
+            imports="class Step:\n    def __init__(self, number):\n        self.number = number",
+            begin="self.steps = [step.number for step in {Step(n) for n in range(1000)}]",
+            each="self.get_logger().info(str(self.steps.pop()))",
+        ),
+        None,
+    ),
+    "processor_time": (
+        program(imports="import time", each='self.get_logger().info(f"{time.process_time():.9f}")'),
+        "processor_time",
+    ),
+    "uptime_of_the_kernel": (
+        program(each='self.get_logger().info(open("/proc/uptime").read())'),
+        "kernel",
+    ),
+    "file_time": (
+        program(
+            imports="import os", each='open("x", "w").close(); self.get_logger().info(str(os.stat("x").st_mtime_ns))'
+        ),
+        "kernel",
+    ),
+}
+#: Nodes in one executor, which keeps them in a set, with timers that are due at the same instants.
+SEVERAL_NODES = """
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class One(Node):
+    def __init__(self, number):
+        super().__init__(f"node_{number}")
+        self.publisher = self.create_publisher(String, f"/note_{number}", 10)
+        self.create_timer(0.1, self.tick)
+
+    def tick(self):
+        self.get_logger().info("tick")
+        self.publisher.publish(String(data=self.get_name()))
+
+
+rclpy.init()
+executor = SingleThreadedExecutor()
+for node in {One(number) for number in range(9)}:
+    executor.add_node(node)
+executor.spin()
+"""
+#: What repeats although it is drawn, or differs between machines.
+REPEATING = {
+    "plain": program(),
+    "set_of_texts": program(each='self.get_logger().info(str({f"step {n}" for n in range(50)}))'),
+    "randomness": program(
+        imports="import random, secrets, uuid, tempfile",
+        each="self.get_logger().info(str((random.random(), secrets.token_hex(), uuid.uuid4(), tempfile.mktemp())))",
+    ),
+    "randomness_after_numpy": program(
+        imports="import secrets\nimport numpy",
+        begin="self.generator = numpy.random.default_rng()",
+        each="self.get_logger().info(str((self.generator.random(), numpy.random.rand(), secrets.token_hex())))",
+    ),
+    "clocks": program(
+        imports="import time, datetime",
+        each="self.get_logger().info(str((time.time(), time.monotonic(), datetime.datetime.now())))",
+    ),
+    "machine": program(
+        imports="import os, locale",
+        each="self.get_logger().info(str((os.cpu_count(), os.getuid(), sorted(os.environ.get('TZ', '')))))",
+    ),
+    "depth_of_recursion": program(
+        imports="def deep(n=0):\n    try:\n        return deep(n + 1)\n    except RecursionError:\n        return n",
+        begin="print(deep())",
+    ),
+    "two_topics_at_once": program(
+        begin="self.others = [self.create_publisher(Twist, f'/x{n}', 10) for n in (3, 1, 2)]",
+        each="[other.publish(message) for other in self.others]",
+    ),
+    "several_nodes": SEVERAL_NODES,
+    "thread_that_raises": program(
+        imports="import threading",
+        begin="threading.Thread(target=int, args=('no number',)).start()",
+    ),
+    "threads": program(
+        imports="import threading, time",
+        begin="[threading.Thread(target=self.work, args=(n,), daemon=True).start() for n in range(4)]",
+        each="pass\n\n    def work(self, number):\n        while True:\n            time.sleep(0.1)\n            "
+        "self.get_logger().info(str(number))",
+    ),
+}
+#: What is decided on the wall clock, where which comes first is up to the machine.
+RACING = {
+    "race": program(
+        imports="import subprocess",
+        each='subprocess.run(["true"]); self.get_logger().info("done")',
+    ),
+}
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """An empty folder; unlike pytest's own, every user can enter what is above it."""
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
+@pytest.mark.ros
+def test_programs_that_repeat_are_told_from_those_that_do_not(folder: Path) -> None:
+    """By recording again, without any other change; those of the wall clock are neither."""
+    texts = {**{name: text for name, (text, _) in DIFFERING.items()}, **REPEATING, **RACING}
+    code, found = verified(written(folder, texts), "--condition", "again")
+    assert code == 1
+    assert found["result"] == "different"
+    assert {name: one["cause"] for name, one in differences(found).items()} == {
+        name: cause for name, (_, cause) in DIFFERING.items()
+    }
+    assert [Path(one["submission"]).name for one in found["not_comparable"]] == [*RACING]
+    assert [one["compared"] for one in found["conditions"]] == [found["scenarios"] - len(RACING)]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("condition", ["executed", "together"])
+def test_what_repeats_does_so_under_other_conditions(folder: Path, condition: str) -> None:
+    """Also what a program draws after it has imported numpy, and how deep it can recurse."""
+    code, found = verified(written(folder, REPEATING), "--condition", condition)
+    assert (code, differences(found)) == (0, {})
+
+
+@pytest.mark.ros
+def test_the_first_difference_says_where_it_is(folder: Path) -> None:
+    """With both events, and with the line that logged."""
+    text = program(imports="import itertools", each="self.get_logger().info(str(id(object())))")
+    (path,) = written(folder, {"ada": text})
+    done = subprocess.run([GRADE, "verify", path, "--condition", "again"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    line = 1 + text.splitlines().index("        self.get_logger().info(str(id(object())))")
+    assert "  DIFFERENT  again, with nothing changed: 1 of 1 scenario\n" in done.stdout
+    assert f", velocity_publisher, alone, event 1, velocity_publisher.py:{line}" in " ".join(done.stdout.split())
+    assert "  kind   content: another event\n" in done.stdout
+    assert "  first  t = 0.050 s  INFO [velocity_publisher] 1" in done.stdout
+
+
+@pytest.mark.ros
+def test_only_the_wall_clock_can_decide(folder: Path) -> None:
+    """Then nothing is verified, and the reason is said."""
+    (path,) = written(folder, RACING)
+    done = subprocess.run([GRADE, "verify", path, "--quick"], capture_output=True, text=True, check=False)
+    assert done.returncode == 3
+    assert "Not comparable event by event, because the wall clock decides:" in done.stdout
+    assert "there is nothing to compare" in done.stdout
+
+
+@pytest.mark.ros
+def test_the_result_in_evidence(folder: Path) -> None:
+    """The kept recordings are compared too; evidence of other files is refused, and judging again works as before."""
+    (path,) = written(folder, {"ada": REPEATING["plain"]})
+    kept = folder / "kept"
+    command = [GRADE, path, "--exercise", "velocity_publisher", "-o", f"evidence={kept}"]
+    subprocess.run(command, capture_output=True, check=False)
+    code, found = verified([path], "--evidence", str(kept), "--condition", "order")
+    assert (code, [(one["name"], one["state"]) for one in found["conditions"]]) == (
+        0,
+        [("kept", "same"), ("order", "same")],
+    )
+    assert json.loads((kept / "verification.json").read_text(encoding="utf-8")) == found
+    before = json.loads((kept / "report.json").read_text(encoding="utf-8"))
+    judged = subprocess.run([GRADE, "rejudge", str(kept), "--json"], capture_output=True, text=True, check=False)
+    assert json.loads(judged.stdout)["exercises"] == before["exercises"]
+    other = written(folder, {"bob": REPEATING["clocks"]})
+    done = subprocess.run(
+        [GRADE, "verify", *other, "--evidence", str(kept)], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, "found that of other files" in done.stderr) == (2, True)
+    subprocess.run(command, capture_output=True, check=False)  # a new recording has not been verified
+    assert not (kept / "verification.json").exists()
+
+
+@pytest.mark.ros
+def test_changed_evidence_differs(folder: Path) -> None:
+    """What was recorded of another version of the grader or on another machine is compared event by event."""
+    (path,) = written(folder, {"ada": REPEATING["plain"]})
+    kept = folder / "kept"
+    command = [GRADE, path, "--exercise", "velocity_publisher", "--seed", "1", "-o", f"evidence={kept}"]
+    subprocess.run(command, capture_output=True, check=False)
+    manifest = json.loads((kept / "evidence.json").read_text(encoding="utf-8"))
+    manifest["run"]["seed"] = 2
+    (kept / "evidence.json").write_text(json.dumps(manifest), encoding="utf-8")
+    done = subprocess.run([GRADE, "verify", path, "--evidence", str(kept)], capture_output=True, text=True, check=False)
+    assert done.returncode == 2  # the recording says with which seed it was made
+    assert "one that shows something else" in done.stderr
+
+
+@pytest.mark.ros
+@pytest.mark.long
+def test_an_ordinary_user(folder: Path, ros: RosInstallation) -> None:
+    """Who cannot become another one, and has another sandbox than root."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can become an ordinary user")
+    before = user_start(ros)
+    if why := unreachable(before, ros):
+        pytest.skip(why)
+    paths = written(folder, {"ada": REPEATING["plain"]})
+    home = folder / "home"
+    home.mkdir()
+    os.chown(home, USER, USER)
+    own = {"HOME": str(home), "XDG_CACHE_HOME": str(home), "TMPDIR": str(home)}
+    options = ("--condition", "order", "--condition", "user", "--condition", "bubblewrap-root")
+    code, found = verified(paths, *options, before=before, **own)
+    assert (code, [one["state"] for one in found["conditions"]]) == (0, ["same", "not_tried", "not_tried"])
+
+
+# --- the conditions ---------------------------------------------------------------------------------------------------
+
+#: Stands in for the program that records, and says what it was started with.
+SAYS = """
+import json, os, sys
+told = json.load(sys.stdin)
+parent = os.getppid()
+names = [name for name in os.listdir("/proc") if name.isdecimal() and int(name) != os.getpid()]
+loops = 0
+for name in names:
+    try:
+        status = open(f"/proc/{name}/stat").read().rpartition(")")[2].split()
+        loops += int(status[1]) == parent and b"while os.getppid() ==" in open(f"/proc/{name}/cmdline", "rb").read()
+    except OSError:
+        pass
+said = {name: os.environ.get(name) for name in ("TZ", "LANG", "PYTHONHASHSEED", "TMPDIR", "HOME", "GRADER_SEED_KEY")}
+said |= {"user": os.getuid(), "loops": loops, "cwd": os.getcwd(), "folder": os.path.isdir(said["TMPDIR"] or "/")}
+said |= {name: told[name] for name in ("isolation", "processors", "reverses", "executes")}
+print(json.dumps({"isolation": "x", "said": said}))
+"""
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[VerifyCondition], dict[str, Any]]:
+    """Start the stand-in under a condition, and return what it said."""
+    monkeypatch.setattr(verifying, "PROGRAM", (sys.executable, "-c", SAYS))
+    monkeypatch.setenv("GRADER_SEED_KEY", "a key that nobody else may read")
+    tmp_path.chmod(0o755)
+
+    def start(condition: VerifyCondition) -> dict[str, Any]:
+        (line,) = verifying._recorded(tmp_path, [], condition, "bubblewrap")
+        said: dict[str, Any] = line["said"]
+        return said
+
+    return start
+
+
+def made(name: str, isolation: str = "landlock") -> VerifyCondition:
+    (condition,) = conditions([name], isolation)
+    return condition
+
+
+def test_each_condition_is_made(started: Callable[[VerifyCondition], dict[str, Any]]) -> None:
+    """And nothing else is changed by it."""
+    usual = started(made("again"))
+    assert (usual["cwd"], usual["PYTHONHASHSEED"], usual["GRADER_SEED_KEY"], usual["loops"]) == ("/", "1", None, 0)
+    expected: dict[str, dict[str, Any]] = {
+        "order": {"reverses": True},
+        "processors": {"processors": [min(os.sched_getaffinity(0))]},
+        "load": {"loops": LOOPS * len(os.sched_getaffinity(0))},
+        "executed": {"executes": True},
+        "zone": {"TZ": "Asia/Kathmandu", "LANG": "de_DE.ISO-8859-1"},
+        "hashes": {"PYTHONHASHSEED": "2"},
+    }
+    for name, changes in expected.items():
+        assert started(made(name)) == {**usual, **changes}, name
+    said = started(made("folder"))
+    assert (said["folder"], Path(said["TMPDIR"]).name) == (True, "another temporary folder")
+    both = started(made("together"))
+    assert (both["reverses"], both["executes"], both["TZ"], both["PYTHONHASHSEED"]) == (
+        True,
+        True,
+        "Asia/Kathmandu",
+        "2",
+    )
+
+
+def test_no_loop_is_left(started: Callable[[VerifyCondition], dict[str, Any]]) -> None:
+    """Neither after a recording, nor if the one who started them is killed."""
+    started(made("load"))
+    assert started(made("again"))["loops"] == 0
+    # It holds the output of the one who started it, and ends at once, because that is another process than it is told.
+    loop = f"import subprocess, sys; subprocess.Popen([sys.executable, '-c', {verifying.LOOP!r}, str(2**22)])"
+    subprocess.run([sys.executable, "-c", loop], capture_output=True, check=True, timeout=300)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
+def test_another_user(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """With a home of its own; a program that this user cannot start is named."""
+    tmp_path.chmod(0o755)
+    says = 'cat > /dev/null; echo "{\\"said\\": \\"$(id -u) $(stat -c %u "$HOME")\\", \\"isolation\\": \\"x\\"}"'
+    monkeypatch.setattr(verifying, "PROGRAM", ("/bin/sh", "-c", says))
+    monkeypatch.setattr(module, "_unreachable", lambda user: "")
+    with tempfile.TemporaryDirectory() as name:  # every user can enter what is above it
+        Path(name).chmod(0o755)
+        condition = made("user")
+        (line,) = verifying._recorded(Path(name), [], condition, "none")
+    assert line["said"] == f"{condition.user} {condition.user}"
+    assert condition.user != 0
+    monkeypatch.undo()
+    monkeypatch.setattr(sys, "executable", "/nowhere/python")
+    assert made("user").not_tried == f"user {made('user').user} cannot execute /nowhere/python" or "cannot execute" in (
+        made("user").not_tried
+    )
+
+
+def test_what_this_machine_cannot_make_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the reason."""
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {3})
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    assert made("processors").not_tried == "there is one processor only"
+    assert made("user").not_tried == "only root can become another user"
+
+    def cannot(name: str) -> Any:
+        raise EnvironmentFault(f"isolation {name}: expected bubblewrap, found none")
+
+    monkeypatch.setattr(module, "isolation_from_name", cannot)
+    for name in SANDBOXES:
+        assert made(name, "none").not_tried == "expected bubblewrap, found none"
+    monkeypatch.setattr(module, "isolation_from_name", lambda name: type("Tier", (), {"can_fork": False}))
+    assert made("executed").not_tried == "in the sandbox landlock, each is executed anyway"
+    assert not made("together").executes
+
+
+def test_no_sandbox_is_tried_that_holds_less_unless_it_is_named() -> None:
+    """A stranger's program must not reach a network because somebody verifies it; and never without a sandbox."""
+    assert "none" not in CONDITIONS
+    assert set(USUAL) == set(CONDITIONS) - {"together"}
+    for name in SANDBOXES:
+        try:
+            isolation_from_name(name)
+        except EnvironmentFault:
+            continue
+        found = next(one for one in conditions([], "none") if one.name == name)
+        asked = made(name, "none")
+        if found.not_tried:
+            assert "does not contain" in found.not_tried or asked.not_tried
+        else:
+            assert not asked.not_tried
+
+
+def test_the_sandbox_of_the_first_recording_is_no_other_condition() -> None:
+    """It would only be recorded again."""
+    assert [one.name for one in conditions(["again", "landlock"], "landlock")] == ["again"]
+
+
+# --- failures ---------------------------------------------------------------------------------------------------------
+
+
+def run(*words: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, ["verify", *words])
+    return done.exit_code, done.output
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("nothing-here",), "expected a folder, a .py file or an archive, found nothing there"),
+        (("a", "--condition", "luck"), "'luck' is not one of 'again', 'order'"),
+        (("a", "--quick", "--condition", "order"), "--quick and --condition exclude each other"),
+        (("a", "b", "--evidence", "e"), "expected one SUBMISSION, found several"),
+        (("a", "--evidence", "e", "--seed", "7"), "leave out the other options"),
+        (("a", "--evidence", "e"), "e/evidence.json"),
+        (("a", "--seed", "7", "--seed-key", "k"), "--seed and --seed-key exclude each other"),
+    ],
+)
+def test_what_cannot_be_used(
+    words: Sequence[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Is said before anything is recorded."""
+    monkeypatch.chdir(tmp_path)
+    for name in "ab":
+        written(tmp_path, {name: REPEATING["plain"]})
+    code, output = run(*words)
+    assert (code, message in " ".join(output.split())) == (2, True), output
+
+
+def stand_in(monkeypatch: pytest.MonkeyPatch, code: str) -> None:
+    monkeypatch.setattr(
+        verifying, "PROGRAM", (sys.executable, "-c", f"import json, sys\ntold = json.load(sys.stdin)\n{code}")
+    )
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ('sys.exit("no memory")', "recording ended early: no memory"),
+        ("sys.exit(7)", "recording ended early: exit code 7"),
+        ('print(json.dumps({"problem": "isolation: none holds", "hint": "install it"}))', "isolation: none holds"),
+    ],
+)
+def test_a_first_recording_that_fails_is_no_difference(
+    code: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing was compared: the machine has a problem, and it is said which."""
+    stand_in(monkeypatch, code)
+    (path,) = written(tmp_path, {"ada": REPEATING["plain"]})
+    found = run(path, "--condition", "again")
+    assert (found[0], message in found[1]) == (3, True), found
+
+
+#: Answers with the same empty trace each time, or as another one does from the second time on.
+ANSWERS = """
+import os, pathlib
+mark = pathlib.Path({mark!r})
+times = len(mark.read_text()) if mark.exists() else 0
+mark.write_text("x" * (times + 1))
+print(json.dumps({{"isolation": "none", "can_fork": True}}))
+trace = {{"format": "grader/trace/v1", "scenario": "alone", "clock": "virtual", "clock_reason": "", "stop_ns": 5}}
+trace |= {{"notes": [], "harness_problem": "", "observations": []}}
+line = {{"number": 0, "exercise": "velocity_publisher", "scenario": "alone", "trace": trace}}
+if times:
+    {then}
+print(json.dumps(line))
+print(json.dumps({{"number": 0, "sources": {{}}}}))
+"""
+
+
+@pytest.mark.parametrize(
+    ("then", "code", "state"),
+    [
+        ("pass", 0, ConditionState.SAME),
+        ('trace["stop_ns"] = 6', 1, ConditionState.DIFFERENT),
+        ('trace["clock_reason"] = "it is late"', 1, ConditionState.DIFFERENT),
+        ('trace["harness_problem"] = "the machine was too busy"', 3, ConditionState.FAILED),
+        ('line = {"number": 0, "problem": "no space left", "hint": ""}', 3, ConditionState.FAILED),
+        ("sys.exit(1)", 3, ConditionState.FAILED),
+        ('line = {"number": 0, "sources": {}}', 3, ConditionState.FAILED),
+    ],
+)
+def test_exit_codes(
+    then: str, code: int, state: ConditionState, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A recording that is missing or failed is no difference, and does not count as the same either."""
+    stand_in(monkeypatch, ANSWERS.format(mark=str(tmp_path / "mark"), then=then))
+    (path,) = written(tmp_path, {"ada": REPEATING["plain"]})
+    found = CliRunner().invoke(app, ["verify", path, "--condition", "again", "--json", "--no-progress"])
+    assert found.exit_code == code, found.output
+    (condition,) = json.loads(found.stdout)["conditions"]
+    assert condition["state"] == state.value

@@ -1,0 +1,99 @@
+"""What a host tells of messages that were announced and did not come."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs rclpy")
+pytestmark = pytest.mark.ros
+
+HOST = str(Path(__file__).resolve().parents[3] / "grader/runtime/host")
+
+
+class Handle:
+    """A handle that the middleware fills: each message comes at one look, and pushes out what was not taken."""
+
+    pointer = 1
+
+    def __init__(self, coming: list[str]) -> None:
+        self.coming, self.there = coming, ""
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def look(self) -> bool:
+        """Let the next message come; return whether one is there."""
+        self.there = self.coming.pop(0) if self.coming else self.there
+        return bool(self.there)
+
+    def take_message(self, *_: object) -> str:
+        """Take the message that is there."""
+        taken, self.there = self.there, ""
+        return taken
+
+
+class Subscription:
+    """As much of a subscription as the ledger asks for."""
+
+    msg_type, raw = None, False
+
+    def __init__(self, topic: Any, *coming: str) -> None:
+        self.topic_name = topic
+        self.qos_profile = type("Qos", (), {"depth": 1})()
+        self.handle = Handle([*coming])
+
+
+@pytest.fixture
+def ledger(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A ledger of a process to which only that comes which a test says."""
+    monkeypatch.syspath_prepend(HOST)
+    import launcher  # type: ignore[import-not-found]
+
+    launcher.load_package()
+    module = importlib.import_module("_grader_host.ledger")
+    monkeypatch.setattr(module, "_valid", lambda _: True)
+    monkeypatch.setattr(module, "_await_ready", lambda receiver, context, *_: receiver.handle.look())
+    monkeypatch.setattr(module.Ledger, "_context", lambda _: object())
+    return module.Ledger()
+
+
+def announce(ledger: Any, subscription: Any, count: int = 1) -> None:
+    """Tell that something is on its way to a subscription, and wait for it."""
+    ledger._expected[subscription] = count
+    ledger.await_arrivals([subscription])
+
+
+@pytest.mark.rule(11)
+def test_what_does_not_come_is_told(ledger: Any) -> None:
+    """It may matter, and nobody can do anything about it but say so."""
+    heard = Subscription("/odom")
+    ledger.add("subscription", heard)
+    announce(ledger, heard, 2)
+    assert dict(ledger.lost) == {"/odom": 2}
+
+
+def test_what_a_subscription_misses_that_took_the_place_of_another_is_not_told(ledger: Any) -> None:
+    """`wait_for_message` in a loop makes a new one for every message: each has to be found first."""
+    first, second = Subscription("/odom"), Subscription("/odom")
+    for subscription in (first, second):
+        ledger.add("subscription", subscription)
+    announce(ledger, second)
+    assert not ledger.lost
+    assert not ledger.expects_anything()
+
+
+@pytest.mark.rule(11)
+def test_the_newest_of_several_messages_is_kept_however_late_it_comes(ledger: Any) -> None:
+    """How many messages a short queue has dropped cannot be known: the older one does not stand for both."""
+    heard = Subscription("/odom", "older", "newest")
+    ledger.add("subscription", heard)
+    ledger.expect({"topic /odom": 2})
+    assert list(ledger.kept(heard)) == ["newest"]
+    assert not ledger.lost

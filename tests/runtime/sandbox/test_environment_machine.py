@@ -1,0 +1,102 @@
+"""What a program sees of the machine is the same, wherever and by whomever it is graded."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from sandboxes import USER, unreachable, user_start
+
+from grader.runtime.ros_installation import find_ros
+from grader.runtime.sandbox.bubblewrap import USER_NAME
+from grader.runtime.sandbox.tiers import FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME
+
+pytestmark = pytest.mark.ros
+
+ROOT = Path(__file__).parents[3]
+PAGE = ROOT / "docs" / "reference" / "machine.md"
+GRADE = Path(sys.executable).with_name("grade")
+#: A shell that hands on as much as possible of what a process inherits.
+ODD_SHELL = "umask 077; ulimit -S -s 1024; trap '' HUP INT TERM USR1; exec nice -n 5 \"$@\""
+
+
+def documented() -> set[str]:
+    """Return the rows of the page that are fixed or drawn."""
+    table = PAGE.read_text(encoding="utf-8").partition("## Fixed or drawn")[2].partition("\n## ")[0]
+    cells = [line.split("|")[1].strip() for line in table.splitlines() if line.startswith("| ")]
+    assert cells[0] == "what"
+    return set(cells[1:])
+
+
+def rows(program: Path, *options: str, before: tuple[str, ...] = (), **variables: str) -> dict[str, str]:
+    """Return what the program printed under `grade observe`, by its row; skips if its tier does not work here."""
+    command = [*before, str(GRADE), "observe", str(program), "--duration", "1", "--json", *options]
+    environment = {**os.environ, **variables}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600, env=environment)
+    if done.stderr.startswith("error: isolation"):
+        pytest.skip(done.stderr.strip())
+    assert done.stdout, done.stderr
+    observed = json.loads(done.stdout)
+    assert [fault["kind"] for fault in observed["faults"]] == ["exited"], observed["faults"]
+    return dict(record["text"].split(" = ", 1) for record in observed["records"])
+
+
+@pytest.fixture(scope="module")
+def program() -> Iterator[Path]:
+    """The program, alone in a folder that every user can read."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)
+        yield Path(shutil.copy(Path(__file__).parent / "machine" / "machine.py", folder))
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """An empty folder; unlike pytest's own, every user can enter what is above it."""
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
+@pytest.fixture(scope="module")
+def usual(program: Path) -> dict[str, str]:
+    """What it prints in the strongest sandbox of this machine."""
+    return rows(program)
+
+
+def test_the_page_lists_what_the_program_prints(usual: dict[str, str]) -> None:
+    """Each row of the page that is fixed or drawn is printed and so compared."""
+    assert usual.keys() == documented()
+
+
+def test_on_one_processor_from_an_odd_shell(program: Path, usual: dict[str, str], folder: Path) -> None:
+    """Affinity, priority, umask, limits, signals, time zone, locale, folders and variables are the caller's."""
+    before = ("taskset", "-c", "0", "bash", "-c", ODD_SHELL, "bash")
+    variables = {"TZ": "Asia/Kathmandu", "LANG": "de_DE.ISO-8859-1", "LC_ALL": "C", "TMPDIR": str(folder)}
+    variables |= {"COLUMNS": "20", "TERM": "dumb", "USER": "somebody", "OMP_NUM_THREADS": "9", "PYTHONHASHSEED": "7"}
+    assert rows(program, before=before, **variables) == usual
+
+
+@pytest.mark.parametrize("tier", [FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME])
+def test_in_another_tier(program: Path, usual: dict[str, str], tier: str) -> None:
+    """The tiers without a view of files of their own answer alike."""
+    assert rows(program, "--isolation", tier) == usual
+
+
+def test_for_another_user(program: Path, usual: dict[str, str], folder: Path) -> None:
+    """An ordinary user, whose sandbox has a user namespace, sees what root sees."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can become another user")
+    ros = find_ros()
+    before = user_start(ros)
+    if why := unreachable(before, ros):
+        pytest.skip(why)
+    os.chown(folder, USER, USER)
+    own = {"HOME": str(folder), "XDG_CACHE_HOME": str(folder), "TMPDIR": str(folder)}
+    assert rows(program, "--isolation", USER_NAME, before=before, **own) == usual
