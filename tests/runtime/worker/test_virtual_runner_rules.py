@@ -74,7 +74,8 @@ class Run:
     """A run of scripted programs before an observer of some kind."""
 
     def __init__(self, kind: type[ScriptedObserver], *programs: Behaviour, **fields: Any) -> None:
-        world, self.log = World(), []
+        world = World()
+        self.log: list[tuple[str, dict[str, Any]]] = []
         self.students = [Student(name, made, world) for name, made in zip(("a.py", "b.py"), programs, strict=False)]
         for student in self.students:
             student.log = self.log
@@ -306,7 +307,7 @@ def marked_rules(source: str) -> Iterator[int]:
         if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
             for mark in node.decorator_list:
                 if isinstance(mark, ast.Call) and ast.unparse(mark.func) == "pytest.mark.rule":
-                    yield from (argument.value for argument in mark.args if isinstance(argument, ast.Constant))
+                    yield from (ast.literal_eval(argument) for argument in mark.args)
 
 
 def test_each_rule_of_virtual_time_has_a_test() -> None:
