@@ -10,12 +10,7 @@ from typing import Any
 from grader.runtime.machine import Patience
 from grader.runtime.model.trace import GraphSnapshot
 from grader.runtime.stimuli.calls import PlannedCalls
-from grader.runtime.worker.claims import (
-    CHANNELS,
-    answers,
-    meets,
-    serves,
-)
+from grader.runtime.worker.claims import CHANNELS, answers, meets, serves
 from grader.runtime.worker.core import Core
 from grader.runtime.worker.matching import Match, Matching
 from grader.runtime.worker.observer import Observer
