@@ -146,6 +146,7 @@ PURE = (
     "runtime/worker/claims.py",
     "runtime/worker/core.py",
     "runtime/worker/delay.py",
+    "runtime/worker/matching.py",
     "grading/model",
     "grading/judging",
     "grading/reporting",

@@ -148,7 +148,7 @@ finally:
 def test_every_submission_of_a_class_is_checked(tmp_path: Path) -> None:
     """Without asking for it: one that is right in virtual time only is found among honest ones, and only that one."""
     honest = (folder_of("correct/velocity_class") / "velocity_publisher.py").read_text(encoding="utf-8")
-    cheat = TESTS / "spot_checks" / "cheats" / "drawn_fraction.py"
+    cheat = TESTS / "grading" / "app" / "spot_checks" / "cheats" / "drawn_fraction.py"
     for name, text in {
         "ada": f"{honest}\n# ada\n",
         "bob": f"{honest}\n# bob\n",
