@@ -13,11 +13,11 @@ import pytest
 
 from grader.grading.submissions import projects
 from grader.grading.submissions.projects import read_projects
+from grader.runtime import contained
 from grader.runtime.model.projects import Project
 from grader.runtime.programs.executables import executables, find_executable
 from grader.runtime.programs.shares import install_shares
 from grader.runtime.ros_installation import RosInstallation
-from grader.runtime.supervisor import contained
 
 COSTLY = "setup.py: not read, because that would take too much memory or time"
 INVALID = "setup.py: not valid, so what is declared there is not used"
