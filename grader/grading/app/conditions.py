@@ -24,13 +24,10 @@ from grader.grading.model.conditions import (
     USUAL,
     ZONE,
 )
+from grader.runtime import machine
 from grader.runtime.model.checkup import missing
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault
-from grader.runtime.ros_installation import find_ros
-from grader.runtime.sandbox.choose import inspect_tier
-from grader.runtime.sandbox.exposure import some_user
-from grader.runtime.sandbox.tiers import isolation_from_name
 
 #: Busy loops for each processor under `load`: a node then gets a third of one.
 LOOPS = 2
@@ -92,7 +89,7 @@ def _processors(isolation: str) -> VerifyCondition:
 
 
 def _executed(isolation: str) -> VerifyCondition:
-    forks = isolation_from_name(isolation).can_fork
+    forks = machine.can_fork(isolation)
     lacks = "" if forks else f"in the sandbox {isolation}, each is executed anyway"
     return VerifyCondition(EXECUTED, "each program executed, not forked", lacks, executes=True)
 
@@ -102,7 +99,7 @@ def _user(isolation: str) -> VerifyCondition:
     words = "as another user"
     if os.geteuid() != 0:
         return VerifyCondition(USER, words, "only root can become another user")
-    user = some_user()
+    user = machine.other_user()
     return VerifyCondition(USER, words, _unreachable(user), isolation="auto", user=user)
 
 
@@ -129,8 +126,7 @@ def _sandbox(name: str, *, asked: bool) -> VerifyCondition:
     """Return the condition of another sandbox; unless asked for, only one that holds completely is tried."""
     words = f"in the sandbox {name}"
     try:
-        isolation_from_name(name)
-        report = inspect_tier(name, find_ros())
+        report = machine.sandbox(name)
     except EnvironmentFault as fault:
         return VerifyCondition(name, words, fault.message.partition(": ")[2], isolation=name)
     open_ones = [found.name for found in missing(report.properties)]
@@ -141,7 +137,7 @@ def _sandbox(name: str, *, asked: bool) -> VerifyCondition:
 
 
 def _together(isolation: str) -> VerifyCondition:
-    forks = isolation_from_name(isolation).can_fork
+    forks = machine.can_fork(isolation)
     return VerifyCondition(
         TOGETHER,
         "in another order, on one processor, elsewhere, with other hashes" + ", executed" * forks,

@@ -36,20 +36,20 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str]]:
         seen.append((request.isolation, request.files[0].read_text()))
         return SimpleNamespace(topics=[SimpleNamespace(name="/trial", messages=10)], faults=[])
 
-    monkeypatch.setattr(doctor, "find_ros", lambda: None)
-    monkeypatch.setattr(doctor, "software", lambda ros: ())
-    monkeypatch.setattr(doctor, "weaknesses", lambda ros: ())
+    monkeypatch.setattr(machine, "find_ros", lambda: None)
+    monkeypatch.setattr(machine, "software", lambda ros: ())
+    monkeypatch.setattr(machine, "weaknesses", lambda ros: ())
     monkeypatch.setattr(doctor, "observe", observe)
-    monkeypatch.setattr(doctor, "is_for_others", lambda name: name == "bubblewrap-root")
+    monkeypatch.setattr(machine, "is_for_others", lambda name: name == "bubblewrap-root")
     return seen
 
 
 def examined(monkeypatch: pytest.MonkeyPatch, *tiers: TierReport) -> Checkup:
-    monkeypatch.setattr(doctor, "find_ros", lambda: SimpleNamespace(runtime=None))
-    monkeypatch.setattr(doctor, "inspect_tiers", lambda ros: tiers)
-    monkeypatch.setattr(doctor, "byte_code", lambda runtime: Fact("byte code", "up to date"))
-    monkeypatch.setattr(doctor, "isolation_from_name", lambda name: SimpleNamespace(can_fork=name == "landlock"))
-    monkeypatch.setattr(doctor, "sandbox_memory", lambda ros: Fact("sandbox check", "remembered"))
+    monkeypatch.setattr(machine, "find_ros", lambda: SimpleNamespace(runtime=None, distro="jazzy"))
+    monkeypatch.setattr(machine, "inspect_tiers", lambda ros: tiers)
+    monkeypatch.setattr(machine, "byte_code", lambda runtime: Fact("byte code", "up to date"))
+    monkeypatch.setattr(machine, "isolation_from_name", lambda name: SimpleNamespace(can_fork=name == "landlock"))
+    monkeypatch.setattr(machine, "sandbox_memory", lambda ros: Fact("sandbox check", "remembered"))
     return doctor.examine(lambda step: None)
 
 
@@ -102,7 +102,7 @@ def test_without_ros_the_rest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     def none() -> NoReturn:
         raise EnvironmentFault("ROS 2: expected rclpy, found none in this environment", "pip install it")
 
-    monkeypatch.setattr(doctor, "find_ros", none)
+    monkeypatch.setattr(machine, "find_ros", none)
     result = CliRunner().invoke(app, ["doctor"])
     assert result.exit_code == 2
     assert result.stdout.startswith(

@@ -22,6 +22,7 @@ from grader.grading.app import verify as verifying
 from grader.grading.app.conditions import LOOPS, VerifyCondition, conditions
 from grader.grading.model.conditions import CONDITIONS, SANDBOXES, USUAL
 from grader.grading.model.verification import ConditionState
+from grader.runtime import machine
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import RosInstallation
 from grader.runtime.sandbox.tiers import isolation_from_name
@@ -347,10 +348,10 @@ def test_what_this_machine_cannot_make_is_named(monkeypatch: pytest.MonkeyPatch)
     def cannot(name: str) -> Any:
         raise EnvironmentFault(f"isolation {name}: expected bubblewrap, found none")
 
-    monkeypatch.setattr(module, "isolation_from_name", cannot)
+    monkeypatch.setattr(machine, "isolation_from_name", cannot)
     for name in SANDBOXES:
         assert made(name, "none").not_tried == "expected bubblewrap, found none"
-    monkeypatch.setattr(module, "isolation_from_name", lambda name: type("Tier", (), {"can_fork": False}))
+    monkeypatch.setattr(machine, "isolation_from_name", lambda name: type("Tier", (), {"can_fork": False}))
     assert made("executed").not_tried == "in the sandbox landlock, each is executed anyway"
     assert not made("together").executes
 
