@@ -26,9 +26,8 @@ from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.trace import Message
 from grader.runtime.plan import Plan, PlannedStart, derive
 from grader.runtime.recording.codec import from_json, observation_to_json, to_json
+from grader.runtime.session import TestJob, WorkerLostError
 from grader.runtime.steps import LaunchFailedError
-from grader.runtime.supervisor.supervisor import WorkerLostError
-from grader.runtime.supervisor.test_runs import TestJob
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
 from grader.world.programs import Found, Runnable
 from grader.world.world import World

@@ -42,9 +42,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
-from grader.runtime.session import RecordingSession, open_session
-from grader.runtime.supervisor.supervisor import Job
-from grader.runtime.supervisor.test_runs import TestJob, record_tests
+from grader.runtime.session import Job, RecordingSession, TestJob, open_session
 
 #: Programs per worker that are recorded before they are judged; limited because traces are large.
 _AT_ONCE = 6
@@ -71,7 +69,7 @@ class TrialRunner:
         """Grade a complete submission; the traces are those of its scenarios."""
         jobs = plan_jobs(self.request, [self.exercise], submission, self.bags, self.seed, self.interfaces)
         recorded = self.session.record(jobs, self.request.clock, self.progress)
-        recorded |= record_tests(self.session.recorder, self._tests(submission), self.progress)
+        recorded |= self.session.record_tests(self._tests(submission), self.progress)
         self.recordings += len(recorded)
         traces = {scenario: trace for (_, scenario), trace in recorded.items()}
         return result_of(judge_exercise(self.exercise, traces, submission, read_sources(submission))), traces
@@ -90,7 +88,7 @@ class TrialRunner:
             }
             recorded = self.session.record(jobs, self.request.clock, self.progress)
             tests = {(c.id, key[1]): job for c in chunk for key, job in self._tests(submissions[c.id]).items()}
-            recorded |= record_tests(self.session.recorder, tests, self.progress)
+            recorded |= self.session.record_tests(tests, self.progress)
             self.recordings += len(recorded)
             for candidate in chunk:
                 own = {scenario: trace for (id_, scenario), trace in recorded.items() if id_ == candidate.id}

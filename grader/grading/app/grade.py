@@ -32,11 +32,15 @@ from grader.runtime.model.releases import TRIED
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
 from grader.runtime.plan import derive, known_programs, plan_scenario
-from grader.runtime.programs.shares import install_shares
-from grader.runtime.session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
-from grader.runtime.supervisor.real_time_budget import RealTimeBudget
-from grader.runtime.supervisor.supervisor import Job
-from grader.runtime.supervisor.test_runs import TestJob, record_tests
+from grader.runtime.session import (
+    AUTO,
+    NO_ISOLATION,
+    Job,
+    RealTimeBudget,
+    RecordingSession,
+    TestJob,
+    planned_clock,
+)
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
@@ -102,7 +106,7 @@ def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
         first = None if later else take
         budget = RealTimeBudget(request.time_budget_s, spent_s=ready.provided.spent_s)
         traces = session.record(ready.jobs, request.clock, progress, first, budget=budget)
-        tested = record_tests(session.recorder, ready.tests, progress, budget)
+        tested = session.record_tests(ready.tests, progress, budget)
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
@@ -160,7 +164,7 @@ def prepared(
         unrecorded = [exercise for exercise in exercises if exercise.id not in done]
         prefixes: tuple[str, ...] = ()
         if unrecorded:
-            prefixes, problems = install_shares(submission.root, submission.projects, Path(prefix), session.ros)
+            prefixes, problems = session.install_shares(submission.root, submission.projects, Path(prefix))
             submission = replace(submission, notes=(*submission.notes, *problems))
         reaches = read_reaches(submission.root)
         folders, own_hashes = provided.folders, not HASHES.isdisjoint(reaches)
