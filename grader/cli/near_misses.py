@@ -16,8 +16,8 @@ from grader.grading.reporting.formats import FORMATS
 _ALIKE, _MOST_ENTRIES = 0.75, 500
 #: Words for commands that are options.
 _WORDS = {"help": "grade --help", "version": "grade --version", "watch": "grade --watch", "all": "grade --all"}
-#: Suffixes of reports -> format; several formats write JSON and text, these are the ones that people mean.
-_BY_SUFFIX = {".html": "html", ".htm": "html", ".json": "json", ".md": "markdown", ".xml": "junit", ".txt": "text"}
+#: Suffixes of reports -> format; of several formats with one suffix, people mean the first.
+_BY_SUFFIX = {".htm": "html", **{FORMATS[name].suffix: name for name in reversed(FORMATS)}}
 #: Files of formats that nobody grades, and that are often given.
 _NO_REPORT = ".pdf"
 

@@ -8,10 +8,12 @@ from typing import Any
 
 MET, NOT_MET = frozenset({"met"}), frozenset({"not_met", "blocked"})
 ANYTHING = frozenset({"met", "partly", "not_met", "blocked"})
-#: By a word of the table: the outcomes allowed to each criterion. None of them is ever undecided.
+#: A node that does what is asked gains nothing if the machine is too busy to see it; for all others that is a way out.
+MET_IF_SEEN = MET | {"undecided"}
+#: By a word of the table: the outcomes allowed to each criterion.
 EARNS: Mapping[str, Mapping[str, frozenset[str]]] = {
     # Beside its attack the node does what is asked, and gets what that is worth.
-    "honest": {"topic": MET, "rate": MET, "speed": MET, "log": MET},
+    "honest": {"topic": MET_IF_SEEN, "rate": MET_IF_SEEN, "speed": MET_IF_SEEN, "log": MET_IF_SEEN},
     # It publishes at a quarter of the rate; the attack must not make up for that.
     "slow": {"topic": MET, "rate": NOT_MET, "speed": ANYTHING, "log": MET},
     # A message class that checks its fields may refuse the number, which stops the node.
@@ -46,7 +48,8 @@ def objections(report: Mapping[str, Any], name: str, earns: str) -> Iterator[str
     for what, allowed in EARNS[earns].items():
         if criteria[what]["outcome"] not in allowed:
             yield f"{what} is {criteria[what]['outcome']}: {criteria[what]['reason']}"
-    yield from _attempts(criteria["log"], must_speak=earns not in SILENT)
+    unseen = criteria["log"]["outcome"] == "undecided"
+    yield from _attempts(criteria["log"], must_speak=earns not in SILENT and not unseen)
 
 
 def _attempts(log: Mapping[str, Any], *, must_speak: bool) -> Iterator[str]:

@@ -9,7 +9,7 @@ import json
 import re
 import unicodedata
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from html.parser import HTMLParser
 from typing import Any
 
@@ -37,9 +37,7 @@ def objections(format_: str, content: bytes) -> Iterator[str]:
         yield from _controls(text)
         commands = (_COMMAND.search(text), _ANNOTATION.search(text))
         yield from (f"a workflow command: {found[0].strip()}" for found in commands if found)
-    reader = {"html": _page, "markdown": _markdown, "junit": _xml, "text": _nothing, "github": _nothing, "csv": _cells}
-    reader["classroom"] = _packed
-    yield from reader.get(format_, _json)(text)
+    yield from READERS[format_](text)
 
 
 def _nothing(text: str) -> Iterator[str]:
@@ -153,3 +151,15 @@ class _Page(HTMLParser):
                 json.loads(data)
             except ValueError:
                 self.found.append("embedded data that was cut short")
+
+
+#: What looks at the reports of each format, and at the gradebook (`csv`): what hostile text would do there.
+READERS: Mapping[str, Callable[[str], Iterator[str]]] = {
+    **dict.fromkeys(("json", "gradescope", "prairielearn", "classroom50"), _json),
+    **dict.fromkeys(("text", "github"), _nothing),
+    "classroom": _packed,
+    "csv": _cells,
+    "html": _page,
+    "junit": _xml,
+    "markdown": _markdown,
+}

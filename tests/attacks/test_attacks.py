@@ -16,6 +16,7 @@ from arena import UNPRIVILEGED, Arena, Ran
 from attack_runs import HERE, read_attacks, run_unit, units
 from attack_verdicts import EARNS, objections
 
+from grader.grading.reporting.formats import FORMATS
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import find_ros
 from grader.runtime.sandbox.choose import inspect_tiers
@@ -173,6 +174,16 @@ def test_an_attack_that_says_that_it_escaped_is_believed() -> None:
     assert len(list(objections(report(said="hello", **right), "a01", "honest"))) == 1
 
 
+def test_a_busy_machine_is_no_success_of_an_honest_node() -> None:
+    """It cannot tell what it tried if nothing was seen of it, and it has gained nothing."""
+    unseen = dict.fromkeys(("topic", "rate", "speed", "log"), "undecided")
+    criteria = [
+        {"id": f"a01__{what}", "outcome": outcome, "reason": "", "evidence": {}} for what, outcome in unseen.items()
+    ]
+    assert list(objections({"exercises": [{"criteria": criteria}]}, "a01", "honest")) == []
+    assert len(list(objections({"exercises": [{"criteria": criteria}]}, "a01", "slow"))) == 4
+
+
 @pytest.mark.parametrize("rate", ["met", "partly", "undecided"])
 def test_a_slow_node_must_not_get_its_rate(rate: str) -> None:
     """An attack that improves a verdict, or makes it undecided, is not contained."""
@@ -202,6 +213,11 @@ BAD = {
     "markup on a platform": ("gradescope", b'{"output": "<iframe src=x>", "output_format": "html"}'),
     "not UTF-8": ("text", b"\xff"),
 }
+
+
+def test_the_reports_of_every_format_are_looked_at() -> None:
+    """By a reader that knows what hostile text could do in it."""
+    assert {*FORMATS, "csv"} == set(hostile_reports.READERS)
 
 
 @pytest.mark.parametrize(("format_", "content"), BAD.values(), ids=BAD)

@@ -74,7 +74,6 @@ from grader.runtime.model.scenario import (
     Time,
     TimeBetween,
     is_launch_file,
-    is_open,
     longest,
     shortest,
 )
@@ -194,7 +193,7 @@ def _in_stimulus(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlT
 def _cut_off(stimulus: Stimulus, observed: Span, late_ns: int, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
     """Yield a mistake if, for some draw, the observation ends before a case comes; `late_ns` is its time on the way."""
     time, needed_ns = observed.duration_ns, stimulus.course_ns() + late_ns
-    if (isinstance(time, TimeBetween) or is_open(stimulus)) and needed_ns > shortest(time):
+    if (isinstance(time, TimeBetween) or stimulus.is_open()) and needed_ns > shortest(time):
         text = f"expected at least {duration(needed_ns)}, so that every case is played whatever is drawn, found "
         text += f"{'as little as ' if isinstance(time, TimeBetween) else ''}{duration(shortest(time))}"
         yield tree.at(path).mistake(text)

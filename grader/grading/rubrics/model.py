@@ -68,7 +68,8 @@ _SHORT_FOR: Mapping[type[Stimulus], Mapping[str, type[Shape]]] = {
 def _stimuli() -> Iterator[tuple[str, type[Shape]]]:
     for kind in KINDS:
         if kind is not Simulated:  # its parameters are those of a simulation
-            yield kind.key, part_model(kind, f"{kind.key.capitalize()}Shape", **kind.shown)
+            name = "".join(word.capitalize() for word in kind.key.split("_"))
+            yield kind.key, part_model(kind, f"{name}Shape", **kind.shown)
             yield from _SHORT_FOR.get(kind, {}).items()
 
 

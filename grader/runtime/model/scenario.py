@@ -217,6 +217,15 @@ class Stimulus:
         """Return the latest time at which all its cases have been presented; for a server, when it appears."""
         return longest(self.start_ns)
 
+    def is_open(self) -> bool:
+        """Return whether the seed decides anything besides values: times, counts or orders.
+
+        This looks at the parameters. A kind that draws times which no parameter describes says so here.
+        """
+        parts = [getattr(self, one.name) for one in fields(self)]  # type: ignore[arg-type]  # each kind is a dataclass
+        inside = [item for part in parts if isinstance(part, tuple) for item in part]
+        return any(isinstance(part, (TimeBetween, CountBetween, AnyOrder, SomeOf)) for part in (*parts, *inside))
+
     def mistakes(self) -> Iterator[tuple[str, str]]:
         """Yield parameters that do not fit each other: the name of one in rubrics, and what was expected."""
         if 0 < getattr(self, "stop_ns", 0) <= longest(self.start_ns):
@@ -226,13 +235,6 @@ class Stimulus:
         """Return it with the paths of files, which a rubric names relative to its folder."""
         del folder
         return self
-
-
-def is_open(stimulus: Stimulus) -> bool:
-    """Return whether the seed decides anything besides values: times, counts or orders."""
-    parts = [getattr(stimulus, one.name) for one in fields(stimulus)]  # type: ignore[arg-type]  # each kind is one
-    inside = [item for part in parts if isinstance(part, tuple) for item in part]
-    return any(isinstance(part, (TimeBetween, CountBetween, AnyOrder, SomeOf)) for part in (*parts, *inside))
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,7 +81,7 @@ class PlannedBurst(Planned):
 class Burst(Stimulus):
     """A stimulus: several messages at one instant."""
 
-    key: ClassVar[str] = "burst"
+    key: ClassVar[str] = "a_burst"
     becomes = PlannedBurst
 
     topic: Topic
@@ -106,7 +106,7 @@ scenarios:
     processes: [listener.py]
     observe: {duration: 2 s}
     stimuli:
-      - burst: {topic: /heat, type: std_msgs/msg/Float32, start: 1 s, values: [{data: 20.2}, {data: 31.5}, {data: 47}]}
+      - a_burst: {topic: /heat, type: std_msgs/msg/Float32, start: 1 s, values: [{data: 20}, {data: 31.5}, {data: 47}]}
 criteria:
   - id: hears
     title: Logs each of them
@@ -146,6 +146,11 @@ def test_each_kind_is_sent_to_workers_under_a_name_of_its_own() -> None:
     assert len(PLANNED) == len({kind.key for kind in KINDS}) == len(KINDS)
 
 
+def test_no_kind_is_derived_from_another() -> None:
+    """Whoever asks for the one would find the other as well."""
+    assert [(a, b) for a in KINDS for b in KINDS if a is not b and issubclass(a, b)] == []
+
+
 @pytest.mark.ros
 def test_a_kind_is_one_module_and_its_row(tmp_path: Path) -> None:
     """In a copy of the package: read from a rubric, drawn, sent to a worker, checked, played, judged and explained."""
@@ -159,7 +164,8 @@ def test_a_kind_is_one_module_and_its_row(tmp_path: Path) -> None:
         "from grader.runtime.stimuli.calls",
         "from grader.runtime.stimuli.burst import Burst\nfrom grader.runtime.stimuli.calls",
     )
-    table.write_text(text.replace("    Simulated,\n)", "    Simulated,\n    Burst,\n)"), encoding="utf-8")
+    before, _, after = text.partition("\n)\n")  # the end of `KINDS`
+    table.write_text(f"{before}\n    Burst,\n)\n{after}", encoding="utf-8")
     (tmp_path / "rubric.yaml").write_text(RUBRIC, encoding="utf-8")
     (tmp_path / "listener.py").write_text(LISTENER, encoding="utf-8")
 
