@@ -21,11 +21,11 @@ from grader.grading.rubrics.draws import First
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric
 from grader.grading.rubrics.simulations import Offered, offered
 from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlTree, read_yaml
-from grader.grading.submissions.collected import shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError, RecordingError, RubricError
 from grader.runtime.model.quantities import duration
 from grader.runtime.model.scenario import Scenario, is_launch_file, shortest
+from grader.runtime.model.wording import shown
 from grader.runtime.stimuli.recorded import RecordedStream
 from grader.runtime.stimuli.simulation import Simulated
 

@@ -13,9 +13,9 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, Validation
 
 from grader.grading.rubrics.mistakes import mistakes_of, nearest
 from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError
+from grader.runtime.model.wording import listed, shown
 
 #: A file of some thousand students with reasons has less.
 MAX_BYTES = 1 << 20

@@ -14,9 +14,9 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 from grader.grading.model.exercise import Exercise
 from grader.grading.rubrics.mistakes import mistakes_of, nearest
 from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
+from grader.runtime.model.wording import listed, shown
 
 SCHEMA = "grader/selftest-notes/v1"
 MAX_BYTES = 256 * 1024

@@ -35,13 +35,13 @@ from grader.grading.app.seeds import PRACTICE
 from grader.grading.judging.judge_run import judge_exercise
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.rubric_files import notes_on, rubric_file
-from grader.grading.submissions.collected import shown
 from grader.grading.submissions.sources import read_sources
 from grader.grading.submissions.submission import stage_submission
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
+from grader.runtime.model.wording import shown
 from grader.runtime.session import Job, RecordingSession, TestJob, open_session
 
 #: Programs per worker that are recorded before they are judged; limited because traces are large.

@@ -23,7 +23,6 @@ from grader.grading.model.exercise import Exercise, exercise_name
 from grader.grading.model.report import Environment, Report
 from grader.grading.model.run import Run
 from grader.grading.rubrics.builtin import builtin_exercises, exercise_ids
-from grader.grading.submissions.collected import listed, shown
 from grader.grading.submissions.sources import HASHES, read_reaches, read_sources
 from grader.grading.submissions.submission import stage_collected, stage_submission
 from grader.runtime.model.dataclass import dataclass
@@ -31,6 +30,7 @@ from grader.runtime.model.errors import EvidenceError, SubmissionError
 from grader.runtime.model.releases import TRIED
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
+from grader.runtime.model.wording import listed, shown
 from grader.runtime.plan import derive, known_programs, plan_scenario
 from grader.runtime.session import (
     AUTO,

@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING
 from grader.grading.app.ros_packages import LENDABLE, LENT, Lent, copied, lent_to
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.report import BroughtPackage, DescribedPackage
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.interfaces.build import BuiltInterfaces, build
 from grader.runtime.interfaces.definitions import InterfacePackage, digest, files_in, find_packages, shipped_packages
 from grader.runtime.interfaces.program import needed
@@ -29,6 +28,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault, RubricError
 from grader.runtime.model.submission import Definition, Submission
 from grader.runtime.model.trace import Delivery, Message, Trace
+from grader.runtime.model.wording import listed, shown
 from grader.runtime.ros_installation import RosInstallation, find_ros
 from grader.runtime.session import RecordingSession
 from grader.runtime.shipped import PACKAGE

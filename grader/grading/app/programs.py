@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from grader.grading.submissions.collected import Collected, first_of, listed
+from grader.grading.submissions.collected import Collected
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.submission import collect_submission, stage_collected, stage_submission
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.projects import Project
 from grader.runtime.model.submission import Submission
+from grader.runtime.model.wording import first_of, listed
 from grader.runtime.programs.executables import executables, find_executables
 
 #: What can be named.

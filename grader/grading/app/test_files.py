@@ -6,8 +6,8 @@ from pathlib import Path
 
 from grader.grading.app.interface_packages import modules_for
 from grader.grading.model.exercise import Exercise
-from grader.grading.submissions.collected import shown
 from grader.runtime.model.errors import RubricError
+from grader.runtime.model.wording import shown
 from grader.runtime.session import collected_tests
 
 

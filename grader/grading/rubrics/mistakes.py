@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlTree, nearest_position
-from grader.grading.submissions.collected import listed, shown
+from grader.runtime.model.wording import listed, shown
 
 #: pydantic's kind of error -> what was expected.
 _EXPECTED: Mapping[str, str] = {

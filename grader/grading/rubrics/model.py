@@ -39,9 +39,9 @@ from grader.grading.rubrics.types import (
     wrong,
 )
 from grader.grading.rubrics.variants import VariantsField
-from grader.grading.submissions.collected import listed
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.scenario import Connection, Span, Stimulus
+from grader.runtime.model.wording import listed
 from grader.runtime.simulation.robots import SIMULATIONS
 from grader.runtime.stimuli import KINDS
 from grader.runtime.stimuli.calls import ServiceCalls
