@@ -12,7 +12,6 @@ from pathlib import Path
 from random import Random
 from typing import Any, ParamSpec, TypeVar
 
-from grader.grading.app.programs import package_of
 from grader.runtime.message_classes import built, plain_fields
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
@@ -33,6 +32,7 @@ from grader.runtime.model.trace import (
     Trace,
 )
 from grader.runtime.plan import Plan, PlannedConnection, PlannedStart, derive, ros_arguments
+from grader.runtime.programs.executables import package_of
 from grader.runtime.serialization import (
     QoSProfile,
     parameter_message,

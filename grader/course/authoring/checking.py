@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.grading.app.bags import recordings_of
-from grader.grading.app.interface_packages import known_interfaces
+from grader.grading.app.interfaces import known_interfaces
 from grader.grading.app.test_files import collect_tests
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.tested import TESTED

@@ -21,7 +21,7 @@ from grader.course.authoring.skeleton import (
 )
 from grader.grading.app.grade import Progress
 from grader.grading.app.inputs import FIRST_S, NOTHING, SentMessages, copied, period_s
-from grader.grading.app.interface_packages import known_interfaces
+from grader.grading.app.interfaces import known_interfaces
 from grader.grading.app.observe import ObserveRequest, undisturbed, watch
 from grader.grading.judging.findings import fault_sentence
 from grader.grading.judging.values import carries_number, student_endpoints

@@ -43,7 +43,7 @@ from grader.course.similarity.library import ComparedProgram, Handed, Similar
 from grader.course.similarity.pages import MOST_PAGES, OVERVIEW, page_name, render_overview, render_pair, render_table
 from grader.grading.app.bags import read_given, read_recordings, recordings_digest
 from grader.grading.app.grade import read_exercises, wanted_files
-from grader.grading.app.interface_packages import offered_digest
+from grader.grading.app.interfaces import rubric_folders
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.seeds import kept_key
 from grader.grading.model.exercise import Exercise
@@ -55,6 +55,7 @@ from grader.grading.reporting.html.final_mark import render_refusal, with_final_
 from grader.grading.reporting.json_report import ReportData
 from grader.grading.reporting.rejudged import ReportChange, change, render_changes_table
 from grader.grading.rubrics.draws import First
+from grader.runtime.interface_packages import offered_digest
 from grader.runtime.model.errors import ClassError, GraderError, HarnessError, SubmissionError
 from grader.runtime.temp_dirs import scratch_folder
 
@@ -154,7 +155,7 @@ def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Condi
         rubrics=tuple((exercise.id, exercise.digest) for exercise in exercises),
         recording=recordings_digest(read_given(grading, read_recordings(grading, exercises))),
         options=GradingOptions(**values(grading)),
-        interfaces=offered_digest(grading.interfaces, exercises),
+        interfaces=offered_digest(grading.interfaces, rubric_folders(exercises)),
     )
 
 

@@ -29,7 +29,7 @@ from grader.course.mutation.results import (
 )
 from grader.grading.app.bags import Recordings, read_recordings
 from grader.grading.app.grade import Progress, plan_jobs, plan_tests, read_exercises
-from grader.grading.app.interface_packages import provide
+from grader.grading.app.interfaces import provided_for
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.seeds import PRACTICE
 from grader.grading.judging.judge_run import judge_exercise
@@ -179,7 +179,7 @@ def _bench(  # noqa: PLR0913  each comes from a different stage
         reference=reference,
         sources=_sources(reference, exercise),
         progress=progress,
-        interfaces=provide(session, [exercise], (), reference).folders,
+        interfaces=provided_for(session, [exercise], (), reference).folders,
         workers=options.jobs or 1,
     )
 

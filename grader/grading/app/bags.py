@@ -124,7 +124,7 @@ def _define(folders: tuple[Path, ...]) -> Define:
 
     def definition(type_: str) -> str | None:
         # Takes long, and is seldom needed.
-        from grader.grading.app.interface_packages import known_interfaces  # noqa: PLC0415
+        from grader.grading.app.interfaces import known_interfaces  # noqa: PLC0415
 
         known = known_interfaces(folders)
         found = known.definition(type_) if known is not None else None

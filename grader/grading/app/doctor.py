@@ -7,12 +7,12 @@ import time
 from pathlib import Path
 
 from grader.grading.app.grade import Progress
-from grader.grading.app.interface_packages import described
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.model import entry_points
 from grader.grading.reporting.formats import EVIDENCE, FORMATS, format_of
 from grader.grading.submissions.foreign_archives import install_command, is_installed
 from grader.runtime import machine
+from grader.runtime.interface_packages import described
 from grader.runtime.model.checkup import NO_SANDBOX, Checkup, Exchange, Fact
 from grader.runtime.model.errors import EnvironmentFault, GraderError
 from grader.runtime.model.limits import Limits

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 import grader
 from grader.grading.app.bags import Recordings, read_given, read_recordings, recordings_digest, refuse_unplayed
-from grader.grading.app.interface_packages import Provided, definitions, known_interfaces, provide
+from grader.grading.app.interfaces import definitions, known_interfaces, provided_for
 from grader.grading.app.request import GradeRequest, reproduction
 from grader.grading.app.seeds import PRACTICE_NOTE
 from grader.grading.app.spot_checks import SpotChecks, check
@@ -25,6 +25,7 @@ from grader.grading.model.run import Run
 from grader.grading.rubrics.builtin import builtin_exercises, exercise_ids
 from grader.grading.submissions.sources import HASHES, read_reaches, read_sources
 from grader.grading.submissions.submission import stage_collected, stage_submission
+from grader.runtime.interface_packages import Provided
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EvidenceError, SubmissionError
 from grader.runtime.model.releases import TRIED
@@ -157,7 +158,7 @@ def prepared(
         played = recordings_digest(read_given(request, recordings))
         seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
         environment = environment_of(session)
-        provided = provide(session, exercises, request.interfaces, submission, request.time_budget_s)
+        provided = provided_for(session, exercises, request.interfaces, submission, request.time_budget_s)
         submission = replace(submission, notes=(*submission.notes, *provided.problems))
         kept = _kept(request, exercises, submission, played, seed, environment, provided.offered)
         done = {exercise for exercise, _ in kept}

@@ -12,7 +12,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from grader.grading.app.interface_packages import known_interfaces
+from grader.grading.app.interfaces import known_interfaces
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric
 from grader.grading.rubrics.yaml_tree import YamlSyntaxError, read_yaml
 from grader.runtime.model.dataclass import dataclass

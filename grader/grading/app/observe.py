@@ -9,13 +9,13 @@ from pathlib import Path
 from grader.grading.app.bags import observed, recordings_of
 from grader.grading.app.grade import Progress
 from grader.grading.app.inputs import NamedSimulation, SentMessages, messages, simulated
-from grader.grading.app.interface_packages import provide
 from grader.grading.app.programs import find_targets, stage
 from grader.grading.app.seeds import PRACTICE
 from grader.grading.judging.summary import summarise
 from grader.grading.judging.values import student_endpoints
 from grader.grading.model.report import Summary
 from grader.grading.submissions.sources import source_text
+from grader.runtime.interface_packages import provide
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.limits import MOST_LAUNCHED, Limits
@@ -87,7 +87,7 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         submission = stage(targets, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, recordings=recordings, clock=clock)
-        provided = provide(session, (), request.interfaces, submission)
+        provided = provide(session, submission, course=request.interfaces)
         installed = session.folder / "installed"
         prefixes, _ = session.install_shares(submission.root, submission.projects, installed)
         plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)

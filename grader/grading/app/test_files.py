@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader.grading.app.interface_packages import modules_for
+from grader.grading.app.interfaces import modules_for
 from grader.grading.model.exercise import Exercise
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.wording import shown
