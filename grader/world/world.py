@@ -44,8 +44,8 @@ from grader.runtime.serialization import (
     type_of_part,
 )
 from grader.runtime.session import RecordingSession, SteppedRun
+from grader.runtime.simulation import Moment, Simulation
 from grader.runtime.simulation.loading import made
-from grader.runtime.simulation.participant import Moment, Simulation
 from grader.runtime.steps import (
     Advance,
     CallService,
@@ -58,7 +58,7 @@ from grader.runtime.steps import (
     Simulate,
     StartProcesses,
 )
-from grader.runtime.stimuli.goals import PlannedGoal
+from grader.runtime.stimuli import PlannedGoal
 from grader.world import telling
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
 from grader.world.interfaces import let_import, modules_for

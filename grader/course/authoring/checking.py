@@ -26,8 +26,7 @@ from grader.runtime.model.errors import HarnessError, RecordingError, RubricErro
 from grader.runtime.model.quantities import duration
 from grader.runtime.model.scenario import Scenario, is_launch_file, shortest
 from grader.runtime.model.wording import shown
-from grader.runtime.stimuli.recorded import RecordedStream
-from grader.runtime.stimuli.simulation import Simulated
+from grader.runtime.stimuli import RecordedStream, Simulated
 
 #: The points of a rubric should add up to a multiple of this, for easy arithmetic.
 ROUND = 5

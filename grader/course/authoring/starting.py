@@ -35,7 +35,7 @@ from grader.runtime.model.errors import GraderError, RubricError, SubmissionErro
 from grader.runtime.model.quantities import NS_PER_S, seconds
 from grader.runtime.model.scenario import ODOMETRY, Scenario
 from grader.runtime.model.trace import FaultKind, Trace
-from grader.runtime.stimuli.simulation import Simulated
+from grader.runtime.stimuli import Simulated
 
 _VALUES = (1, 2, 3, 4)
 _CALLS = 3

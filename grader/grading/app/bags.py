@@ -17,7 +17,7 @@ from grader.runtime.model.scenario import ODOMETRY
 from grader.runtime.model.wording import listed, shown
 from grader.runtime.recording.bag import BagMinimum, Define, read_bag, topics_in
 from grader.runtime.shipped import PACKAGE, shipped
-from grader.runtime.stimuli.recorded import RecordedStream, Recording
+from grader.runtime.stimuli import RecordedStream, Recording
 
 if TYPE_CHECKING:
     from grader.grading.app.request import GradeRequest

@@ -19,7 +19,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError, RubricError
 from grader.runtime.model.scenario import Stimulus
 from grader.runtime.model.wording import listed, shown
-from grader.runtime.simulation.robots import SIMULATIONS
+from grader.runtime.simulation import SIMULATIONS
 
 #: Time before the first message, in seconds, to observe how the nodes wait.
 FIRST_S = 1.0

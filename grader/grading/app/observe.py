@@ -25,7 +25,7 @@ from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
 from grader.runtime.plan import plan_scenario
 from grader.runtime.session import Job, open_session, planned_clock
-from grader.runtime.stimuli.recorded import RecordedStream
+from grader.runtime.stimuli import RecordedStream
 
 #: When a given recording starts playing; before that the nodes receive nothing of it.
 RECORDED_AFTER_NS = NS_PER_S

@@ -24,7 +24,7 @@ from grader.runtime.model.errors import EvidenceError
 from grader.runtime.model.packages import BroughtPackage
 from grader.runtime.model.scenario import ODOMETRY, Scenario
 from grader.runtime.model.submission import Definition, StudentFile
-from grader.runtime.stimuli.recorded import RecordedStream
+from grader.runtime.stimuli import RecordedStream
 
 #: Describes the run and lists its recordings; written last.
 MANIFEST = "evidence.json"

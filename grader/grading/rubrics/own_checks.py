@@ -25,9 +25,7 @@ from grader.runtime.model.author_files import line_of, words_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.wording import shown
-from grader.runtime.simulation import loading
-from grader.runtime.simulation.participant import Simulation
-from grader.runtime.simulation.robots import SIMULATIONS
+from grader.runtime.simulation import SIMULATIONS, Simulation, loading
 
 #: Largest file of checks, in bytes.
 MAX_BYTES = 256 * 1024
