@@ -148,6 +148,7 @@ PURE = (
     "grading/model",
     "grading/judging",
     "grading/reporting",
+    "course/class_page",
     "course/mutation/operators",
 )
 

@@ -16,6 +16,8 @@ from functools import partial
 from pathlib import Path
 
 import grader
+from grader.course.class_page.class_links import with_class_links
+from grader.course.class_page.contents import PageLink
 from grader.course.classroom.adjustments import Adjustments, read_adjustments, with_criteria
 from grader.course.classroom.class_page import RunOfClass, folders_of, links_between, title_of, without_folders
 from grader.course.classroom.final_marks import MARK, dump_mark, kept_mark, shown_mark
@@ -48,9 +50,7 @@ from grader.grading.app.request import GradeRequest
 from grader.grading.app.seeds import kept_key
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.grading_options import GradingOptions, values
-from grader.grading.reporting.class_page.contents import PageLink
 from grader.grading.reporting.escape import json_value
-from grader.grading.reporting.html.class_links import with_class_links
 from grader.grading.reporting.html.final_mark import render_refusal, with_final_mark
 from grader.grading.reporting.json_report import ReportData
 from grader.grading.reporting.rejudged import ReportChange, change, render_changes_table
