@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from grader.grading.judging.wording import listed, nearest
+from grader.grading.model.wording import listed, nearest
 from grader.runtime.message_classes import built, message_class
 from grader.runtime.model.author_files import line_of, words_of
 from grader.runtime.model.errors import GraderError, HarnessError, SubmissionError

@@ -10,8 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
-from grader.grading.judging.wording import listed, nearest
-from grader.grading.submissions.projects import read_projects
+from grader.grading.model.wording import listed, nearest
+from grader.grading.submissions.submission import read_projects
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.projects import Project

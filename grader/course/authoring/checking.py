@@ -19,8 +19,8 @@ from grader.grading.model.exercise import Criterion, Exercise, named, roles_of
 from grader.grading.rubrics.check_parameters import manual_of
 from grader.grading.rubrics.draws import First
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric
+from grader.grading.rubrics.mistakes import Mistake, TreePath, YamlTree, read_yaml
 from grader.grading.rubrics.simulations import Offered, offered
-from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlTree, read_yaml
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError, RecordingError, RubricError
 from grader.runtime.model.quantities import duration

@@ -25,8 +25,8 @@ from grader.grading.app.interfaces import known_interfaces
 from grader.grading.app.observe import ObserveRequest, undisturbed, watch
 from grader.grading.judging.findings import fault_sentence
 from grader.grading.judging.values import carries_number, student_endpoints
-from grader.grading.judging.wording import quote
 from grader.grading.model.exercise import Exercise
+from grader.grading.model.wording import quote
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric
 from grader.grading.rubrics.simulations import offered

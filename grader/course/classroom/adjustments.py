@@ -11,8 +11,15 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
-from grader.grading.rubrics.mistakes import mistakes_of, nearest
-from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
+from grader.grading.rubrics.mistakes import (
+    Mistake,
+    TreePath,
+    YamlSyntaxError,
+    YamlTree,
+    mistakes_of,
+    nearest,
+    read_yaml,
+)
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError
 from grader.runtime.model.wording import listed, shown

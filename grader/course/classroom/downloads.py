@@ -15,7 +15,11 @@ from pathlib import Path
 
 from grader.grading.submissions.archives import (
     ARCHIVE_SUFFIXES,
+    FILE,
+    FOLDER,
     HEAD_BYTES,
+    Member,
+    UnusableArchiveError,
     archive_kind,
     is_tar,
     tar_members,
@@ -23,7 +27,6 @@ from grader.grading.submissions.archives import (
     zip_members,
 )
 from grader.grading.submissions.collected import collision, is_skipped, name_problem, why_skipped
-from grader.grading.submissions.members import FILE, FOLDER, Member, UnusableArchiveError
 from grader.runtime.files import write_whole
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, HarnessError

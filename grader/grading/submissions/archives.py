@@ -43,6 +43,22 @@ from grader.runtime.model.limits import (
 )
 from grader.runtime.model.wording import shown
 
+__all__ = [
+    "ARCHIVE_SUFFIXES",
+    "FILE",
+    "FOLDER",
+    "HAND_IN_ZIP",
+    "HEAD_BYTES",
+    "Member",
+    "UnusableArchiveError",
+    "archive_kind",
+    "collect_archive",
+    "is_tar",
+    "tar_members",
+    "unpacked",
+    "zip_members",
+]
+
 HAND_IN_ZIP = "pack the folder with your .py files as a zip"
 
 BLOCK = 512

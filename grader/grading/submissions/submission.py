@@ -21,6 +21,17 @@ from grader.runtime.model.submission import EXPORT_NOTEBOOK, StudentFile, Submis
 from grader.runtime.model.wording import first_of, listed, shown
 from grader.runtime.programs.executables import Executable, executables, find_executables
 
+__all__ = [
+    "collect_submission",
+    "every_file",
+    "not_there",
+    "read_projects",
+    "read_start",
+    "stage_collected",
+    "stage_submission",
+    "write_files",
+]
+
 #: Names at least this similar are shown as a possible misspelling.
 SIMILARITY = 0.8
 
