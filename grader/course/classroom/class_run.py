@@ -59,6 +59,15 @@ from grader.runtime.interface_packages import offered_digest
 from grader.runtime.model.errors import ClassError, GraderError, HarnessError, SubmissionError
 from grader.runtime.temp_dirs import scratch_folder
 
+__all__ = [
+    "ClassRequest",
+    "Status",
+    "compare_class",
+    "conditions_of",
+    "grade_class",
+    "link_of_earlier_run",
+]
+
 SIMILARITY_FOLDER, SIMILARITY_TABLE = "similarity", "similarity.csv"
 #: Adjustments in the results folder, which count where no others are named.
 ADJUSTMENTS = "adjust.yaml"

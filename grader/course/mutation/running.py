@@ -44,6 +44,13 @@ from grader.runtime.model.trace import Trace
 from grader.runtime.model.wording import shown
 from grader.runtime.session import Job, RecordingSession, TestJob, open_session
 
+__all__ = [
+    "SelftestOptions",
+    "SelftestResult",
+    "TrialRunner",
+    "selftest",
+]
+
 #: Programs per worker that are recorded before they are judged; limited because traces are large.
 _AT_ONCE = 6
 
