@@ -83,6 +83,8 @@ def _student(
 
 #: More causes than the first number are folded, more than the second only counted.
 FIRST_CAUSES, MOST_CAUSES = 8, 40
+#: More entries of a list, such as that of crashes, are folded: this many fill a screen.
+FIRST_ENTRIES = 30
 REPORT_PAGE, REPORT_DATA = "report.html", "report.json"
 #: The same as far as students may see it.
 HANDED_BACK_PAGE = "feedback.html"
@@ -102,6 +104,7 @@ def render_class(page: ClassPage, *, assets: str | None = None) -> str:
         exercises=exercises,
         causes=found,
         first_causes=FIRST_CAUSES,
+        first_entries=FIRST_ENTRIES,
         most_causes=MOST_CAUSES,
         spread=spread,
         tiles=_tiles(page, spread),

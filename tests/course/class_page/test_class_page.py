@@ -191,6 +191,18 @@ def test_a_class_without_reports_has_a_page() -> None:
     assert exercise_counts([]) == ()
 
 
+@pytest.mark.parametrize(("count", "folds"), [(30, 0), (31, 1), (1667, 1)])
+def test_a_long_list_is_folded_after_a_screen(count: int, folds: int) -> None:
+    """Everybody in it is there, in order."""
+    entries = tuple(PageEntry(f"entry {number}", 0) for number in range(count))
+    bare = parsed(student(), listings=(Listing("l", "List", "about", ()),))[0]
+    found, _ = parsed(student(), listings=(Listing("l", "List", "about", entries),))
+    listed = [text for text in map(str.strip, found.texts) if text.removeprefix(": ").startswith("entry ")]
+    assert [text.removeprefix(": ") for text in listed] == [entry.text for entry in entries]
+    assert found.tags["details"] == bare.tags["details"] + folds
+    assert (f"{count - 30} more" in "".join(found.texts)) == bool(folds)
+
+
 @pytest.mark.parametrize("text", HOSTILE)
 def test_hostile_text_stays_text(text: str) -> None:
     """Wherever somebody else chose the words: names, remarks, decisions, reasons, titles, lists, links, facts."""

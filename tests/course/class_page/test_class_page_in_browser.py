@@ -32,7 +32,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 class Visit:
     """A page that was opened, what its console said, and what it asked for."""
 
-    def __init__(self, browser: Browser, folder: Path, **options: Any) -> None:
+    def __init__(self, browser: Browser, folder: Path, name: str = "index.html", **options: Any) -> None:
         self.context = browser.new_context(**{"viewport": {"width": 1280, "height": 900}, **options})
         self.page = self.context.new_page()
         self.said: list[str] = []
@@ -40,7 +40,7 @@ class Visit:
         self.page.on("console", lambda message: self.said.append(message.text))
         self.page.on("pageerror", lambda error: self.said.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.goto((folder / "index.html").as_uri())
+        self.page.goto((folder / name).as_uri())
         self.page.wait_for_selector("html[data-ready=yes]")
 
 
@@ -252,6 +252,25 @@ def test_hostile_names_stay_text(visit: Visit, page: Page) -> None:
     ):
         assert name in text
     assert not [url for url in visit.asked if "owned" in url]
+
+
+@pytest.mark.parametrize("most", [833, 98765])
+def test_the_numbers_of_a_large_class_fit_into_the_chart(browser: Browser, results: Path, most: int) -> None:
+    """Those beside its axis as well."""
+    source = (results / "index.html").read_text(encoding="utf-8")
+    source, changed = re.subn(r'(\["100 %",[0-9.]+,[0-9.]+),\d+,\d+\]', rf"\1,{most},{most}]", source)
+    (results / "large.html").write_text(source, encoding="utf-8")
+    large = Visit(browser, results, "large.html")
+    drawing = large.page.locator("[data-figure=scores] .drawing svg")
+    outer = drawing.bounding_box()
+    texts = drawing.locator("text")
+    boxes = [box for number in range(texts.count()) if (box := texts.nth(number).bounding_box()) is not None]
+    said = texts.all_text_contents()
+    large.context.close()
+    assert changed == 1
+    assert str(most) in said
+    assert outer is not None
+    assert min(box["x"] for box in boxes) >= outer["x"]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

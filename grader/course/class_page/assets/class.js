@@ -208,9 +208,12 @@
     else chart = echarts.init(drawing, null, { renderer: "svg", width, height });
     const narrow = width < 560;
     const short = (label) => (narrow ? label.replace(/ to .*/, "") : label);
+    // The axis ends above the highest bar, so it may have a digit more.
+    const most = Math.max(0, ...data.bins.flatMap((bin) => bin.slice(3, 5)));
+    const digits = String(Math.ceil(most * 1.2)).length;
     chart.setOption({
       animation: false,
-      grid: { left: 36, right: 8, top: 20, bottom: 44, outerBoundsMode: "none" },
+      grid: { left: Math.max(36, 12 + 8 * digits), right: 8, top: 20, bottom: 44, outerBoundsMode: "none" },
       xAxis: {
         type: "category",
         data: data.bins.map((bin) => short(bin[0])),
@@ -225,7 +228,7 @@
       yAxis: {
         type: "value",
         minInterval: 1,
-        axisLabel: FONT,
+        axisLabel: { ...FONT, formatter: String },
         splitLine: { lineStyle: { color: Charts.colour("grid") } },
       },
       tooltip: {
