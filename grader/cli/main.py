@@ -35,7 +35,6 @@ from grader.cli.options import (
 from grader.cli.outputs import outputs_option
 from grader.cli.run_options import run_options
 from grader.grading.model.grading_options import GRADE, OBSERVE, GradingOptions
-from grader.grading.model.report import exit_code
 from grader.grading.reporting.formats import EVIDENCE, known
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import (
@@ -247,6 +246,8 @@ class _Grading:
 
             open_page(self.page)
             self.page = None
+        from grader.grading.model.report import exit_code
+
         return exit_code(seen, self.min_score)
 
     def each_save(self, started: float) -> int:

@@ -21,7 +21,6 @@ from grader.cli.options import (
     write_file,
 )
 from grader.cli.outputs import outputs_option
-from grader.grading.model.report import exit_code
 from grader.grading.reporting.formats import EVIDENCE, FORMATS, known
 
 if TYPE_CHECKING:
@@ -142,6 +141,8 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
 
             data = report_to_json(told(report, for_whom))
             _add_marks([(report.name, folder, page, data) for page in pages])
+    from grader.grading.model.report import exit_code
+
     return exit_code(told(report, for_whom), min_score)
 
 
