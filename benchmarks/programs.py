@@ -48,8 +48,8 @@ WALL_TRIES = 3
 #: What runs in the student's process, and what steps it.
 MEASURED = (
     "host",
-    *(f"worker/{name}.py" for name in ("claims", "core", "delay", "discovery", "observer", "runner")),
-    *(f"worker/{name}.py" for name in ("service_ends", "service_peers")),
+    *(f"worker/{name}.py" for name in ("claims", "core", "delay", "discovery", "matching", "observer")),
+    *(f"worker/{name}.py" for name in ("runner", "service_ends", "service_peers")),
     *(f"worker/{name}.py" for name in ("topic_peers", "trace_recorder", "virtual_runner", "worker", "workload")),
 )
 #: The first lines of a module that notes which of its functions are called, in a file that its process can append to.

@@ -13,7 +13,7 @@ from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import RosInstallation, find_ros
 
 #: Fixtures that tests in several folders use.
-pytest_plugins = ["browser_fixtures", "recording_fixtures"]
+pytest_plugins = ["browser_fixtures", "common_fixtures"]
 
 #: The markers of tests that `-m fast` leaves out.
 NOT_FAST = ("ros", "browser", "sandbox", "slow", "long", "nightly")

@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from places import ROOT, TESTS
 
 import grader
 from grader import api
 from grader.grading.model import exercise
 from grader.runtime.model import errors
 
-ROOT = Path(__file__).resolve().parent.parent
-PINNED = ROOT / "tests" / "api.txt"
+PINNED = TESTS / "api.txt"
 #: Python that authors write, or copy from a page.
 PAGES = sorted([*(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").rglob("*.md"), ROOT / "README.md"])
 SCRIPTS = sorted([*(ROOT / "examples").rglob("*.py")])

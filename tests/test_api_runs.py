@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from places import ROOT
 
 from grader.api import GraderError, Outcome, SubmissionError, grade, observe, rejudge
-
-ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.mark.ros

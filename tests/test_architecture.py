@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from places import ROOT
 from sample_folders import GROUPS, folders_in
 
 if TYPE_CHECKING:
     import grimp
 
-PACKAGE = Path(__file__).resolve().parent.parent / "grader"
+PACKAGE = ROOT / "grader"
 
 #: What pure packages never touch: files, processes, clocks, chance.
 IMPURE = {"os", "subprocess", "socket", "time", "datetime", "random", "threading", "pathlib", "tempfile", "rclpy"}
@@ -150,6 +151,7 @@ PURE = (
     "runtime/worker/claims.py",
     "runtime/worker/core.py",
     "runtime/worker/delay.py",
+    "runtime/worker/matching.py",
     "grading/model",
     "grading/judging",
     "grading/reporting",
@@ -328,7 +330,7 @@ NO_COUNTERPART = {
     "world/workspace/src/robot/test": "a package that is tested itself",
 }
 #: What shows that a test uses a part as its users do, without an import: it starts `grade`, or a pytest of its own.
-FROM_OUTSIDE = {"cli": r'with_name\("grade"\)', "world": r'"pytest"|\bpytester\b'}
+FROM_OUTSIDE = {"cli": r"\bGRADE\b", "world": r'"pytest"|\bpytester\b'}
 
 
 def parts_imported(path: Path) -> Iterator[str]:
@@ -385,7 +387,7 @@ def test_tests_lie_where_the_code_lies() -> None:
         ("runtime/worker/test_marks.py", "import grader.runtime.worker.runner", None),
         ("runtime/worker/test_runner_marks.py", "import rclpy", None),
         ("cli/test_marks.py", "import pytest", "neither imports grader.cli"),
-        ("cli/test_marks.py", 'GRADE = Path(sys.executable).with_name("grade")', None),
+        ("cli/test_marks.py", "from places import GRADE", None),
     ],
 )
 def test_a_misplaced_test_is_found(name: str, text: str, said: str | None, tmp_path: Path) -> None:
@@ -475,3 +477,37 @@ def test_an_import_from_the_inside_of_a_part_is_found(
     """The rule can fail."""
     assert {importer, imported} <= graph.modules
     assert not any(opened(door, (importer, imported)) for door in doors_of(contract))
+
+
+def modules_of(tests: Path) -> list[Path]:
+    """Return the modules of tests, and the helpers beside them and in `support`; no programs that tests grade."""
+    folders = {path.parent for path in tests.rglob("test_*.py")} | {tests / "support"}
+    return sorted(path for folder in folders for path in folder.glob("*.py"))
+
+
+def repeated(tests: Path) -> list[list[str]]:
+    """Return the helpers and fixtures that do the same in several modules; those of one or two statements may."""
+    found: dict[str, list[str]] = {}
+    for path in modules_of(tests):
+        for node in tree_of(path).body:
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("test_"):
+                body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+                if sum(isinstance(part, ast.stmt) for line in body for part in ast.walk(line)) > 2:
+                    place = f"{path.relative_to(tests)}: {node.name}"
+                    found.setdefault("".join(map(ast.dump, body)), []).append(place)
+    return [places for places in found.values() if len(places) > 1]
+
+
+def test_helpers_have_one_home() -> None:
+    """No two modules define the same helper, and none takes one out of a module of tests."""
+    assert repeated(TESTS) == []
+    names = {path.stem for path in modules_of(TESTS) if path.stem.startswith("test_")}
+    assert [(path.name, name) for path in modules_of(TESTS) for name in imports_of(path) if name in names] == []
+
+
+def test_a_repeated_helper_is_found(tmp_path: Path) -> None:
+    """The rule can fail, whatever the helpers are called and say of themselves."""
+    for name in ("one", "other"):
+        text = f'def {name}(path):\n    """{name}"""\n    path.mkdir()\n    path.chmod(0o755)\n    return path\n'
+        (tmp_path / f"test_{name}.py").write_text(text, encoding="utf-8")
+    assert repeated(tmp_path) == [["test_one.py: one", "test_other.py: other"]]

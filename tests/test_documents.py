@@ -7,13 +7,14 @@ import ast
 import re
 import shlex
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 import click
 import generated
 import pytest
+from parsed_commands import parsed
+from places import ROOT
 from sample_folders import GOLDEN, collections
 
 from grader import api
@@ -21,7 +22,6 @@ from grader.cli.main import app
 from grader.grading.judging.checks import CHECKS
 from grader.grading.model.rubric_files import rubric_file
 
-ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
@@ -88,16 +88,6 @@ def test_what_does_not_exist_is_found() -> None:
     assert missing(text, ROOT) == wanted
 
 
-#: What stands for a value in commands, where a command needs one of a certain kind.
-_STAND_INS = {
-    "N": "1",
-    "S": "10",
-    "P": "60",
-    "P%": "5%",
-    "FORMAT=PATH": "json=report.json",
-    "badge=badge.svg": "json=badge.svg",
-    "OWNER/NAME@COMMIT": f"school/grader@{'0' * 40}",
-}
 _GRADE = re.compile(r"^(?:\$ )?(?:\S+/bin/)?grade (.*)$")
 #: What follows a command in its line: a remark, or a redirection.
 _REST = re.compile(r"(?: {2,}| [>|#]>? ).*$")
@@ -112,19 +102,6 @@ def grade_commands(text: str) -> Iterator[str]:
         found = _GRADE.match(shown.strip())
         if found and not found[1].startswith(_NO_COMMAND) and not _USAGE.search(found[1]):
             yield _REST.sub("", found[1])
-
-
-def parsed(words: list[str]) -> None:
-    """Parse a command without running it; raises click.ClickException if it has no such subcommand or option."""
-    command: click.Command = app
-    while isinstance(command, click.Group) and words and words[0] in command.commands:
-        command, words = command.commands[words[0]], words[1:]
-    if command is app:
-        command = app.default
-    # In a sentence, `grade batch` and `grade rubric` name a command.
-    if [word for word in words if not word.startswith("-")]:
-        with suppress(click.exceptions.Exit):  # `--help`
-            command.make_context("grade", [_STAND_INS.get(word, word) for word in words])
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)

@@ -12,6 +12,7 @@ from _pytest.mark import ParameterSet
 from archive import outcomes
 from click.testing import CliRunner
 from decided import grade_until_decided
+from places import ROOT
 from ruamel.yaml import YAML
 
 from grader.cli import main
@@ -20,7 +21,6 @@ from grader.grading.judging.diagnosis import CAUSE_KEY
 from grader.grading.model.report import Report
 from grader.grading.rubrics.loader import read_rubric
 
-ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = sorted(path.parent.name for path in (ROOT / "examples").glob("*/README.md"))
 #: The place of the first submission of an example that is left to the nightly run.
 NIGHTLY_FROM = 2

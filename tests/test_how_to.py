@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from places import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 #: Pages in the order in which they are read, in one folder: later ones use what earlier ones leave.
 PAGES = (
     *("docs/how-to/class.md", "docs/how-to/feedback.md", "docs/how-to/disputed-mark.md", "docs/how-to/moodle.md"),

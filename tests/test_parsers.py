@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 from parsers import PACKAGE, all_parsers, parsers_of
+from places import ROOT
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "parsers.md"
+PAGE = ROOT / "docs" / "reference" / "parsers.md"
 _ROW = re.compile(r"^\| `(grader/[^`]+)` \| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
 
 

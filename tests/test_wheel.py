@@ -15,12 +15,12 @@ from pathlib import Path
 
 import click
 import pytest
+from places import ROOT
 
 from grader.cli.main import app
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).resolve().parent.parent
 HOOK = runpy.run_path(str(ROOT / "hatch_build.py"))
 
 

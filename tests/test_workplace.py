@@ -11,16 +11,16 @@ from typing import Any
 import pytest
 from archive import judged, recordings
 from click.testing import CliRunner
+from parsed_commands import parsed
+from places import ROOT
 from ruamel.yaml import YAML
 from sample_folders import expected
-from test_documents import parsed
 
 from grader.cli.main import app
 from grader.grading.model.report import Report
 from grader.grading.reporting import delivery
 from grader.grading.reporting.text import render_text
 
-ROOT = Path(__file__).resolve().parent.parent
 TEMPLATE = ROOT / "student_template"
 TASKS = json.loads((TEMPLATE / ".vscode" / "tasks.json").read_text(encoding="utf-8"))["tasks"]
 COLUMNS = int(TASKS[0]["options"]["env"]["COLUMNS"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import random
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from grader.runtime.model.errors import EnvironmentFault
 
@@ -13,6 +13,10 @@ from grader.runtime.model.errors import EnvironmentFault
 USABLE = range(10, 101)
 #: How many reservations to keep: for the running scenarios, and for earlier ones whose endpoints have not yet expired.
 HELD = 8
+#: A domain, and the socket that keeps it from other graders.
+Reservation = tuple[int, socket.socket]
+#: The reservations that this process holds, oldest first.
+_RESERVED: list[Reservation] = []
 
 
 def private_domains() -> Iterator[int]:
@@ -20,22 +24,26 @@ def private_domains() -> Iterator[int]:
     return itertools.cycle(USABLE)
 
 
-def shared_domains() -> Iterator[int]:
+def shared_domains(usable: Sequence[int] = USABLE, held: list[Reservation] = _RESERVED) -> Iterator[int]:
     """Yield domains on a shared network; each is unused and reserved against other graders.
+
+    Args:
+        usable: Domains to choose from.
+        held: Where reservations are kept, at most `HELD`, oldest first; those of all callers by default.
 
     Raises:
         EnvironmentFault: No domain is free.
     """
     while True:
-        _RESERVED.append(_reserve())
-        for _, claim in _RESERVED[:-HELD]:
+        held.append(_reserve(usable))
+        for _, claim in held[:-HELD]:
             claim.close()
-        del _RESERVED[:-HELD]
-        yield _RESERVED[-1][0]
+        del held[:-HELD]
+        yield held[-1][0]
 
 
-def _reserve() -> tuple[int, socket.socket]:
-    for domain in random.sample(USABLE, len(USABLE)):
+def _reserve(usable: Sequence[int]) -> Reservation:
+    for domain in random.sample(usable, len(usable)):
         claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
             claim.bind(f"\0rclpy-grader-domain-{domain}")
@@ -47,7 +55,3 @@ def _reserve() -> tuple[int, socket.socket]:
             continue
         return domain, claim
     raise EnvironmentFault("ROS domains: expected a free one, found all in use", "wait for other gradings to end")
-
-
-#: Reservations that are still held, oldest first.
-_RESERVED: list[tuple[int, socket.socket]] = []

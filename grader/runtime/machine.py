@@ -11,7 +11,7 @@ import stat
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import grader
@@ -43,10 +43,14 @@ SETTINGS_FOLDER = Path("/proc/sys")
 _PERSISTENT = "/etc/sysctl.d/60-rclpy-grader.conf"
 
 
-def ros_here() -> tuple[RosInstallation | None, tuple[Fact, ...]]:
+#: The installation, or why there is none that can be used.
+Found = tuple[RosInstallation | None, tuple[Fact, ...]]
+
+
+def ros_here(find: Callable[[], RosInstallation] = find_ros) -> Found:
     """Find the ROS installation, or report as a fact why it cannot be used."""
     try:
-        return find_ros(), ()
+        return find(), ()
     except EnvironmentFault as fault:
         return None, (Fact("ROS 2", fault.message.removeprefix("ROS 2: "), fits=False, remedy=fault.hint),)
 
@@ -65,23 +69,27 @@ def sandbox(name: str) -> TierReport:
     """Return the report on one sandbox, from its last test if nothing has changed since.
 
     Raises:
-        EnvironmentFault: This machine lacks ROS, or what the sandbox is made with.
+        EnvironmentFault: This machine lacks ROS.
     """
-    isolation_from_name(name)
     return inspect_tier(name, find_ros())
 
 
 def can_fork(name: str) -> bool:
-    """Return whether students' nodes are forked in a sandbox, not executed; raises EnvironmentFault as above."""
+    """Return whether students' nodes are forked in a sandbox, not executed; raises EnvironmentFault without it."""
     return isolation_from_name(name).can_fork
 
 
-def node_start(name: str) -> Fact:
+def node_start(name: str, *, can_fork: bool) -> Fact:
     """Report how students' nodes are started in a sandbox."""
-    if can_fork(name):
+    if can_fork:
         return Fact("start of nodes", "each is forked from a process that has imported ROS")
     text = "each executes Python and imports ROS, which takes longer: to be forked"
     return Fact("start of nodes", f"{text} into {name}, it needs Linux {'.'.join(map(str, ENTERABLE))} or newer")
+
+
+def weaknesses_here(ros: RosInstallation | None) -> Iterator[Fact]:
+    """Yield the known weaknesses of the software in use, without those that are repaired here."""
+    yield from weaknesses(ros, repaired_here())
 
 
 def easiest_remedy(tiers: Sequence[TierReport]) -> str:
@@ -118,8 +126,8 @@ def _python(ros: RosInstallation | None) -> Fact:
     return Fact("Python", f"{value}; {lack}", remedy=f"install the grader with python{newer}")
 
 
-def weaknesses(ros: RosInstallation | None) -> Iterator[Fact]:
-    """Yield the known weaknesses of the versions here."""
+def weaknesses(ros: RosInstallation | None, repaired: frozenset[str]) -> Iterator[Fact]:
+    """Yield the known weaknesses of the versions here but for those that the distribution has repaired."""
     bwrap = shutil.which("bwrap")
     versions = {
         FAST_DDS: version_of(_fast_dds(ros)) if ros is not None else (),
@@ -127,18 +135,19 @@ def weaknesses(ros: RosInstallation | None) -> Iterator[Fact]:
         LINUX: kernel_version(platform.release(), platform.version()),
     }
     setuid = bool(bwrap) and bool(Path(str(bwrap)).stat().st_mode & stat.S_ISUID)
-    yield from known(versions, setuid=setuid, repaired=repaired_here())
+    yield from known(versions, setuid=setuid, repaired=repaired)
 
 
 def system() -> Iterator[Fact]:
     """Yield the relevant properties of the kernel and the hardware."""
     yield Fact("kernel", f"{platform.system()} {platform.release()} {platform.machine()}, {_distribution()}")
     yield Fact("user", f"{'root' if os.geteuid() == 0 else f'uid {os.geteuid()}'}{_surroundings()}")
-    yield _namespaces()
+    yield namespaces(setting_command())
     yield Fact("Landlock", _landlock())
     yield Fact("processors", str(len(os.sched_getaffinity(0))))
-    yield _memory()
-    yield _scratch()
+    yield memory(_available_memory())
+    folder = tempfile.gettempdir()
+    yield scratch(folder, shutil.disk_usage(folder).free)
 
 
 def _package_version(prefix: Path, package: str) -> str:
@@ -193,14 +202,18 @@ def _surroundings() -> str:
     return f", {known}" if known else ""
 
 
-def _namespaces() -> Fact:
-    """Report whether ordinary users may create namespaces; root always may."""
-    command = setting_command()
+def namespaces(command: str, settings: Path = SETTINGS_FOLDER) -> Fact:
+    """Report whether ordinary users may create namespaces; root always may.
+
+    Args:
+        command: What lifts the setting that forbids them; empty if none does.
+        settings: Where the kernel exposes its settings.
+    """
     if not command:
         filtered = ", but a filter of system calls may" if confined() else ""
         return Fact("user namespaces", f"no setting forbids them{filtered}")
     name, _, value = command.rpartition(" ")[2].partition("=")
-    now = SETTINGS_FOLDER.joinpath(*name.split(".")).read_text(encoding="ascii").strip()
+    now = settings.joinpath(*name.split(".")).read_text(encoding="ascii").strip()
     lasting = f"until the next start; for good: echo {name}={value} | sudo tee {_PERSISTENT}"
     return Fact("user namespaces", f"kept from ordinary users by {name}={now}", remedy=f"{command} ({lasting})")
 
@@ -210,8 +223,8 @@ def _landlock() -> str:
     return f"version {version}" if version > 0 else "not offered by this kernel"
 
 
-def _memory() -> Fact:
-    available = _available_memory()
+def memory(available: int | None) -> Fact:
+    """Report whether so many bytes of memory are enough; None if they are not known."""
     fits = available is None or available >= MIN_MEMORY_BYTES
     value = "unknown" if available is None else f"{available / GIB:.1f} GiB available"
     return Fact("memory", value, fits=fits, remedy="" if fits else "end other programs: a scenario may need 1 GiB")
@@ -226,9 +239,8 @@ def _available_memory() -> int | None:
     return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:")), None)
 
 
-def _scratch() -> Fact:
-    folder = tempfile.gettempdir()
-    free = shutil.disk_usage(folder).free
+def scratch(folder: str, free: int) -> Fact:
+    """Report whether so many bytes in the folder for temporary files are enough."""
     fits = free >= MIN_SCRATCH_BYTES
     remedy = "" if fits else "free some space, or set TMPDIR to a folder that has it"
     return Fact("temporary files", f"{free / GIB:.1f} GiB free in {folder}", fits=fits, remedy=remedy)

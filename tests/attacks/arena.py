@@ -20,10 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from places import GRADE, ROOT
 from process_table import segments_in_use
 
-ROOT = Path(__file__).resolve().parents[2]
-GRADE = Path(sys.executable).with_name("grade")
 #: The user that stands for an ordinary one where the attacks are tried by root.
 USER = 1000
 #: Tiers in which the grader itself is an ordinary user.
@@ -140,7 +139,7 @@ class Arena:
         out.mkdir()
         self._give_away(self.base)
         outputs = [f"json={out}/report.json", f"text={out}/report.txt", f"evidence={out}/evidence"]
-        arguments = [str(GRADE), str(submission), "--isolation", self.tier, *options]
+        arguments = [GRADE, str(submission), "--isolation", self.tier, *options]
         arguments += [word for output in outputs for word in ("-o", output)]
         environment = {
             "PATH": os.environ.get("PATH", "/usr/bin:/bin"),

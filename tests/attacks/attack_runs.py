@@ -10,9 +10,10 @@ from pathlib import Path
 from types import ModuleType
 
 import hostile_reports
-from arena import ROOT, Arena, Ran
+from arena import Arena, Ran
 from attack_rubric import controller_rubric, publisher_rubric
 from attack_verdicts import criteria_of, objections
+from places import ROOT
 from ruamel.yaml import YAML
 
 from grader.grading.reporting.formats import FORMATS

@@ -7,16 +7,14 @@ import os
 import re
 import signal
 import subprocess
-import sys
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
+from places import GRADE
 from process_table import Running, read, running, segments_in_use, students_of
 from sample_folders import folder_of
-
-GRADE = str(Path(sys.executable).with_name("grade"))
+from waiting import wait_for
 
 pytestmark = pytest.mark.ros
 
@@ -72,14 +70,6 @@ def processes_of(scratch: Path) -> list[int]:
         if str(scratch).encode() in told:
             found.append(int(entry.name))
     return found
-
-
-def wait_for(condition: Callable[[], object], seconds: float = 60) -> None:
-    """Wait until a condition holds; fail if it never does."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "it never came to that"
-        time.sleep(0.02)
 
 
 @pytest.mark.parametrize(

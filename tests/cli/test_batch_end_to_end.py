@@ -10,12 +10,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from sample_folders import TESTS, folder_of
+from places import GRADE, TESTS
+from sample_folders import folder_of
 
 pytestmark = pytest.mark.ros
 #: Without spot checks, which tests of their own are about.
 ONE = ("--exercise", "velocity_publisher", "--jobs", "1", "--spot-checks", "0%")
-GRADE = (sys.executable, "-c", "from grader.cli.main import main; main()")
 CLASS = {"ada": "correct/velocity_class", "bob": "wrong/velocity_10_hz", "cleo": "broken/syntax_error"}
 
 
@@ -30,7 +30,7 @@ def class_(tmp_path: Path) -> Path:
 
 def run(*arguments: Path | str) -> subprocess.CompletedProcess[str]:
     """Run the command, and return it with what it printed."""
-    return subprocess.run([*GRADE, "batch", *map(str, arguments)], capture_output=True, text=True, check=False)
+    return subprocess.run([GRADE, "batch", *map(str, arguments)], capture_output=True, text=True, check=False)
 
 
 def points(results: Path) -> dict[str, str]:
@@ -44,7 +44,7 @@ def test_a_killed_class_is_finished_by_the_same_command(class_: Path, tmp_path: 
     """What was done is not run again, the scores are those of an undisturbed run, and no process is left."""
     results = tmp_path / "out"
     first = subprocess.Popen(
-        [*GRADE, "batch", class_, "-o", results, *ONE], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        [GRADE, "batch", class_, "-o", results, *ONE], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
     assert first.stderr is not None
     assert first.stderr.readline() == "to grade: 4\n"
@@ -87,7 +87,7 @@ def test_results_are_whole(class_: Path, tmp_path: Path) -> None:
         page = (place / "report.html").read_text(encoding="utf-8")
         script = page.split('src="../../')[1].split('"')[0]
         assert (results / script).is_file()
-    again = subprocess.run([*GRADE, "rejudge", results / "students"], capture_output=True, text=True, check=False)
+    again = subprocess.run([GRADE, "rejudge", results / "students"], capture_output=True, text=True, check=False)
     assert "judged: 3" in again.stdout, again.stderr
 
 
@@ -96,7 +96,7 @@ def test_a_download_is_graded_where_a_student_hides_modules(class_: Path, tmp_pa
     (tmp_path / "json.py").write_text("raise SystemExit('imported')\n", encoding="utf-8")
     (tmp_path / "grader.py").write_text("raise SystemExit('imported')\n", encoding="utf-8")
     archive = shutil.make_archive(str(tmp_path / "hw"), "zip", class_)
-    command: list[Path | str] = [Path(sys.executable).with_name("grade"), "batch", "hw.zip", "-o", "out", *ONE]
+    command: list[Path | str] = [GRADE, "batch", "hw.zip", "-o", "out", *ONE]
     assert archive.endswith("hw.zip")
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr
@@ -148,7 +148,7 @@ finally:
 def test_every_submission_of_a_class_is_checked(tmp_path: Path) -> None:
     """Without asking for it: one that is right in virtual time only is found among honest ones, and only that one."""
     honest = (folder_of("correct/velocity_class") / "velocity_publisher.py").read_text(encoding="utf-8")
-    cheat = TESTS / "spot_checks" / "cheats" / "drawn_fraction.py"
+    cheat = TESTS / "grading" / "app" / "spot_checks" / "cheats" / "drawn_fraction.py"
     for name, text in {
         "ada": f"{honest}\n# ada\n",
         "bob": f"{honest}\n# bob\n",

@@ -5,9 +5,8 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +14,17 @@ import pytest
 from _pytest.mark import ParameterSet
 from archive import SEED, outcomes, told
 from decided import grade_until_decided, say_nothing
+from places import GRADE, ROOT, SHARED
 from process_table import running, students_of
 from sample_folders import expected, folder_of, golden
+from waiting import wait_for
 
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.start import grade
 from grader.grading.model.report import Report
 
-ROOT = Path(__file__).resolve().parents[2]
 #: What these are told depends on where a loop stood when it was stopped.
 UNSTEADY = ("broken/loops_in_callback", "broken/loops_in_constructor", "broken/events_executor", "broken/memory_grows")
-GRADE = str(Path(sys.executable).with_name("grade"))
 
 pytestmark = pytest.mark.ros
 
@@ -119,7 +118,7 @@ def test_another_seed_plays_another_part_of_the_recording() -> None:
 @pytest.mark.parametrize("bag", ["neato_square", "turtlebot3_path/path.mcap", "standing_best_effort"])
 def test_recordings_of_other_robots_can_be_played(bag: str) -> None:
     """A correct subscriber is correct on anybody's odometry, whatever its pace and its QoS."""
-    path = ROOT.parent / "shared" / "bags" / bag
+    path = SHARED / "bags" / bag
     if not path.exists():
         pytest.skip(f"{path} is not on this machine")
     done = run(ROOT / "reference_solutions", "--exercise", "odom_subscriber", "--odom-bag", path)
@@ -156,14 +155,6 @@ def test_killing_the_grader_ends_what_it_started(tmp_path: Path) -> None:
     process.kill()
     process.wait()
     wait_for(lambda: not started & running())
-
-
-def wait_for(condition: Callable[[], object], seconds: float = 60) -> None:
-    """Wait until a condition holds; fail if it never does."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "it never came to that"
-        time.sleep(0.05)
 
 
 def test_a_submission_is_never_written_to(tmp_path: Path) -> None:

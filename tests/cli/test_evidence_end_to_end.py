@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from places import ROOT
 from rosbags.highlevel import AnyReader
 from sample_folders import folder_of
 
 from grader.cli import main
 
-ROOT = Path(__file__).resolve().parents[2]
 CRASHES = folder_of("broken/raises_in_callback")
 FORMATS = {"json": "r.json", "text": "r.txt", "html": "r.html", "markdown": "r.md", "junit": "r.xml"}
 

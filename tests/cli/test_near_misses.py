@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from places import ROOT
 
 from grader.cli import main
 from grader.grading.app.grade import belonging, names_a_program, read_exercises, wanted_files
@@ -119,7 +120,7 @@ def test_a_folder_or_chosen_exercises_are_left_as_they_are(tmp_path: Path) -> No
 @pytest.mark.ros
 def test_a_right_file_alone_gets_all_of_its_points() -> None:
     """30 of 30, and exit code 0."""
-    file = Path(__file__).parents[2] / "reference_solutions" / "velocity_publisher.py"
+    file = ROOT / "reference_solutions" / "velocity_publisher.py"
     result = CliRunner().invoke(main.app, [str(file), "--no-progress"], prog_name="grade")
     assert result.stdout.startswith("velocity_publisher.py: 30 of 30 points\n")
     assert "Fix first" not in result.stdout

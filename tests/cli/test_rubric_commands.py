@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from places import ROOT
 
 from grader.cli import main
 from grader.grading.rubrics.builtin import builtin_rubrics
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.schema import schema_text
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+EXAMPLES = ROOT / "examples"
 GOOD = """\
 schema: grader/rubric/v1
 exercise: {id: pump, number: 7, title: A pump}

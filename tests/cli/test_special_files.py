@@ -6,16 +6,14 @@ import os
 import shutil
 import socket
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from places import GRADE, ROOT
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
-GRADE = Path(sys.executable).with_name("grade")
 #: Far more than a command needs that opens nothing which never ends; only a hang takes so long.
 HANGS_S = 300
 SPECIAL = "a device, pipe or socket"

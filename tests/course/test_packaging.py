@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from packaging.requirements import Requirement
-from stand_in_runner import ROOT
+from places import ROOT
 
 from grader.cli.main import app
 from grader.course import packaging

@@ -9,7 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from stand_in_runner import CANARY, ROOT, Job, evaluated, job_environment, obeyed, pairs, run_action
+from places import ROOT
+from stand_in_runner import CANARY, Job, evaluated, job_environment, obeyed, pairs, run_action
 
 pytestmark = pytest.mark.slow
 

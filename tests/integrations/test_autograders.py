@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from stand_in_runner import ROOT, job_environment, obeyed
+from places import ROOT
+from stand_in_runner import job_environment, obeyed
 
 pytestmark = pytest.mark.slow
 

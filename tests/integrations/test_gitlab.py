@@ -5,8 +5,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from places import ROOT
 from ruamel.yaml import YAML
-from stand_in_runner import ROOT
 
 pytestmark = pytest.mark.slow
 

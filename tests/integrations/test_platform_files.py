@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from places import ROOT
 from ruamel.yaml import YAML
-from stand_in_runner import ROOT
 
 import grader
 from grader.course.packaging import workflow

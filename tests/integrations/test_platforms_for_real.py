@@ -13,12 +13,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 from click.testing import CliRunner
-from stand_in_runner import CANARY, ROOT, job_environment, obeyed, run_action
+from places import ROOT, SHARED
+from stand_in_runner import CANARY, job_environment, obeyed, run_action
 
 from grader.cli.main import app
 
 BIN = Path(sys.executable).parent
-SCHEMA = ROOT.parent / "shared" / "formats" / "classroom50-result-v1.schema.json"
+SCHEMA = SHARED / "formats" / "classroom50-result-v1.schema.json"
 #: Looks for the token wherever a process could find one, and says what it found in the only way it has: by failing.
 PRYING = """
 import glob, os, rclpy

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from stand_in_runner import ROOT
+from places import ROOT
 
 pytestmark = pytest.mark.slow
 

@@ -15,14 +15,14 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 
+from places import GRADE
+
 sys.path.append(str(Path(__file__).resolve().parent.parent / "support"))
 from archive import SEED, Recorded, charted, judged, recorded_in, recorded_of, told, write_archive
 from ruamel.yaml import YAML
 from sample_folders import ARCHIVE, CHARTS, GOLDEN, collection_of, collections, expected, expected_in, table
 
 from grader.grading.reporting.json_report import dumps
-
-GRADE = str(Path(sys.executable).with_name("grade"))
 
 
 def graded(name: str, exercises: list[str]) -> Recorded:

@@ -17,6 +17,7 @@ import pytest
 from click.testing import CliRunner
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from places import TESTS
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from grader.cli import main
@@ -47,7 +48,7 @@ from grader.runtime.session import RecordingSession, open_session
 from grader.runtime.supervisor import confined_build
 from grader.runtime.supervisor.real_time_budget import FOREVER_S
 
-REAL = Path(__file__).parents[1] / "real_checks"
+REAL = TESTS / "real_checks"
 RUBRIC_FILE = REAL / "brought.yaml"
 
 

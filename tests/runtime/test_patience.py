@@ -33,6 +33,7 @@ def test_what_comes_costs_no_patience(waited: list[float]) -> None:
     assert set(waited) == {SETTLE_S}
 
 
+@pytest.mark.rule(14)
 def test_after_some_losses_waits_are_brief(waited: list[float]) -> None:
     """Also for what is waited for elsewhere and told here; what then comes still counts."""
     mine = Patience()

@@ -41,7 +41,7 @@ def browser() -> Iterator[Browser]:
 
         def patient_context(**options: Any) -> BrowserContext:
             """Return a context whose pages wait as long as a busy machine needs."""
-            context = new_context(**options)
+            context: BrowserContext = new_context(**options)
             context.set_default_timeout(PATIENCE_MS)
             return context
 

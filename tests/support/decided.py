@@ -6,7 +6,7 @@ from grader.grading.app.grade import Progress
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.start import grade
 from grader.grading.model.exercise import Outcome
-from grader.grading.model.report import Report
+from grader.grading.model.report import Report, Verdict
 
 #: Even if every second attempt is undecided, so many are it less than once in a million runs: 2 ** -20.
 ATTEMPTS = 20
@@ -29,3 +29,8 @@ def was_too_busy(report: Report) -> bool:
     """Return whether a criterion is undecided because of the machine."""
     verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
     return any(v.outcome is Outcome.UNDECIDED and "the machine was too busy" in v.reason for v in verdicts)
+
+
+def verdicts(report: Report) -> dict[str, Verdict]:
+    """Return the verdicts by the ids of their criteria."""
+    return {verdict.id: verdict for verdict in report.exercises[0].verdicts}

@@ -54,6 +54,20 @@ def main(kind=Publisher):
     rclpy.spin(kind())
 """
 
+#: What a program needs to speak on its line in the place of its host.
+HOST_LINE = """
+def line():
+    import stat
+    for name in os.listdir("/proc/self/fd"):
+        try:
+            if stat.S_ISSOCK(os.fstat(int(name)).st_mode):
+                found = socket.socket(fileno=os.dup(int(name)))
+                if found.family == socket.AF_UNIX:
+                    return found
+        except OSError:
+            pass
+"""
+
 
 def hostile(harm: str = "", later: str = "", before: str = "") -> str:
     """Return a right publisher that does harm when it is made, at every tick, or before everything else."""
@@ -114,3 +128,8 @@ def record(studio: RecordingSession, folder: Path, *programs: str, **fields: Any
     """Record programs together, as `planned` says."""
     plan = planned(folder, *programs, **fields)
     return studio.recorder.record([Job("hostile", plan)], lambda step: None)[0]
+
+
+def printed(trace: Trace) -> list[str]:
+    """Return the lines that programs wrote to standard output."""
+    return [line.text for line in trace.lines() if line.stream == "stdout"]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from hypothesis import strategies as st
+from places import ROOT
 
 from grader.grading.evidence.store import keep
 from grader.grading.judging.judge_run import judge_run
@@ -41,7 +42,7 @@ from grader.runtime.model.trace import (
 )
 from grader.runtime.recording.recording_file import encode
 
-RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"
+RUBRICS = ROOT / "rubrics"
 TWIST = "geometry_msgs/msg/Twist"
 PERIOD_NS = 50_000_000
 

@@ -12,9 +12,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from places import TESTS
 from ruamel.yaml import YAML
 
-TESTS = Path(__file__).resolve().parents[1]
 #: One folder for each exercise, and a collection of programs that crash, or are no programs, whatever the exercise.
 EXERCISES, SHAPES = TESTS / "exercises", TESTS / "shapes"
 GROUPS = ("correct", "threads", "wrong", "broken")

@@ -200,4 +200,3 @@ def job_environment(**more: str) -> dict[str, str]:
 #: A token that must not turn up anywhere.
 CANARY = "canary" + "0123456789abcdef" * 2
 #: The folder of action.yml.
-ROOT = Path(__file__).resolve().parents[2]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-GRADE = str(Path(sys.executable).with_name("grade"))
+from places import GRADE
+
 PROGRAM = """
 {imports}
 import rclpy

@@ -120,3 +120,8 @@ WRONG: dict[str, tuple[Writer, str]] = {
     "nan": (lambda x, y: "x=nan, y=nan", "wrong"),
     "no number": (lambda x, y: "got odometry", "no_pair"),
 }
+
+
+def plain(x: float, y: float) -> str:
+    """Write a position down as most people do."""
+    return f"x={x:.2f} y={y:.2f}"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from places import ROOT, TESTS
 from std_srvs.srv import SetBool
 from test_msgs.action import Fibonacci
 
@@ -18,13 +19,11 @@ from grader.world.world import World
 
 pytestmark = pytest.mark.ros
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-
 
 @pytest.fixture
 def fibonacci_server(tmp_path: Path) -> Path:
     """The server of the example, with an action that the test's process has as well."""
-    text = (REPOSITORY / "examples/fibonacci/reference/fibonacci_server.py").read_text(encoding="utf-8")
+    text = (ROOT / "examples/fibonacci/reference/fibonacci_server.py").read_text(encoding="utf-8")
     file = tmp_path / "fibonacci_server.py"
     file.write_text(text.replace("example_interfaces.action", "test_msgs.action"), encoding="utf-8")
     return file
@@ -61,7 +60,7 @@ def test_a_goal_without_a_result_says_why(ros: World, fibonacci_server: Path) ->
 
 def test_a_parameter_is_set_while_a_node_runs(ros: World) -> None:
     """As with `ros2 param set`; a value that the node refuses, or does not know, fails."""
-    ros.run(REPOSITORY / "examples/parameters/reference/greeter.py", parameters={"period": 0.5})
+    ros.run(ROOT / "examples/parameters/reference/greeter.py", parameters={"period": 0.5})
     ros.advance(2.0)
     ros.set_parameter("/greeter", "name", "you")
     ros.set_parameter("greeter", "period", 0.25)
@@ -77,7 +76,7 @@ def test_a_parameter_is_set_while_a_node_runs(ros: World) -> None:
 
 def load_corridor() -> type[Simulation]:
     """Load the simulation of an example."""
-    spec = importlib.util.spec_from_file_location("corridor", REPOSITORY / "examples/obstacle_stop/corridor.py")
+    spec = importlib.util.spec_from_file_location("corridor", ROOT / "examples/obstacle_stop/corridor.py")
     assert spec is not None
     assert spec.loader is not None
     module = sys.modules["corridor"] = importlib.util.module_from_spec(spec)
@@ -88,8 +87,8 @@ def load_corridor() -> type[Simulation]:
 
 def test_a_simulated_robot_drives_by_what_a_node_says(ros: World) -> None:
     """Its state is in the test's process: the robot stops half a metre before the wall, and goes on when it opens."""
-    ros.run(REPOSITORY / "examples/obstacle_stop/reference/obstacle_stop.py")
-    robot = ros.simulate(load_corridor()(wall=2.0, opens=20_000_000_000))
+    ros.run(ROOT / "examples/obstacle_stop/reference/obstacle_stop.py")
+    robot = ros.simulate(load_corridor()(wall=2.0, opens=20_000_000_000))  # type: ignore[call-arg]
     ros.advance(15.0)
     assert robot.x == pytest.approx(1.5, abs=0.2)  # type: ignore[attr-defined]
     ros.wait_until(lambda: robot.x > 2.5, timeout=20.0)  # type: ignore[attr-defined]
@@ -141,7 +140,7 @@ def test_a_simulation_may_offer_services_and_fail(ros: World) -> None:
 def workspace(tmp_path: Path) -> Path:
     """A copy of a workspace with a package, and a folder of tests in it."""
     root = tmp_path / "workspace"
-    shutil.copytree(REPOSITORY / "tests/packages/workspace", root)
+    shutil.copytree(TESTS / "packages/workspace", root)
     (root / "src/robot/test").mkdir()
     return root / "src/robot/test"
 

@@ -2,11 +2,14 @@
 
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
+from places import ROOT
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
@@ -21,7 +24,7 @@ from grader.world.world import World
 pytestmark = pytest.mark.ros
 
 HERE = Path(__file__).parent
-EXAMPLES = HERE.parents[1] / "examples"
+EXAMPLES = ROOT / "examples"
 #: Long enough for the busiest machine; no test of this file that passes waits for it.
 PATIENCE = 60.0
 
@@ -150,7 +153,7 @@ class Counter(Simulation):
         self.steps += 1
         return [("/in", {"data": str(self.steps)})]
 
-    def on_message(self, now: Moment, topic: str, message: dict[str, str]) -> list[Output]:
+    def on_message(self, now: Moment, topic: str, message: Mapping[str, Any]) -> list[Output]:
         """Remember."""
         self.heard.append(int(message["data"]))
         return []
@@ -182,6 +185,11 @@ def test_an_action(ros: World, tmp_path: Path) -> None:
             ros.send_goal("/fibonacci", Fibonacci.Goal(order=600), timeout=0.1)
 
 
+def has_come(ros: World, text: str) -> bool:
+    """Return whether a text has been heard on /out."""
+    return any(message.data == text for message in ros.messages("/out"))
+
+
 def test_losses_and_delays(ros_session: Worlds, clock: str) -> None:
     """No message arrives before its delay is over, or at all if it is lost; the draws follow from the seed."""
     heard = []
@@ -191,7 +199,7 @@ def test_losses_and_delays(ros_session: Worlds, clock: str) -> None:
             ros.run("nodes/echo.py")
             began = ros.now
             ros.publish("/in", [String(data=str(number)) for number in range(20)], rate=100)
-            ros.wait_until(lambda ros=ros: any(m.data == "19" for m in ros.messages("/out")), timeout=PATIENCE)
+            ros.wait_until(partial(has_come, ros, "19"), timeout=PATIENCE)
             assert ros.received("/out")[0].t - began >= 0.05
             numbers = [int(m.data) for m in ros.messages("/out")]
             heard.append([number for number in numbers if number < 19])

@@ -5,17 +5,17 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from decided import verdicts
+from places import GRADE, ROOT
 
 from grader.api import Outcome, Report, rejudge, report_to_json
 from grader.grading.app.grade import grade_in
 from grader.grading.app.keeping import EvidenceWriter
 from grader.grading.app.request import GradeRequest
-from grader.grading.model.report import Verdict
 from grader.grading.reporting.formats import PageLayout, known
 from grader.runtime.session import RecordingSession, open_session
 
@@ -92,11 +92,6 @@ def grade(session: RecordingSession, tmp_path: Path) -> Grade:
         return report
 
     return graded
-
-
-def verdicts(report: Report) -> dict[str, Verdict]:
-    """Return the verdicts by the ids of their criteria."""
-    return {verdict.id: verdict for verdict in report.exercises[0].verdicts}
 
 
 def outcomes(report: Report) -> list[str]:
@@ -448,7 +443,7 @@ def test_a_recording_keeps_the_verdict(grade: Grade, tmp_path: Path) -> None:
     )
 
 
-PAGE = Path(__file__).resolve().parents[2] / "docs/how-to/tests-as-criteria.md"
+PAGE = ROOT / "docs/how-to/tests-as-criteria.md"
 
 
 def test_the_page_about_tests_shows_what_works(grade: Grade) -> None:
@@ -473,7 +468,7 @@ def test_a_class_is_graded_by_tests(tmp_path: Path) -> None:
         (tmp_path / "class" / name).mkdir(parents=True)
         (tmp_path / "class" / name / "obstacle_stop.py").write_text(program)
     command = ["grade", "batch", "class", "--rubric", "rubric.yaml", "-o", "results"]
-    command[0] = str(Path(sys.executable).with_name("grade"))
+    command[0] = GRADE
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode in (0, 1), done.stdout + done.stderr
     results = json.loads((tmp_path / "results/batch.json").read_text())["students"]

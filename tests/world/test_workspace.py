@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from junitparser import JUnitXml
+from places import ROOT
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
@@ -56,7 +57,7 @@ def test_a_mistake_in_a_definition_is_told_with_its_place(workspace: Path) -> No
     assert said in done.stdout, done.stdout
 
 
-PAGE = Path(__file__).resolve().parents[2] / "docs/how-to/package-ci.md"
+PAGE = ROOT / "docs/how-to/package-ci.md"
 _RUN = re.compile(r"^ +run: (.+)$", re.MULTILINE)
 
 

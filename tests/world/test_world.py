@@ -456,7 +456,7 @@ def test_what_cannot_be_published_is_told(
         ros.advance(-1.0)
 
 
-WRONG_USES = [
+WRONG_USES: list[tuple[Callable[[World], object], str]] = [
     (lambda ros: ros.publish("/a", Trigger.Request()), "/a: expected a ROS message, found Trigger_Request"),
     (lambda ros: ros.call("/a", String()), r"/a: expected a request such as Trigger\.Request\(\), found String"),
     (lambda ros: ros.call("/a", Trigger.Response()), "found Trigger_Response"),

@@ -58,11 +58,27 @@ class VerifyCondition:
     user: int | None = None  # the user to run as; None for the same one
 
 
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What decides which conditions can be made: the machine, and the user who runs the grader."""
+
+    processors: tuple[int, ...]  # that may be used
+    is_root: bool
+    python: str  # the interpreter that another user has to start
+    can_fork: Callable[[str], bool]  # whether a sandbox can fork nodes; raises EnvironmentFault if it is not there
+
+
+def surroundings() -> Surroundings:
+    """Return those of this process."""
+    processors = tuple(sorted(os.sched_getaffinity(0)))
+    return Surroundings(processors, os.geteuid() == 0, sys.executable, machine.can_fork)
+
+
 #: The first recording, which the others are compared with.
 FIRST = VerifyCondition("first", "as grading records", variables={"PYTHONHASHSEED": HASH_SEEDS[0]})
 
 
-def conditions(names: Sequence[str], isolation: str) -> list[VerifyCondition]:
+def conditions(names: Sequence[str], isolation: str, here: Surroundings) -> list[VerifyCondition]:
     """Return the named conditions, in the order in which they are tried; all usual ones if none is named.
 
     Those that this machine or user cannot make say why. Testing the sandboxes may take some seconds.
@@ -70,45 +86,48 @@ def conditions(names: Sequence[str], isolation: str) -> list[VerifyCondition]:
     Args:
         names: Some of `CONDITIONS`.
         isolation: The sandbox of the first recording.
+        here: What they are made in.
     """
     wanted = [name for name in CONDITIONS if name in (names or USUAL) and name != isolation]
-    return [_sandbox(name, asked=name in names) if name in SANDBOXES else _MAKERS[name](isolation) for name in wanted]
+    return [
+        _sandbox(name, here, asked=name in names) if name in SANDBOXES else _MAKERS[name](isolation, here)
+        for name in wanted
+    ]
 
 
-def _load(isolation: str) -> VerifyCondition:
+def _load(isolation: str, here: Surroundings) -> VerifyCondition:
     del isolation
-    loops = LOOPS * len(os.sched_getaffinity(0))
+    loops = LOOPS * len(here.processors)
     return VerifyCondition(LOAD, f"beside {loops} busy loops", loops=loops)
 
 
-def _processors(isolation: str) -> VerifyCondition:
+def _processors(isolation: str, here: Surroundings) -> VerifyCondition:
     del isolation
-    there = sorted(os.sched_getaffinity(0))
-    lacks = "" if len(there) > 1 else "there is one processor only"
-    return VerifyCondition(PROCESSORS, "on one processor", lacks, processors=tuple(there[:1]))
+    lacks = "" if len(here.processors) > 1 else "there is one processor only"
+    return VerifyCondition(PROCESSORS, "on one processor", lacks, processors=here.processors[:1])
 
 
-def _executed(isolation: str) -> VerifyCondition:
-    forks = machine.can_fork(isolation)
+def _executed(isolation: str, here: Surroundings) -> VerifyCondition:
+    forks = here.can_fork(isolation)
     lacks = "" if forks else f"in the sandbox {isolation}, each is executed anyway"
     return VerifyCondition(EXECUTED, "each program executed, not forked", lacks, executes=True)
 
 
-def _user(isolation: str) -> VerifyCondition:
+def _user(isolation: str, here: Surroundings) -> VerifyCondition:
     del isolation
     words = "as another user"
-    if os.geteuid() != 0:
+    if not here.is_root:
         return VerifyCondition(USER, words, "only root can become another user")
     user = machine.other_user()
-    return VerifyCondition(USER, words, _unreachable(user), isolation="auto", user=user)
+    return VerifyCondition(USER, words, _unreachable(user, here.python), isolation="auto", user=user)
 
 
-def _unreachable(user: int) -> str:
+def _unreachable(user: int, python: str) -> str:
     """Return why another user cannot start the grader, as a phrase; empty if it can."""
     try:
         import_all = "import grader.grading.app.recorded_again"
         done = subprocess.run(
-            [sys.executable, "-c", import_all],
+            [python, "-c", import_all],
             user=user,
             group=user,
             extra_groups=[],
@@ -118,14 +137,15 @@ def _unreachable(user: int) -> str:
             timeout=TRIAL_S,
         )
     except (OSError, subprocess.SubprocessError):
-        return f"user {user} cannot execute {sys.executable}"
-    return "" if done.returncode == 0 else f"user {user} cannot read what {sys.executable} needs"
+        return f"user {user} cannot execute {python}"
+    return "" if done.returncode == 0 else f"user {user} cannot read what {python} needs"
 
 
-def _sandbox(name: str, *, asked: bool) -> VerifyCondition:
+def _sandbox(name: str, here: Surroundings, *, asked: bool) -> VerifyCondition:
     """Return the condition of another sandbox; unless asked for, only one that holds completely is tried."""
     words = f"in the sandbox {name}"
     try:
+        here.can_fork(name)
         report = machine.sandbox(name)
     except EnvironmentFault as fault:
         return VerifyCondition(name, words, fault.message.partition(": ")[2], isolation=name)
@@ -136,26 +156,26 @@ def _sandbox(name: str, *, asked: bool) -> VerifyCondition:
     return VerifyCondition(name, words, lacks, isolation=name)
 
 
-def _together(isolation: str) -> VerifyCondition:
-    forks = machine.can_fork(isolation)
+def _together(isolation: str, here: Surroundings) -> VerifyCondition:
+    forks = here.can_fork(isolation)
     return VerifyCondition(
         TOGETHER,
         "in another order, on one processor, elsewhere, with other hashes" + ", executed" * forks,
         reverses=True,
         executes=forks,
-        processors=_processors(isolation).processors,
+        processors=_processors(isolation, here).processors,
         variables={**ELSEWHERE, "PYTHONHASHSEED": HASH_SEEDS[1]},
         other_folder=True,
     )
 
 
-def _always(condition: VerifyCondition) -> Callable[[str], VerifyCondition]:
+def _always(condition: VerifyCondition) -> Callable[[str, Surroundings], VerifyCondition]:
     """Return what makes a condition that every machine and user can make."""
-    return lambda _: condition
+    return lambda _isolation, _here: condition
 
 
 #: Makes a condition from the sandbox of the first recording.
-_MAKERS: Mapping[str, Callable[[str], VerifyCondition]] = {
+_MAKERS: Mapping[str, Callable[[str, Surroundings], VerifyCondition]] = {
     AGAIN: _always(VerifyCondition(AGAIN, "again, with nothing changed")),
     ORDER: _always(VerifyCondition(ORDER, "one scenario at a time, the last one first", reverses=True)),
     PROCESSORS: _processors,

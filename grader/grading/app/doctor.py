@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from grader.grading.app.grade import Progress
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.model import entry_points
+from grader.grading.model.report import Summary
 from grader.grading.reporting.formats import EVIDENCE, FORMATS, format_of
 from grader.grading.submissions.foreign_archives import install_command, is_installed
 from grader.runtime import machine
 from grader.runtime.interface_packages import described
-from grader.runtime.model.checkup import NO_SANDBOX, Checkup, Exchange, Fact
+from grader.runtime.model.checkup import NO_SANDBOX, Checkup, Exchange, Fact, TierReport
 from grader.runtime.model.errors import EnvironmentFault, GraderError
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import NS_PER_S
@@ -35,29 +37,41 @@ rclpy.spin(node)
 """
 
 
-def examine(progress: Progress) -> Checkup:
+#: Observes a node, as `observe` does.
+Look = Callable[[ObserveRequest, Progress], Summary]
+
+
+def examine(progress: Progress, find: Callable[[], machine.Found] = machine.ros_here) -> Checkup:
     """Find out what this machine can do; takes a few seconds."""
     progress("looking for ROS 2")
-    ros, lack = machine.ros_here()
-    facts = (
-        *machine.software(ros),
-        *lack,
-        *machine.system(),
-        *machine.weaknesses(ros),
-        _archives(),
-        *(_interfaces(ros.distro) if ros is not None else ()),
-        *_added(),
-    )
+    ros, lack = find()
+    known = machine.weaknesses_here(ros)
+    own = () if ros is None else _interfaces(ros.distro)
+    facts = (*machine.software(ros), *lack, *machine.system(), *known, _archives(), *own, *_added())
     if ros is None:
         return Checkup(facts, None, (), "", "", Limits())
     progress("looking at the byte code")
     facts += machine.prepared(ros)
     progress("trying every sandbox")
-    tiers = machine.sandboxes(ros)
+    return concluded(facts, machine.sandboxes(ros), progress)
+
+
+def concluded(
+    facts: tuple[Fact, ...], tiers: tuple[TierReport, ...], progress: Progress, look: Look = observe
+) -> Checkup:
+    """Choose the tier that grading would use, and exchange messages in it.
+
+    Args:
+        facts: What is known of the machine.
+        tiers: What trying every tier has shown, the strongest first.
+        progress: Called at each step.
+        look: Observes the trial node.
+    """
     used = next((tier.name for tier in tiers if tier.usable), "")
-    facts += (machine.node_start(used or NO_SANDBOX),)
+    tier = used or NO_SANDBOX
+    facts += (machine.node_start(tier, can_fork=machine.can_fork(tier)),)
     progress("exchanging messages")
-    exchange = _exchange(used or NO_SANDBOX, progress)
+    exchange = _exchange(tier, progress, look)
     return Checkup(facts, exchange, tiers, used, "" if used else machine.easiest_remedy(tiers), Limits())
 
 
@@ -112,7 +126,7 @@ def _added_scheduler(name: str, package: str) -> Fact:
     return Fact("class scheduler", f"{name} of {package}")
 
 
-def _exchange(tier: str, progress: Progress) -> Exchange:
+def _exchange(tier: str, progress: Progress, look: Look) -> Exchange:
     """Observe the trial node the way a student's node is observed, and count its messages."""
     started = time.perf_counter()
     arrived, problem = 0, ""
@@ -120,7 +134,7 @@ def _exchange(tier: str, progress: Progress) -> Exchange:
         file = Path(folder) / "trial.py"
         file.write_text(TRIAL_NODE, encoding="utf-8")
         try:
-            summary = observe(ObserveRequest((file,), TRIAL_NS, isolation=tier), progress)
+            summary = look(ObserveRequest((file,), TRIAL_NS, isolation=tier), progress)
             arrived = sum(topic.messages for topic in summary.topics if topic.name == TRIAL_TOPIC)
             problem = "; ".join(fault.text for fault in summary.faults)
         except GraderError as error:

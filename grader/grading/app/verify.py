@@ -14,7 +14,7 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import IO, Any
 
-from grader.grading.app.conditions import FIRST, OTHER_FOLDER, VerifyCondition, conditions, own_home
+from grader.grading.app.conditions import FIRST, OTHER_FOLDER, VerifyCondition, conditions, own_home, surroundings
 from grader.grading.app.grade import Progress, begun, read_exercises, wanted_files
 from grader.grading.app.recorded_again import Recordings, WantedRecording
 from grader.grading.app.request import GradeRequest, request_of, request_to_json
@@ -108,7 +108,7 @@ def verify(request: VerifyRequest, progress: Progress) -> Verification:
         first = [(Place(one.name, *key), each) for one in subjects for key, each in one.first.items()]
         tried = [] if evidence is None else [_compared_with_evidence(subjects)]
         progress("looking for conditions to record under")
-        wanted = conditions(request.conditions, isolation)
+        wanted = conditions(request.conditions, isolation, surroundings())
         for number, condition in enumerate(wanted, 1):
             progress(f"recording {condition.words} ({number} of {len(wanted)})")
             tried.append(_tried(folder, subjects, condition, isolation))
@@ -254,11 +254,15 @@ class _Counted:
 
 
 def _recorded(
-    folder: Path, subjects: Sequence[_Subject], condition: VerifyCondition, isolation: str
+    folder: Path,
+    subjects: Sequence[_Subject],
+    condition: VerifyCondition,
+    isolation: str,
+    command: Sequence[str] | None = None,
 ) -> Iterator[Mapping[str, Any]]:
     """Record submissions under a condition, and yield the lines of `grader.grading.app.recorded_again`.
 
-    If that program ends without a word, there is a line with the problem.
+    If that program, or another command in its place, ends without a word, there is a line with the problem.
     """
     recordings = Recordings(
         wanted=tuple(one.wanted for one in subjects),
@@ -279,7 +283,7 @@ def _recorded(
             variables |= own_home(condition.user, own)
         stack.enter_context(_busy(condition.loops))
         said = stack.enter_context(tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace"))
-        program = stack.enter_context(_started(condition, variables, said))
+        program = stack.enter_context(_started(command or PROGRAM, condition, variables, said))
         assert program.stdin is not None
         assert program.stdout is not None
         with suppress(BrokenPipeError), program.stdin as told:  # if it has ended, its exit code says so
@@ -295,14 +299,14 @@ def _recorded(
 
 @contextmanager
 def _started(
-    condition: VerifyCondition, variables: Mapping[str, str], said: IO[str]
+    command: Sequence[str], condition: VerifyCondition, variables: Mapping[str, str], said: IO[str]
 ) -> Iterator[subprocess.Popen[str]]:
     """Start the program that records, and end it with the block."""
     as_user: dict[str, Any] = {}
     if condition.user is not None:
         as_user = {"user": condition.user, "group": condition.user, "extra_groups": []}
     program = subprocess.Popen(
-        PROGRAM,
+        command,
         env=dict(variables),
         cwd="/",  # the current folder may hold modules of a student
         stdin=subprocess.PIPE,

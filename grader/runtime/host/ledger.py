@@ -31,6 +31,8 @@ from .events import Events
 
 #: Topics that every node has; they are not counted.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
+#: After so many messages in a row, the next one waits until they have arrived, so that no queue overflows.
+MESSAGES_PER_FLUSH = 8
 #: A QoS duration of at least this means infinite.
 INFINITE_NS = 9_000_000_000_000_000_000
 BACKGROUND_PARAMETERS = frozenset({"use_sim_time", "start_type_description_service"})
@@ -88,6 +90,8 @@ class Ledger:
         #: Whether an endpoint or node was removed since the last report. A report must be sent before anything new is
         #: created, or the grader could take the old endpoint in the graph for the new one.
         self.removed = False
+        #: How many messages were sent since `must_settle` last said so.
+        self._in_a_row = 0
         #: Handles that have sent messages which may not have arrived yet; they are kept alive until then.
         self._sending: dict[int, Any] = {}
         #: Counterparts, by kind and topic, that the grader does not know and that stayed when their end was awaited.
@@ -162,6 +166,14 @@ class Ledger:
     def note_waited(self) -> None:
         """Note that the program waits, or knows of the graph: whoever is there has discovered its publishers."""
         self._fresh.clear()
+
+    def must_settle(self) -> bool:
+        """Count a message that is about to be sent, and return whether the grader has to know something before it."""
+        self._in_a_row += 1
+        if not self.changed and self._in_a_row < MESSAGES_PER_FLUSH:
+            return False
+        self._in_a_row = 0
+        return True
 
     def note_sent(self, channel: str, handle: Any, work_ns: int) -> None:
         """Count one message, and keep its sender alive until the message has arrived.

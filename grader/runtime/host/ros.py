@@ -43,8 +43,6 @@ from .ledger import BACKGROUND, ENDS_OF_TOPICS, REAL_WAIT_SET, Ledger, asks_for_
 from .order import ReadyOrder
 from .scheduler import Scheduler
 
-#: After this many messages in a row, the next one waits until they have arrived, so that no queue overflows.
-MESSAGES_PER_FLUSH = 8
 #: The kinds of entities in a wait set, in the order of the counts that it is made with.
 GUARD = "guard_condition"
 KINDS = ("subscription", GUARD, "timer", "client", "service")
@@ -639,15 +637,11 @@ def install_traffic(  # noqa: PLR0913 - all that the traffic depends on
     ledger.events.install(BACKGROUND)
     _install_endpoints(ledger, settle, leave, give_up)
     install_departures(leave, depart, ledger.remove)
-    in_a_row = 0
 
     def counted(name: str, handle: Any, send: Callable[[], Any]) -> Any:
-        nonlocal in_a_row
         if name in BACKGROUND:
             return send()
-        in_a_row += 1
-        if ledger.changed or in_a_row >= MESSAGES_PER_FLUSH:
-            in_a_row = 0
+        if ledger.must_settle():
             settle()
         if ledger.is_elsewhere(handle):
             return send()

@@ -75,6 +75,28 @@ MODULE = b"grader.runtime.worker.worker_main"
 _CREDENTIALS = struct.Struct("3i")
 
 
+@dataclass(frozen=True, slots=True)
+class WorkerLimits:
+    """What a worker itself may use, besides what its plan allows the nodes.
+
+    Attributes:
+        margin_s: Seconds after the end of a plan's real time in which it has to answer.
+        answer_bytes: Size of the largest answer, if the messages in it are small.
+        memory_bytes: Memory at which it is ended.
+        processor_s: Returns its processor time in seconds, from the limits and the duration of a plan.
+        spare_cpu_s: Seconds beyond that before the supervisor ends it.
+    """
+
+    margin_s: float = MARGIN_S
+    answer_bytes: int = ANSWER_BYTES
+    memory_bytes: int = FULL_BYTES
+    processor_s: Callable[[Limits, int], int] = worker_processor_s
+    spare_cpu_s: int = SPARE_CPU_S
+
+
+OF_WORKERS = WorkerLimits()
+
+
 class WorkerFailedError(HarnessError):
     """A worker reported a failure of its own.
 
@@ -109,6 +131,7 @@ class WorkerProcess(ABC):
     Args:
         line: The socket.
         domains: Yields ROS domains that no other program uses.
+        limits: What it may use.
 
     Attributes:
         worn: Whether it reports that it should be replaced.
@@ -117,9 +140,10 @@ class WorkerProcess(ABC):
         forked: Its forks.
     """
 
-    def __init__(self, line: socket.socket, domains: Iterator[int]) -> None:
+    def __init__(self, line: socket.socket, domains: Iterator[int], limits: WorkerLimits) -> None:
         self._line = line
         self._domains = domains
+        self._limits = limits
         self._interfaces: tuple[str, ...] = ()
         self._received = bytearray()
         self._pid = 0
@@ -148,25 +172,25 @@ class WorkerProcess(ABC):
         own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
         request = json.dumps({"plan": to_json(plan), **own}) + "\n"
         # Of the worker itself: a plan that takes longer gives it more to receive.
-        own_s = worker_processor_s(plan.limits, plan.duration_ns + plan.wait_at_most_ns)
+        own_s = self._limits.processor_s(plan.limits, plan.duration_ns + plan.wait_at_most_ns)
         expected = f"worker: expected a trace of {plan.scenario}, found none"
         if self._group is not None:
             launches = any(is_launch_file(name) for name, _ in plan.processes)
             self._group.make_room(plan.limits, plan.limits.participants if launches else len(plan.processes))
         try:
-            self._line.settimeout(MARGIN_S)  # a plan with a recording is larger than the socket buffer
+            self._line.settimeout(self._limits.margin_s)  # a plan with a recording is larger than the socket buffer
             self._await_start()
             self._line.sendall(request.encode())
             tries = 1 + (plan.clock == ClockKind.WALL.value)
-            seconds = min(tries * plan.limits.wall_ns, budget.left_ns) / NS_PER_S + MARGIN_S
+            seconds = min(tries * plan.limits.wall_ns, budget.left_ns) / NS_PER_S + self._limits.margin_s
             # On the wall clock it may start three times.
             begun_ns = own_processor_ns(self._pid) if self._pid else 0
-            self._most_ns = begun_ns + (1 + 2 * (tries - 1)) * (own_s + SPARE_CPU_S) * NS_PER_S
+            self._most_ns = begun_ns + (1 + 2 * (tries - 1)) * (own_s + self._limits.spare_cpu_s) * NS_PER_S
             answer = json.loads(self._answer(plan.limits, time.monotonic() + seconds))
         except TimeoutError as error:
             raise WorkerLostError(f"{expected} (it did not answer in time)", late=True) from error
         except MemoryError as error:
-            what = f"{size(FULL_BYTES)} of memory"
+            what = f"{size(self._limits.memory_bytes)} of memory"
             raise WorkerLostError(f"{expected} (it had filled {what})", limit=what) from error
         except OverflowError as error:
             what = processor_words(own_s)
@@ -174,7 +198,10 @@ class WorkerProcess(ABC):
         except EOFError as error:
             end = self._end()
             # Limits that the kernel or the worker's own monitor enforces end it in these ways.
-            limits = {"SIGXCPU": processor_words(own_s), f"code {FULL_CODE}": f"{size(FULL_BYTES)} of memory"}
+            limits = {
+                "SIGXCPU": processor_words(own_s),
+                f"code {FULL_CODE}": f"{size(self._limits.memory_bytes)} of memory",
+            }
             limit = limits.get(end, "")
             raise WorkerLostError(f"{expected} (ended by {end})", limit=limit) from error
         except (OSError, ValueError, RecursionError) as error:
@@ -220,7 +247,7 @@ class WorkerProcess(ABC):
                 if not found:
                     raise EOFError
                 self._received += found
-                if len(self._received) > ANSWER_BYTES:
+                if len(self._received) > self._limits.answer_bytes:
                     raise OSError("its answer did not end")
             line, _, self._received = self._received.partition(b"\n")
             answer: dict[str, Any] = json.loads(line)
@@ -248,7 +275,7 @@ class WorkerProcess(ABC):
             EOFError: The worker has ended.
             OSError: The answer is too large, or the connection is broken.
         """
-        most = max(ANSWER_BYTES, ANSWER_BYTES_PER_BYTE * limits.traffic_bytes)
+        most = max(self._limits.answer_bytes, ANSWER_BYTES_PER_BYTE * limits.traffic_bytes)
         received = bytearray()
         while not received.endswith(b"\n"):
             self._line.settimeout(LOOK_S)
@@ -270,7 +297,7 @@ class WorkerProcess(ABC):
     def _look(self) -> None:
         """Raise MemoryError or OverflowError if the worker itself uses too much memory or processor time."""
         self._pid = self._pid or self._find()
-        if self._pid and usage([self._pid]).memory_bytes > FULL_BYTES:
+        if self._pid and usage([self._pid]).memory_bytes > self._limits.memory_bytes:
             raise MemoryError
         if self._pid and own_processor_ns(self._pid) > self._most_ns:
             raise OverflowError
@@ -305,6 +332,7 @@ class ExecutedWorker(WorkerProcess):
         scratch: A folder for files that ROS writes, such as logs.
         forks: How many forks it makes; each costs less than another start.
         executes: Whether it executes each student's process, also in a tier in which they can be forked.
+        limits: What it may use.
     """
 
     def __init__(  # noqa: PLR0913  what it records with
@@ -315,12 +343,13 @@ class ExecutedWorker(WorkerProcess):
         scratch: Path,
         *,
         forks: int,
-        executes: bool = False,
+        executes: bool,
+        limits: WorkerLimits,
     ) -> None:
         lines = [socket.socketpair() for _ in range(1 + forks)]
-        super().__init__(lines[0][0], domains)
+        super().__init__(lines[0][0], domains, limits)
         self.shares = forks > 0
-        self.forked = [ForkedWorker(line, domains) for line, _ in lines[1:]]
+        self.forked = [ForkedWorker(line, domains, limits) for line, _ in lines[1:]]
         self._executable = os.fsencode(runtime.executable)
         numbers = tuple(theirs.fileno() for _, theirs in lines)
         clock, host = ClockKind.VIRTUAL.value, isolation.host_seen_at
@@ -389,8 +418,8 @@ class ExecutedWorker(WorkerProcess):
 class ForkedWorker(WorkerProcess):
     """A fork of a worker in the same sandbox, made before that one has run anything."""
 
-    def __init__(self, line: socket.socket, domains: Iterator[int]) -> None:
-        super().__init__(line, domains)
+    def __init__(self, line: socket.socket, domains: Iterator[int], limits: WorkerLimits) -> None:
+        super().__init__(line, domains, limits)
         self.shares = True
         self._process: int | None = None  # a descriptor of the process, because its pid may be given to another one
         line.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
@@ -452,6 +481,7 @@ class Recorder:
         workers: How many scenarios to record at the same time.
         on_wall_clock: Called before each recording on the wall clock, which takes much time and little of a processor.
         executes: Whether each student's process is executed, also in a tier in which they can be forked.
+        limits: What each worker may use.
 
     Attributes:
         ended_ns: Processor time of the workers that were replaced.
@@ -467,9 +497,11 @@ class Recorder:
         workers: int,
         on_wall_clock: Callable[[], None] = lambda: None,
         executes: bool = False,
+        limits: WorkerLimits = OF_WORKERS,
     ) -> None:
         self._isolation = isolation
         self._executes = executes
+        self._limits = limits
         self._runtime = runtime
         self._domains = _Shared(domains)
         self._idle: queue.LifoQueue[WorkerProcess | None] = queue.LifoQueue()  # a warm worker first
@@ -653,7 +685,7 @@ class Recorder:
             if self._closed:
                 raise HarnessError("worker: the recorder is closed")
             given = (self._isolation, self._runtime, self._domains, self._scratch)
-            worker = ExecutedWorker(*given, forks=forks, executes=self._executes)
+            worker = ExecutedWorker(*given, forks=forks, executes=self._executes, limits=self._limits)
             self._alive += [worker, *worker.forked]
             return worker
 

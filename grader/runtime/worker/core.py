@@ -11,7 +11,7 @@ import bisect
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
@@ -39,7 +39,9 @@ class Process:
         name: The wanted file name, which identifies the process in traces.
         wake_ns: When it next wants to run, in nanoseconds of virtual time, or None.
         claims: Its endpoints, as it reports them.
-        renewed: Whether it has reported its endpoints since it was last told their counterparts.
+        told: The counterparts that it has to wait for: kind of endpoint -> name -> numbers of them.
+        renewed: Whether it has reported its endpoints since then.
+        sees_graph: Whether its program queries the graph, as it reports.
         arrivals: Messages that are on their way to it and not yet announced to it, by channel.
         unmatched: The channels of its endpoints that had too few counterparts when the wait for them timed out.
         nudged: Whether it has to run again at this instant, because its endpoints were matched.
@@ -50,7 +52,9 @@ class Process:
     name: str
     wake_ns: int | None = field(default=None, kw_only=True)
     claims: list[dict[str, Any]] = field(default_factory=list, kw_only=True)
+    told: dict[str, dict[str, list[int]]] = field(default_factory=dict, kw_only=True)
     renewed: bool = field(default=False, kw_only=True)
+    sees_graph: bool = field(default=False, kw_only=True)
     arrivals: dict[str, int] = field(default_factory=dict, kw_only=True)
     unmatched: frozenset[str] = field(default=frozenset(), kw_only=True)
     nudged: bool = field(default=False, kw_only=True)
@@ -68,8 +72,7 @@ class Play:
     event: Event
 
 
-@dataclass(frozen=True, slots=True)
-class RunProcess(Generic[P]):
+class RunProcess(NamedTuple, Generic[P]):
     """Let a process run until it has nothing left to do at this instant, and handle what it reports meanwhile.
 
     Attributes:
@@ -147,9 +150,10 @@ class Agenda:
         """Return whether an event is due."""
         return bool(self.due) and self.due[0].t_ns <= now_ns
 
-    def moments(self) -> list[int]:
-        """Return when the next event is due, and when the run ends."""
-        return [self.due[0].t_ns, self.end_ns] if self.due else [self.end_ns]
+    def moments(self, before_end_ns: int = 0) -> list[int]:
+        """Return when the next event is due, and when the run ends, or so long before that."""
+        end_ns = self.end_ns - before_end_ns
+        return [self.due[0].t_ns, end_ns] if self.due else [end_ns]
 
     def end_by(self, now_ns: int) -> None:
         """End the run now, if it does not end before."""
@@ -253,7 +257,8 @@ class Core(Generic[P]):
     def _settle(self) -> Iterator[Command[P]]:
         """Let everything happen that happens at this instant: first stimuli, then one process, and again."""
         while self.now_ns < self._agenda.end_ns:
-            yield from self._play()
+            if self._agenda.is_due(self.now_ns):
+                yield from self._play()
             process = self._next_process()
             if process is not None:
                 yield from self.run(process)
@@ -271,17 +276,18 @@ class Core(Generic[P]):
 
     def _next_process(self) -> P | None:
         """Return the process that runs next at this instant; None if none has anything to do."""
-        ready = (process for process in self.processes if self._is_ready(process))
-        if self._shuffle is None:
-            return next(ready, None)
-        found = list(ready)
-        self._shuffle(found)
+        found = []
+        for process in self.processes:
+            if not process.ended and (process.arrivals or process.nudged or self._is_due(process)):
+                if self._shuffle is None:
+                    return process
+                found.append(process)
+        if self._shuffle is not None:
+            self._shuffle(found)
         return found[0] if found else None
 
-    def _is_ready(self, process: P) -> bool:
-        """Return whether a process has messages on their way to it, has to run again, or is due."""
-        is_due = process.wake_ns is not None and process.wake_ns <= self.now_ns
-        return not process.ended and (bool(process.arrivals) or process.nudged or is_due)
+    def _is_due(self, process: P) -> bool:
+        return process.wake_ns is not None and process.wake_ns <= self.now_ns
 
     def _next_ns(self) -> int:
         """Return the next moment at which anything is due."""
@@ -290,12 +296,13 @@ class Core(Generic[P]):
 
     def _quiet_until(self, process: P) -> int:
         """Return the next moment at which a stimulus or any other process is due."""
-        *events, end_ns = self._agenda.moments()
-        moments = [*events, end_ns - self._past_end_ns]
+        moments = self._agenda.moments(self._past_end_ns)
         for other in self.processes:
             if other is not process and not other.ended:
-                moments += [self.now_ns] if other.arrivals or other.nudged else []
-                moments += [other.wake_ns] if other.wake_ns is not None else []
+                if other.arrivals or other.nudged:
+                    return self.now_ns
+                if other.wake_ns is not None:
+                    moments.append(other.wake_ns)
         return max(self.now_ns, min(moments))
 
     def _count_hop(self) -> None:

@@ -29,11 +29,6 @@ MATCHED_NS = 2 * NS_PER_S
 class VirtualSteppedRunner(SteppedRunner, VirtualRunner):
     """Carries out commands on the virtual clock."""
 
-    def __init__(
-        self, plan: Plan, students: list[NodeProcess], observer: Observer, start: Starter, ask: Question
-    ) -> None:
-        super().__init__(plan, students, observer, start, ask)
-
     def unsuitable(self) -> str:
         """Return why virtual time does not suit the nodes; empty if it does."""
         return super().unsuitable() or unfit(self._students, self._faults, full=bool(self._recorder.full))

@@ -72,8 +72,6 @@ class NodeProcess(Process):
 
     Attributes:
         root: The submission's folder as the process sees it.
-        told: The counterparts that it has to wait for.
-        sees_graph: Whether its program queries the graph, as it reports.
         offers: The services, clients and parameters that it has reported.
         exit_code: Its exit code as a shell shows it, 128 and the number of the signal that ended it; None until it has
             ended, or if it is not known.
@@ -104,8 +102,6 @@ class NodeProcess(Process):
     process: subprocess.Popen[bytes] | StartedProcess
     line: socket.socket
     limits: Limits = field(default_factory=Limits)
-    told: dict[str, dict[str, list[int]]] = field(default_factory=dict)
-    sees_graph: bool = False
     offers: set[tuple[str, str, str]] = field(default_factory=set)
     exit_code: int | None = None
     workload: Workload | None = None

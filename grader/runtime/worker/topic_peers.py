@@ -125,7 +125,7 @@ class VirtualTopicPeers(TopicPeers):
         super().__init__(observer, recorder)
         self._students = students
         self._discovery = discovery
-        self._streams = discovery.streams
+        self._streams = discovery.matching.streams
 
     def do(self, event: TopicEvent, now_ns: int) -> None:
         """Execute one event of a stimulus, with the publisher's type adapted to the current subscriptions."""
@@ -134,24 +134,24 @@ class VirtualTopicPeers(TopicPeers):
         super().do(event, now_ns)
 
     def _offer(self, stream: PlannedMessages) -> None:
-        self._discovery.fixed[stream.topic] = stream
+        self._discovery.matching.fixed[stream.topic] = stream
         self._streams[stream.topic] = stream.type
         super()._offer(stream)
         self._discovery.advertised(stream.topic)
 
     def _advertise(self, topic: str, default: str) -> bool:
         latched = super()._advertise(topic, default)
-        (self._discovery.latched.add if latched else self._discovery.latched.discard)(topic)
+        (self._discovery.matching.latched.add if latched else self._discovery.matching.latched.discard)(topic)
         self._discovery.advertised(topic)
         return latched
 
     def _publish(self, delivery: Delivery, message: Any) -> None:
         super()._publish(delivery, message)
         topic = delivery.topic
-        self._discovery.published[topic] += 1
+        self._discovery.matching.published[topic] += 1
         for student in self._students:
             # Only to those that receive it: a process waits in real time for what is announced.
-            if any(self._discovery.takes(reader, topic) for reader in readers_of(student.claims, topic)):
+            if any(self._discovery.matching.takes(reader, topic) for reader in readers_of(student.claims, topic)):
                 announce(student, f"topic {topic}", 1)
 
     def _asked(self, topic: str) -> list[tuple[str, bool]]:
@@ -159,7 +159,7 @@ class VirtualTopicPeers(TopicPeers):
 
     def _withdraw(self, topic: str, now_ns: int) -> None:
         del now_ns
-        self._discovery.fixed.pop(topic, None)
+        self._discovery.matching.fixed.pop(topic, None)
         self._observer.withdraw(topic)
         self._discovery.tell_all()
 

@@ -57,10 +57,10 @@ class VirtualRunner(Runner):
     def _carry_out(self, commands: Iterable[Command[NodeProcess]]) -> None:
         for command in commands:
             match command:
-                case Play():
-                    self._do(command.event, self._core.now_ns)
                 case RunProcess():
                     self._step(command)
+                case Play():
+                    self._do(command.event, self._core.now_ns)
                 case Receive():
                     self._receive(command)
                 case Retry():

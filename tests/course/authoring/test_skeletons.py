@@ -6,12 +6,12 @@ import json
 import math
 import random
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from places import GRADE, ROOT
 from ruamel.yaml import YAML
 
 from grader.cli import main
@@ -23,7 +23,6 @@ from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.trace import Offer
 from grader.testing import TraceBuilder
 
-ROOT = Path(__file__).resolve().parents[3]
 FLOAT = "std_msgs/msg/Float32"
 POSE = "geometry_msgs/msg/PoseStamped"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -184,15 +183,14 @@ def test_nothing_is_written_over(tmp_path: Path) -> None:
 @pytest.mark.ros
 def test_the_reference_scores_full_under_its_skeleton(tmp_path: Path) -> None:
     """A node that publishes, listens and logs: seen, given numbers, asked, checked and graded for real."""
-    grade = str(Path(sys.executable).with_name("grade"))
     reference = str(ROOT / "reference_solutions" / "temperature_sensor.py")
     rubric = tmp_path / "sensor.yaml"
-    command = [grade, "rubric", "new", reference, "--id", "sensor", "-o", str(rubric)]
+    command = [GRADE, "rubric", "new", reference, "--id", "sensor", "-o", str(rubric)]
     subprocess.run(command, check=True, capture_output=True)
     assert check_rubric(rubric).warnings == ()
     asked_of = {(type(c.check).__name__, getattr(c.check, "topic", "")) for c in read_rubric(rubric).criteria}
     assert {("TopicRate", "/temperature"), ("RandomInRange", "/temperature"), ("Subscribes", "/fan_speed")} <= asked_of
-    command = [grade, reference, "--rubric", str(rubric), "--seed", "5", "--json"]
+    command = [GRADE, reference, "--rubric", str(rubric), "--seed", "5", "--json"]
     report = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
     assert report["score"] == report["max_score"] >= 25
 

@@ -15,6 +15,7 @@ import pytest
 from class_samples import FakeScheduler, course, grade, hand_in, report, scores
 from hypothesis import given
 from hypothesis import strategies as st
+from places import ROOT
 
 from grader.course.classroom.adjustments import Adjustments, Amount, Decision, adjust, read_adjustments
 from grader.course.classroom.gradebook import decision_line
@@ -23,7 +24,7 @@ from grader.course.classroom.platforms import feedback
 from grader.grading.app.request import GradeRequest
 from grader.runtime.model.errors import ClassError
 
-RUBRICS = Path(__file__).resolve().parents[3] / "rubrics"
+RUBRICS = ROOT / "rubrics"
 RULES = """late:
   per_day: 10 %
   at_most: 50 %

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from test_regrading import grade, rubric
+from regraded_class import grade, rubric
 
 from grader.cli.main import app
 from grader.course.classroom.final_marks import load_mark

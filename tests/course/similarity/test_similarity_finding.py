@@ -10,7 +10,8 @@ from pathlib import Path
 import copies
 import pytest
 from copies import FILE, handed
-from sample_folders import TESTS, folder_of
+from places import ROOT, TESTS
+from sample_folders import folder_of
 
 from grader.course.similarity import library
 from grader.course.similarity.finding import (
@@ -24,7 +25,6 @@ from grader.course.similarity.finding import (
 from grader.course.similarity.library import Handed, Similar
 from grader.runtime.model.errors import ClassError
 
-ROOT = Path(__file__).resolve().parents[3]
 #: Programs of people who do not know each other.
 STRANGERS = ("odom_chinese", "odom_csv", "odom_distance", "odom_globals_spin_once", "odom_json", "odom_namedtuple",
              "odom_history_path", "odom_loop_with_deadline", "odom_watchdog", "odom_yaml_lines")  # fmt: skip

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tracing import Recording, position_logs
+from wordings import plain
 
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.runtime.model.errors import HarnessError
@@ -14,10 +15,6 @@ from grader.runtime.model.trace import ClockKind, Trace
 
 LOG_PERIOD = known_checks()["log_period"]
 PERIOD = LOG_PERIOD("odom_subscriber.py", "/odom", NS_PER_S)
-
-
-def plain(x: float, y: float) -> str:
-    return f"x={x:.2f} y={y:.2f}"
 
 
 @pytest.mark.parametrize(("period", "credit"), [(0.9, 1), (1.0, 1), (1.1, 1), (0.89, 0), (1.12, 0), (0.5, 0), (2.0, 0)])

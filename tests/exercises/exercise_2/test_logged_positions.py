@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tracing import ODOM_TIMES, drive, driving, pose_at, position_logs
-from wordings import RIGHT, WRONG, Writer
+from wordings import RIGHT, WRONG, Writer, plain
 
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.runtime.model.quantities import NS_PER_S
@@ -18,10 +18,6 @@ from grader.runtime.model.trace import ClockKind, FaultKind
 POSITION = known_checks()["logs_position"]("odom_subscriber.py", "/odom")
 PERIOD = known_checks()["log_period"]("odom_subscriber.py", "/odom", NS_PER_S)
 HALF = Fraction(1, 2)
-
-
-def plain(x: float, y: float) -> str:
-    return f"x={x:.2f} y={y:.2f}"
 
 
 @pytest.mark.parametrize("write", RIGHT.values(), ids=RIGHT)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 from kept_runs import kept_run, velocity_run, velocity_trace
+from places import ROOT
 
 from grader.cli import main
 from grader.grading.app import explain as explaining
@@ -25,7 +26,6 @@ from grader.grading.rubrics.check_parameters import manual_of
 from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.errors import GraderError
 
-ROOT = Path(__file__).resolve().parents[3]
 CRITERIA = [(e.id, c.id) for path in builtin_rubrics().values() for e in [read_rubric(path)] for c in e.criteria]
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from places import ROOT
 
 from grader.grading.app.grade import EarlyReports, read_exercises
 from grader.grading.app.request import GradeRequest
@@ -19,7 +20,7 @@ from grader.grading.model.run import Run
 from grader.runtime.model.submission import StudentFile, Submission
 from grader.runtime.model.trace import ClockKind, Trace
 
-REFERENCE = Path(__file__).resolve().parents[3] / "reference_solutions"
+REFERENCE = ROOT / "reference_solutions"
 EXERCISES = read_exercises(GradeRequest("x"))
 SCENARIOS = [(exercise.id, scenario.id) for exercise in EXERCISES for scenario in exercise.scenarios]
 

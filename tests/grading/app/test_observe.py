@@ -2,12 +2,12 @@
 
 import json
 import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from places import GRADE, ROOT, SHARED, TESTS
 
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.judging.summary import summarise
@@ -30,7 +30,6 @@ from grader.runtime.model.trace import (
     Trace,
 )
 
-ROOT = Path(__file__).resolve().parents[3]
 FLOAT = "std_msgs/msg/Float32"
 
 
@@ -152,9 +151,8 @@ def test_hostile_text_stays_text() -> None:
 @pytest.mark.ros
 def test_nodes_are_observed_for_real() -> None:
     """Both reference nodes of exercise 3 run together; what they do comes out as JSON and as text."""
-    grade = str(Path(sys.executable).with_name("grade"))
     files = [str(ROOT / "reference_solutions" / name) for name in ("temperature_sensor.py", "fan_controller.py")]
-    command = [grade, "observe", *files, "--duration", "5"]
+    command = [GRADE, "observe", *files, "--duration", "5"]
     told = json.loads(subprocess.run([*command, "--json"], check=True, capture_output=True).stdout)
     assert told["nodes"] == ["/fan_controller", "/temperature_sensor"]
     assert [(t["name"], round(t["rate_hz"], 6)) for t in told["topics"]] == [("/fan_speed", 5.0), ("/temperature", 5.0)]
@@ -256,7 +254,7 @@ def test_the_file_that_is_named_runs(tmp_path: Path, room: str) -> None:
     assert [note for note in summary.notes if "not graded" in note] == []
 
 
-WORKSPACE = ROOT / "tests" / "packages" / "workspace"
+WORKSPACE = TESTS / "packages" / "workspace"
 ROBOT = WORKSPACE / "src" / "robot"
 TARGETS = {
     "a workspace": (WORKSPACE, ("robot/talker", "robot/listener"), ("/listener", "/talker")),
@@ -296,8 +294,7 @@ def test_what_cannot_be_observed_is_told_what_is_there(path: Path, said: str) ->
 
 def test_a_file_that_is_none_is_one_line() -> None:
     """Exit code 2, the name and what to do; nothing is started."""
-    grade = str(Path(sys.executable).with_name("grade"))
-    done = subprocess.run([grade, "observe", "nope.py"], check=False, capture_output=True, text=True)
+    done = subprocess.run([GRADE, "observe", "nope.py"], check=False, capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stderr.splitlines()[0] == "error: nope.py: expected a .py file, found none"
 
@@ -428,14 +425,14 @@ def test_output_that_only_looks_like_a_traceback_stays() -> None:
     ]
 
 
-SHARED = ROOT.parent / "shared" / "cases" / "fidelity"
+CASES = SHARED / "cases" / "fidelity"
 
 
 @pytest.mark.ros
-@pytest.mark.skipif(not SHARED.is_dir(), reason="the programs of others are not here")
+@pytest.mark.skipif(not CASES.is_dir(), reason="the programs of others are not here")
 @CLOCKS
 def test_services_of_others_are_in_the_graph(clock: str) -> None:
     """Also of programs without a topic."""
-    files = (SHARED / "graph_server.py", SHARED / "graph_asks.py")
+    files = (CASES / "graph_server.py", CASES / "graph_asks.py")
     text = render_summary(observe(ObserveRequest(files, 2 * NS_PER_S, clock=clock), lambda _: None))
     assert "Graph:\n  /asks ┄┄/ask┄┄▶ /server\n" in text

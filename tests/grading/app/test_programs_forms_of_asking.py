@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from decided import grade_until_decided
+from places import SHARED
 
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.app.programs import find_targets, stage
@@ -18,7 +19,7 @@ from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.programs.executables import find_executable
 
-SHARED = Path(__file__).resolve().parents[4] / "shared" / "cases" / "fidelity"
+FIDELITY = SHARED / "cases" / "fidelity"
 NODE = """#!/usr/bin/env python3
 import rclpy
 
@@ -460,14 +461,14 @@ CASES = {
 }
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="the programs of others are not here")
+@pytest.mark.skipif(not FIDELITY.is_dir(), reason="the programs of others are not here")
 @pytest.mark.parametrize("case", CASES)
 def test_workspaces_of_others(tmp_path: Path, case: str) -> None:
     """All programs are found, and the same from a copy without links."""
-    found = find_targets((SHARED / case,))
+    found = find_targets((FIDELITY / case,))
     assert tuple(target.name for target in found.targets) == CASES[case]
     copy = tmp_path / "copy"
-    shutil.copytree(SHARED / case, copy)
+    shutil.copytree(FIDELITY / case, copy)
     projects, _ = read_projects(copy)
     for program in CASES[case]:
         package, _, name = program.partition("/")

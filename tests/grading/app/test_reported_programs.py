@@ -6,11 +6,11 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from decided import grade_until_decided
+from places import GRADE, ROOT, SHARED
 
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.app.request import GradeRequest
@@ -20,9 +20,7 @@ from grader.runtime.model.trace import ClockKind
 
 pytestmark = pytest.mark.ros
 
-ROOT = Path(__file__).resolve().parents[3]
-CASES = ROOT.parent / "shared" / "cases" / "fidelity"
-GRADE = Path(sys.executable).with_name("grade")
+CASES = SHARED / "cases" / "fidelity"
 #: Program -> the name under which it is handed in, and the line and hint of what is to be fixed first.
 HINTS = {
     "stale_odometry.py": (
@@ -79,7 +77,7 @@ def test_one_processor_is_as_good_as_several(tmp_path: Path) -> None:
     reports = []
     for few in (False, True):
         before = ("taskset", "-c", str(min(os.sched_getaffinity(0)))) if few else ()
-        command = [*before, str(GRADE), str(tmp_path), "--all", "--seed", "1", "--json"]
+        command = [*before, GRADE, str(tmp_path), "--all", "--seed", "1", "--json"]
         done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
         assert done.stdout, done.stderr
         report = json.loads(done.stdout)

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from places import GRADE, ROOT
 
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest
@@ -13,8 +14,6 @@ from grader.grading.app.seeds import PRACTICE, PRACTICE_NOTE, SeedKey, kept_key,
 from grader.grading.evidence.store import open_evidence, run_of
 from grader.runtime.model.errors import KeyFileError
 
-ROOT = Path(__file__).resolve().parents[3]
-GRADE = str(Path(sys.executable).with_name("grade"))
 KEY = "a-key-that-nobody-must-ever-see-5f2e"
 
 

@@ -7,22 +7,22 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from places import GRADE
 from sandboxes import USER, unreachable, user_start
-from verifying import GRADE, differences, program, verified, written
+from verifying import differences, program, verified, written
 
 from grader.cli.main import app
-from grader.grading.app import conditions as module
 from grader.grading.app import verify as verifying
-from grader.grading.app.conditions import LOOPS, VerifyCondition, conditions
+from grader.grading.app.conditions import LOOPS, VerifyCondition, conditions, surroundings
 from grader.grading.model.conditions import CONDITIONS, SANDBOXES, USUAL
 from grader.grading.model.verification import ConditionState
-from grader.runtime import machine
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import RosInstallation
 from grader.runtime.sandbox.tiers import isolation_from_name
@@ -31,10 +31,13 @@ from grader.runtime.sandbox.tiers import isolation_from_name
 DIFFERING = {
     "address": (program(each='self.get_logger().info(f"sent by {id(object())}")'), "address"),
     "shown_object": (program(each="self.get_logger().info(str(self.executor))"), "address"),
+    # The hash of a tuple mixes that of the object in it, which is its address. So the order is another one whenever the
+    # address of the heap is, which Linux draws from 2**28. That of the bare objects is often the same: only the address
+    # within 64 KiB matters to it, which are 16 pages.
     "set_of_objects": (
         program(
             imports="class Step:\n    def __init__(self, number):\n        self.number = number",
-            begin="self.steps = [step.number for step in {Step(n) for n in range(1000)}]",
+            begin="self.steps = [step.number for (step,) in {(Step(n),) for n in range(1000)}]",
             each="self.get_logger().info(str(self.steps.pop()))",
         ),
         None,
@@ -129,19 +132,11 @@ RACING = {
 }
 
 
-@pytest.fixture
-def folder() -> Iterator[Path]:
-    """An empty folder; unlike pytest's own, every user can enter what is above it."""
-    with tempfile.TemporaryDirectory() as name:
-        Path(name).chmod(0o755)
-        yield Path(name)
-
-
 @pytest.mark.ros
-def test_programs_that_repeat_are_told_from_those_that_do_not(folder: Path) -> None:
+def test_programs_that_repeat_are_told_from_those_that_do_not(open_folder: Path) -> None:
     """By recording again, without any other change; those of the wall clock are neither."""
     texts = {**{name: text for name, (text, _) in DIFFERING.items()}, **REPEATING, **RACING}
-    code, found = verified(written(folder, texts), "--condition", "again")
+    code, found = verified(written(open_folder, texts), "--condition", "again")
     assert code == 1
     assert found["result"] == "different"
     assert {name: one["cause"] for name, one in differences(found).items()} == {
@@ -153,17 +148,17 @@ def test_programs_that_repeat_are_told_from_those_that_do_not(folder: Path) -> N
 
 @pytest.mark.ros
 @pytest.mark.parametrize("condition", ["executed", "together"])
-def test_what_repeats_does_so_under_other_conditions(folder: Path, condition: str) -> None:
+def test_what_repeats_does_so_under_other_conditions(open_folder: Path, condition: str) -> None:
     """Also what a program draws after it has imported numpy, and how deep it can recurse."""
-    code, found = verified(written(folder, REPEATING), "--condition", condition)
+    code, found = verified(written(open_folder, REPEATING), "--condition", condition)
     assert (code, differences(found)) == (0, {})
 
 
 @pytest.mark.ros
-def test_the_first_difference_says_where_it_is(folder: Path) -> None:
+def test_the_first_difference_says_where_it_is(open_folder: Path) -> None:
     """With both events, and with the line that logged."""
     text = program(imports="import itertools", each="self.get_logger().info(str(id(object())))")
-    (path,) = written(folder, {"ada": text})
+    (path,) = written(open_folder, {"ada": text})
     done = subprocess.run([GRADE, "verify", path, "--condition", "again"], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     line = 1 + text.splitlines().index("        self.get_logger().info(str(id(object())))")
@@ -174,9 +169,9 @@ def test_the_first_difference_says_where_it_is(folder: Path) -> None:
 
 
 @pytest.mark.ros
-def test_only_the_wall_clock_can_decide(folder: Path) -> None:
+def test_only_the_wall_clock_can_decide(open_folder: Path) -> None:
     """Then nothing is verified, and the reason is said."""
-    (path,) = written(folder, RACING)
+    (path,) = written(open_folder, RACING)
     done = subprocess.run([GRADE, "verify", path, "--quick"], capture_output=True, text=True, check=False)
     assert done.returncode == 3
     assert "Not comparable event by event, because the wall clock decides:" in done.stdout
@@ -184,10 +179,10 @@ def test_only_the_wall_clock_can_decide(folder: Path) -> None:
 
 
 @pytest.mark.ros
-def test_the_result_in_evidence(folder: Path) -> None:
+def test_the_result_in_evidence(open_folder: Path) -> None:
     """The kept recordings are compared too; evidence of other files is refused, and judging again works as before."""
-    (path,) = written(folder, {"ada": REPEATING["plain"]})
-    kept = folder / "kept"
+    (path,) = written(open_folder, {"ada": REPEATING["plain"]})
+    kept = open_folder / "kept"
     command = [GRADE, path, "--exercise", "velocity_publisher", "-o", f"evidence={kept}"]
     subprocess.run(command, capture_output=True, check=False)
     code, found = verified([path], "--evidence", str(kept), "--condition", "order")
@@ -199,7 +194,7 @@ def test_the_result_in_evidence(folder: Path) -> None:
     before = json.loads((kept / "report.json").read_text(encoding="utf-8"))
     judged = subprocess.run([GRADE, "rejudge", str(kept), "--json"], capture_output=True, text=True, check=False)
     assert json.loads(judged.stdout)["exercises"] == before["exercises"]
-    other = written(folder, {"bob": REPEATING["clocks"]})
+    other = written(open_folder, {"bob": REPEATING["clocks"]})
     done = subprocess.run(
         [GRADE, "verify", *other, "--evidence", str(kept)], capture_output=True, text=True, check=False
     )
@@ -209,10 +204,10 @@ def test_the_result_in_evidence(folder: Path) -> None:
 
 
 @pytest.mark.ros
-def test_changed_evidence_differs(folder: Path) -> None:
+def test_changed_evidence_differs(open_folder: Path) -> None:
     """What was recorded of another version of the grader or on another machine is compared event by event."""
-    (path,) = written(folder, {"ada": REPEATING["plain"]})
-    kept = folder / "kept"
+    (path,) = written(open_folder, {"ada": REPEATING["plain"]})
+    kept = open_folder / "kept"
     command = [GRADE, path, "--exercise", "velocity_publisher", "--seed", "1", "-o", f"evidence={kept}"]
     subprocess.run(command, capture_output=True, check=False)
     manifest = json.loads((kept / "evidence.json").read_text(encoding="utf-8"))
@@ -225,15 +220,15 @@ def test_changed_evidence_differs(folder: Path) -> None:
 
 @pytest.mark.ros
 @pytest.mark.long
-def test_an_ordinary_user(folder: Path, ros: RosInstallation) -> None:
+def test_an_ordinary_user(open_folder: Path, ros: RosInstallation) -> None:
     """Who cannot become another one, and has another sandbox than root."""
     if os.geteuid() != 0:
         pytest.skip("only root can become an ordinary user")
     before = user_start(ros)
     if why := unreachable(before, ros):
         pytest.skip(why)
-    paths = written(folder, {"ada": REPEATING["plain"]})
-    home = folder / "home"
+    paths = written(open_folder, {"ada": REPEATING["plain"]})
+    home = open_folder / "home"
     home.mkdir()
     os.chown(home, USER, USER)
     own = {"HOME": str(home), "XDG_CACHE_HOME": str(home), "TMPDIR": str(home)}
@@ -267,20 +262,20 @@ print(json.dumps({"isolation": "x", "said": said}))
 @pytest.fixture
 def started(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[VerifyCondition], dict[str, Any]]:
     """Start the stand-in under a condition, and return what it said."""
-    monkeypatch.setattr(verifying, "PROGRAM", (sys.executable, "-c", SAYS))
     monkeypatch.setenv("GRADER_SEED_KEY", "a key that nobody else may read")
     tmp_path.chmod(0o755)
 
     def start(condition: VerifyCondition) -> dict[str, Any]:
-        (line,) = verifying._recorded(tmp_path, [], condition, "bubblewrap")
+        (line,) = verifying._recorded(tmp_path, [], condition, "bubblewrap", (sys.executable, "-c", SAYS))
         said: dict[str, Any] = line["said"]
         return said
 
     return start
 
 
-def made(name: str, isolation: str = "landlock") -> VerifyCondition:
-    (condition,) = conditions([name], isolation)
+def made(name: str, isolation: str = "landlock", **changes: Any) -> VerifyCondition:
+    """Return a condition, in surroundings that differ from those here in some ways."""
+    (condition,) = conditions([name], isolation, replace(surroundings(), **changes))
     return condition
 
 
@@ -319,41 +314,34 @@ def test_no_loop_is_left(started: Callable[[VerifyCondition], dict[str, Any]]) -
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
-def test_another_user(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_another_user(tmp_path: Path) -> None:
     """With a home of its own; a program that this user cannot start is named."""
     tmp_path.chmod(0o755)
     says = 'cat > /dev/null; echo "{\\"said\\": \\"$(id -u) $(stat -c %u "$HOME")\\", \\"isolation\\": \\"x\\"}"'
-    monkeypatch.setattr(verifying, "PROGRAM", ("/bin/sh", "-c", says))
-    monkeypatch.setattr(module, "_unreachable", lambda user: "")
     with tempfile.TemporaryDirectory() as name:  # every user can enter what is above it
         Path(name).chmod(0o755)
-        condition = made("user")
-        (line,) = verifying._recorded(Path(name), [], condition, "none")
+        condition = made("user", python="/bin/true")
+        (line,) = verifying._recorded(Path(name), [], condition, "none", ("/bin/sh", "-c", says))
+    assert condition.not_tried == ""
     assert line["said"] == f"{condition.user} {condition.user}"
     assert condition.user != 0
-    monkeypatch.undo()
-    monkeypatch.setattr(sys, "executable", "/nowhere/python")
-    assert made("user").not_tried == f"user {made('user').user} cannot execute /nowhere/python" or "cannot execute" in (
-        made("user").not_tried
-    )
+    lacking = made("user", python="/nowhere/python")
+    assert lacking.not_tried == f"user {lacking.user} cannot execute /nowhere/python"
+    assert made("user", python="/bin/false").not_tried.endswith(" cannot read what /bin/false needs")
 
 
-def test_what_this_machine_cannot_make_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_this_machine_cannot_make_is_named() -> None:
     """With the reason."""
-    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {3})
-    monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    assert made("processors").not_tried == "there is one processor only"
-    assert made("user").not_tried == "only root can become another user"
+    assert made("processors", processors=(3,)).not_tried == "there is one processor only"
+    assert made("user", is_root=False).not_tried == "only root can become another user"
 
     def cannot(name: str) -> Any:
         raise EnvironmentFault(f"isolation {name}: expected bubblewrap, found none")
 
-    monkeypatch.setattr(machine, "isolation_from_name", cannot)
     for name in SANDBOXES:
-        assert made(name, "none").not_tried == "expected bubblewrap, found none"
-    monkeypatch.setattr(machine, "isolation_from_name", lambda name: type("Tier", (), {"can_fork": False}))
-    assert made("executed").not_tried == "in the sandbox landlock, each is executed anyway"
-    assert not made("together").executes
+        assert made(name, "none", can_fork=cannot).not_tried == "expected bubblewrap, found none"
+    assert made("executed", can_fork=lambda _: False).not_tried == "in the sandbox landlock, each is executed anyway"
+    assert not made("together", can_fork=lambda _: False).executes
 
 
 def test_no_sandbox_is_tried_that_holds_less_unless_it_is_named() -> None:
@@ -365,7 +353,7 @@ def test_no_sandbox_is_tried_that_holds_less_unless_it_is_named() -> None:
             isolation_from_name(name)
         except EnvironmentFault:
             continue
-        found = next(one for one in conditions([], "none") if one.name == name)
+        found = next(one for one in conditions([], "none", surroundings()) if one.name == name)
         asked = made(name, "none")
         if found.not_tried:
             assert "does not contain" in found.not_tried or asked.not_tried
@@ -375,7 +363,7 @@ def test_no_sandbox_is_tried_that_holds_less_unless_it_is_named() -> None:
 
 def test_the_sandbox_of_the_first_recording_is_no_other_condition() -> None:
     """It would only be recorded again."""
-    assert [one.name for one in conditions(["again", "landlock"], "landlock")] == ["again"]
+    assert [one.name for one in conditions(["again", "landlock"], "landlock", surroundings())] == ["again"]
 
 
 # --- failures ---------------------------------------------------------------------------------------------------------

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from places import ROOT
 from sample_folders import expected, folder_of
 from verifying import differences, verified
 
 pytestmark = pytest.mark.ros
 
-ROOT = Path(__file__).parents[3]
 #: Submissions that do differ, for reasons that the page about recordings that repeat names: what Python prints about a
 #: mistake shows addresses of objects, or a server is asked more often than its queue can hold.
 DIFFERING = {"broken/service_callback_first", "wrong/battery_sleeps"}

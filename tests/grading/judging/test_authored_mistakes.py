@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from own_check_samples import CHECKS_FILE, PUMP, RUBRIC, write_rubric
+from places import GRADE
 
 from grader.course.classroom.gradebook import Gradebook, Row, Status
 from grader.grading.judging.judge_run import judge_run
@@ -256,9 +256,8 @@ def test_a_simulation_that_fails_later_costs_only_its_scenario(tmp_path: Path, w
     path = write_rubric(tmp_path, rubric)
     (tmp_path / "pump").mkdir()
     (tmp_path / "pump" / "pump.py").write_text(PUMP.replace("PERIOD", "0.1"))
-    grade = str(Path(sys.executable).with_name("grade"))
     done = subprocess.run(
-        [grade, "pump", "--rubric", path.name, "--json"], cwd=path.parent, capture_output=True, text=True, check=False
+        [GRADE, "pump", "--rubric", path.name, "--json"], cwd=path.parent, capture_output=True, text=True, check=False
     )
     assert done.returncode == UNUSABLE, done.stderr
     wet, early = json.loads(done.stdout)["exercises"][0]["criteria"]

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from tracing import ODOMETRY, TWIST, Recording, driving, position_logs, velocity
+from wordings import plain
 
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.installation import lacking_package
@@ -414,10 +415,6 @@ EXERCISE_2 = exercise(
 
 def graded_2(rec: Recording) -> dict[str, str]:
     return outcomes(judge_exercise(EXERCISE_2, {"alone": rec.trace()}, handed_in(ODOM)))
-
-
-def plain(x: float, y: float) -> str:
-    return f"x={x:.2f} y={y:.2f}"
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from places import ROOT
 
 from grader.cli.main import app
 from grader.grading.app.grade import read_exercises
@@ -17,7 +18,6 @@ from grader.grading.model.rubric_files import rubric_file, rubric_files, rubrics
 from grader.grading.rubrics.builtin import builtin_rubrics
 from grader.grading.rubrics.loader import read_rubric, side_files
 
-ROOT = Path(__file__).resolve().parents[3]
 RUBRICS = ROOT / "rubrics"
 EARLIER = [RUBRICS / f"{path.parent.name}.yaml" for path in rubrics_in(RUBRICS)]
 

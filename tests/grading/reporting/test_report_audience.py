@@ -6,9 +6,9 @@ import base64
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
+from places import ROOT
 from report_samples import criterion, endpoint, exercise, hostile, report
 
 from grader.grading.model.chart import Chart, Excerpt, GraphFigure, Panel, Series, Stage
@@ -24,7 +24,7 @@ PUBLISHED = [
     set(re.findall("`(\\w+)`", cell)) - {"evidence"}
     for cell in re.findall(
         r"^\| read by students \| read by instructors \|\n\|---\|---\|\n\|(.*)\|(.*)\|$",
-        (Path(__file__).resolve().parents[3] / "docs/how-to/feedback.md").read_text(encoding="utf-8"),
+        (ROOT / "docs/how-to/feedback.md").read_text(encoding="utf-8"),
         re.MULTILINE,
     )[0]
 ]

@@ -11,6 +11,7 @@ from typing import Any
 
 import jsonschema
 import pytest
+from places import ROOT
 from ruamel.yaml import YAML
 
 from grader.grading.judging.checks import CHECKS
@@ -24,7 +25,7 @@ from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import shortest
 from grader.runtime.stimuli.recorded import RecordedStream
 
-RUBRICS = Path(__file__).resolve().parents[3] / "rubrics"
+RUBRICS = ROOT / "rubrics"
 
 POINTS = {
     "velocity_publisher": {

@@ -15,6 +15,7 @@ import jsonschema
 import pytest
 from click.testing import CliRunner, Result
 from own_check_samples import CHECKS_FILE, PUMP, RUBRIC, write_rubric
+from places import GRADE, ROOT
 from ruamel.yaml import YAML
 
 from grader.cli import main
@@ -250,7 +251,7 @@ def test_it_travels_to_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 def test_the_examples_on_the_page_about_own_checks_work() -> None:
     """Points in proportion, and a check that names a line of the student's file."""
-    page = (Path(__file__).resolve().parents[3] / "docs" / "how-to" / "own-check.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "how-to" / "own-check.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     (proportional,) = (block for block in blocks if block.startswith("@dataclass(frozen=True)\nclass MeanError"))
     (sources,) = (block for block in blocks if block.startswith("    def judge_sources"))
@@ -281,10 +282,9 @@ def test_real_nodes_are_judged_by_it(tmp_path: Path) -> None:
     for name, period in (("early", "0.1"), ("late", "0.8")):
         (tmp_path / "class" / name).mkdir(parents=True)
         (tmp_path / "class" / name / "pump.py").write_text(PUMP.replace("PERIOD", period))
-    grade = str(Path(sys.executable).with_name("grade"))
 
     def scores(*words: str | Path) -> Any:
-        done = subprocess.run([grade, *map(str, words)], cwd=tmp_path, check=False, capture_output=True, text=True)
+        done = subprocess.run([GRADE, *map(str, words)], cwd=tmp_path, check=False, capture_output=True, text=True)
         assert done.returncode in (0, 1), done.stderr
         return json.loads(done.stdout)["score"] if done.stdout.startswith("{") else done.stdout
 

@@ -64,13 +64,6 @@ needs_libarchive = pytest.mark.skipif(not is_installed(), reason="pip install -e
 EVERY = [*PACKERS, *(pytest.param(kind, marks=needs_libarchive) for kind in FOREIGN)]
 
 
-@pytest.fixture
-def into(tmp_path: Path) -> Path:
-    folder = tmp_path / "into"
-    folder.mkdir()
-    return folder
-
-
 def staged(root: Path) -> dict[str, bytes]:
     return {p.relative_to(root).as_posix(): p.read_bytes() for p in root.rglob("*") if p.is_file()}
 

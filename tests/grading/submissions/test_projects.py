@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from places import TESTS
 
 from grader.grading.submissions import projects
 from grader.grading.submissions.projects import read_projects
-from grader.runtime import contained
 from grader.runtime.model.projects import Project
 from grader.runtime.programs.executables import executables, find_executable
 from grader.runtime.programs.shares import install_shares
@@ -120,7 +120,7 @@ def test_patterns_and_joined_paths_are_read(tmp_path: Path, ros: RosInstallation
     assert installed == {"package.xml", "launch/a.launch.py", "config/a.yaml", "a.yaml"}
 
 
-HOSTILE = {
+HOSTILE: dict[str, tuple[dict[str, str | bytes], list[str]]] = {
     "a field width": ({"setup.py": "setup(name='{:>1500000000}'.format('x'))\n"}, []),
     "a nested field width": ({"setup.py": "setup(name='{:>{w}}'.format('x', w='1500000000'))\n"}, []),
     "a width of a conversion": ({"setup.py": "setup(name='%1500000000s' % 'x')\n"}, []),
@@ -235,7 +235,7 @@ def test_a_process_that_is_ended_costs_no_package_before(tmp_path: Path, monkeyp
 def test_a_submission_without_packages_starts_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A folder of plain files pays nothing."""
     (tmp_path / "node.py").touch()
-    monkeypatch.setattr(contained.subprocess, "run", None)
+    monkeypatch.setattr(subprocess, "run", None)
     assert read_projects(tmp_path) == ((), ())
 
 
@@ -296,7 +296,7 @@ def test_files_that_collide_or_never_end_are_noted(tmp_path: Path, ros: RosInsta
 def test_the_limits_leave_room_for_honest_files() -> None:
     """The process that reads an ordinary package is far from its limits of memory and time."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert read_projects(Path(__file__).parents[2] / "packages" / "workspace")[1] == ()
+    assert read_projects(TESTS / "packages" / "workspace")[1] == ()
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = (after.ru_utime + after.ru_stime) - (used.ru_utime + used.ru_stime)
     assert spent < projects.PROCESSOR_S / 2

@@ -11,7 +11,6 @@ from sample_folders import folders_in
 
 from grader.grading.submissions.sources import LONG, UNREADABLE, reaching, read_reaches
 
-ROOT = Path(__file__).resolve().parents[3]
 SUSPICIOUS = {
     "garbage collector": "import gc\ngc.get_objects()",
     "an alias": "from ctypes import CDLL as C\nC(None)",

@@ -22,13 +22,6 @@ WANTED = ("velocity_publisher.py", "odom_subscriber.py", "temperature_sensor.py"
 
 
 @pytest.fixture
-def into(tmp_path: Path) -> Path:
-    folder = tmp_path / "into"
-    folder.mkdir()
-    return folder
-
-
-@pytest.fixture
 def work(tmp_path: Path) -> Path:
     folder = tmp_path / "alice"
     folder.mkdir()

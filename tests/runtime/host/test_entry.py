@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from places import ROOT
 from staging_programs import play_file
 
 
@@ -47,7 +48,6 @@ def start(run: Any) -> Callable[..., Any]:
     return start_one
 
 
-ROOT = Path(__file__).resolve().parents[3]
 MAIN = "def main():\n    say('main ran')\n"
 UNCALLED = "main_not_called"
 NODE = "import rclpy\nfrom rclpy.node import Node\nclass Blinker(Node):\n    pass\n"

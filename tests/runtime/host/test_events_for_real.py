@@ -150,6 +150,7 @@ def warnings(trace: Trace, process: str) -> list[tuple[float, str]]:
     return [(round(o.t_ns / NS_PER_S, 3), o.text.partition(". ")[0]) for o in found]
 
 
+@pytest.mark.rule(15)
 @CLOCKS
 @pytest.mark.parametrize("first", ["offering", "requesting"])
 def test_both_ends_learn_which_policy_does_not_fit(run: Callable[..., Trace], clock: str, first: str) -> None:

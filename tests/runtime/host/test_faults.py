@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from places import ROOT
 
-FAULTS = Path(__file__).resolve().parents[3] / "grader/runtime/host/faults.py"
+FAULTS = ROOT / "grader/runtime/host/faults.py"
 
 
 @pytest.fixture(scope="module")

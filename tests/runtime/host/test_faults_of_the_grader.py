@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hostile import record, staging
+from hostile import record
 
 from grader.runtime.model.trace import Trace
-from grader.runtime.session import RecordingSession, open_session
+from grader.runtime.session import RecordingSession
 
 pytestmark = pytest.mark.ros
 
@@ -96,17 +96,10 @@ rclpy.spin(node)
 """
 
 
-@pytest.fixture(scope="module")
-def studio() -> Iterator[RecordingSession]:
-    """The strongest sandbox of this machine, with one worker."""
-    with open_session("auto", 1) as studio:
-        yield staging(studio)
-
-
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Run:
+def run(one_worker: RecordingSession, tmp_path: Path) -> Run:
     def run_one(source: str, **fields: Any) -> Trace:
-        return record(studio, tmp_path / "s", source, duration_ns=S, **fields)
+        return record(one_worker, tmp_path / "s", source, duration_ns=S, **fields)
 
     tmp_path.chmod(0o755)
     return run_one
@@ -144,10 +137,10 @@ def test_an_exception_of_the_grader_s_own_code_is_undecided(
     assert trace.clock_reason == trace.harness_problem  # so `--clock auto` records it on the wall clock
 
 
-def test_a_failure_in_virtual_time_is_recorded_on_the_wall_clock(studio: RecordingSession, tmp_path: Path) -> None:
+def test_a_failure_in_virtual_time_is_recorded_on_the_wall_clock(one_worker: RecordingSession, tmp_path: Path) -> None:
     """Little of the grader's code runs there."""
     tmp_path.chmod(0o755)
     source = BREAKING.format(module="ledger", name="BACKGROUND_PARAMETERS", value="None")
-    trace = record(studio, tmp_path / "s", source, duration_ns=S, clock="wall", first_message_on="/cmd_vel")
+    trace = record(one_worker, tmp_path / "s", source, duration_ns=S, clock="wall", first_message_on="/cmd_vel")
     assert trace.harness_problem == ""
     assert trace.messages("/cmd_vel")

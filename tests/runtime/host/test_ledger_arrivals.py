@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import importlib
-from pathlib import Path
 from typing import Any
 
 import pytest
+from places import ROOT
 
 pytest.importorskip("rclpy", reason="needs rclpy")
 pytestmark = pytest.mark.ros
 
-HOST = str(Path(__file__).resolve().parents[3] / "grader/runtime/host")
+HOST = str(ROOT / "grader/runtime/host")
 
 
 class Handle:
@@ -70,6 +70,7 @@ def announce(ledger: Any, subscription: Any, count: int = 1) -> None:
     ledger.await_arrivals([subscription])
 
 
+@pytest.mark.rule(11)
 def test_what_does_not_come_is_told(ledger: Any) -> None:
     """It may matter, and nobody can do anything about it but say so."""
     heard = Subscription("/odom")
@@ -88,6 +89,7 @@ def test_what_a_subscription_misses_that_took_the_place_of_another_is_not_told(l
     assert not ledger.expects_anything()
 
 
+@pytest.mark.rule(11)
 def test_the_newest_of_several_messages_is_kept_however_late_it_comes(ledger: Any) -> None:
     """How many messages a short queue has dropped cannot be known: the older one does not stand for both."""
     heard = Subscription("/odom", "older", "newest")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import importlib.util
 import signal
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import pytest
+from places import ROOT
 
-OUTSIDE = Path(__file__).resolve().parents[3] / "grader/runtime/host/outside.py"
+OUTSIDE = ROOT / "grader/runtime/host/outside.py"
 
 
 @pytest.fixture

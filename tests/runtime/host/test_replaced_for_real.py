@@ -7,8 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hostile import printed
 
-from grader.runtime.model.trace import Fault, FaultKind, OutputLine, Trace
+from grader.runtime.model.trace import Fault, FaultKind, Trace
 from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
@@ -67,10 +68,6 @@ def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
         return trace
 
     return run_one
-
-
-def printed(trace: Trace) -> list[str]:
-    return [line.text for line in trace.of(OutputLine) if line.stream == "stdout"]
 
 
 def plainly(program: str) -> list[str]:

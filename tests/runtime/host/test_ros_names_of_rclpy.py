@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from places import ROOT
 
 pytest.importorskip("rclpy", reason="needs rclpy")
 
-ROOT = Path(__file__).resolve().parents[3]
 #: Where rclpy keeps its classes that are written in C++.
 BINDINGS = "rclpy.impl.implementation_singleton"
 

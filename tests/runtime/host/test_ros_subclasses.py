@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hostile import record, staging
+from hostile import record
 
 from grader.runtime.model.trace import GraphSnapshot, Trace
-from grader.runtime.session import RecordingSession, open_session
+from grader.runtime.session import RecordingSession
 
 pytestmark = pytest.mark.ros
 
@@ -138,18 +138,11 @@ executor.spin()
 """
 
 
-@pytest.fixture(scope="module")
-def studio() -> Iterator[RecordingSession]:
-    """The strongest sandbox of this machine, with one worker."""
-    with open_session("auto", 1) as studio:
-        yield staging(studio)
-
-
 @pytest.fixture(params=["virtual", "wall"])
-def run(request: pytest.FixtureRequest, studio: RecordingSession, tmp_path: Path) -> Run:
+def run(request: pytest.FixtureRequest, one_worker: RecordingSession, tmp_path: Path) -> Run:
     def run_one(source: str, **fields: Any) -> Trace:
         duration_ns = S if request.param == "virtual" else 3 * S
-        return record(studio, tmp_path / "s", source, duration_ns=duration_ns, clock=request.param, **fields)
+        return record(one_worker, tmp_path / "s", source, duration_ns=duration_ns, clock=request.param, **fields)
 
     tmp_path.chmod(0o755)
     return run_one

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hostile import record, staging
+from hostile import record
 
 from grader.runtime.model.trace import Trace
-from grader.runtime.session import RecordingSession, open_session
+from grader.runtime.session import RecordingSession
 
 pytestmark = pytest.mark.ros
 
@@ -29,13 +28,6 @@ print("made", flush=True)
 NAMES = ["random", "copy", "queue", "logging", "tempfile", "hashlib", "pickle", "inspect", "yaml", "calendar", "turtle"]
 
 
-@pytest.fixture(scope="module")
-def studio() -> Iterator[RecordingSession]:
-    """The strongest sandbox of this machine, with one worker."""
-    with open_session("auto", 1) as studio:
-        yield staging(studio)
-
-
 def outcome(trace: Trace) -> tuple[bool, str, str]:
     """Return whether the program came to its end, and the error that ended it, with its file."""
     fault = trace.faults()[0]
@@ -46,13 +38,15 @@ def outcome(trace: Trace) -> tuple[bool, str, str]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_hidden_module_fails_where_it_fails_for_python3(studio: RecordingSession, tmp_path: Path, name: str) -> None:
+def test_a_hidden_module_fails_where_it_fails_for_python3(
+    one_worker: RecordingSession, tmp_path: Path, name: str
+) -> None:
     """An experiment uses the module of its own name, which it finds in itself."""
     tmp_path.chmod(0o755)
     folder = tmp_path / "s"
     folder.mkdir()
     (folder / f"{name}.py").write_text(f"import {name}\nprint({name}.no_such_function())\n", encoding="utf-8")
-    virtual = record(studio, folder, PROGRAM, duration_ns=S)
-    bare = record(studio, folder, PROGRAM, duration_ns=60 * S, clock="wall", bare=True)  # it ends by itself
+    virtual = record(one_worker, folder, PROGRAM, duration_ns=S)
+    bare = record(one_worker, folder, PROGRAM, duration_ns=60 * S, clock="wall", bare=True)  # it ends by itself
     assert outcome(virtual) == outcome(bare)
     assert outcome(virtual)[0] == (name in ("calendar", "turtle"))

@@ -41,6 +41,7 @@ def test_hundred_threads_at_one_instant_go_in_the_order_of_their_start() -> None
     """) == ["1000 True", "1000 end"]
 
 
+@pytest.mark.rule(5)
 def test_a_race_between_threads_has_one_outcome() -> None:
     """Threads take turns only where they block: a counter without a lock loses nothing."""
     assert play("""
@@ -291,6 +292,7 @@ def test_two_threads_that_want_each_others_lock_are_idle() -> None:
     """) == ["100 idle for ever"]
 
 
+@pytest.mark.rule(5)
 def test_a_lock_goes_to_whoever_has_waited_longest() -> None:
     """First come, first served; a timeout gives up at its instant."""
     assert play("""
@@ -500,6 +502,7 @@ def test_the_low_level_module_is_virtual_as_well() -> None:
     """) == ["500 work", "500 True", "500 end"]
 
 
+@pytest.mark.rule(5)
 @pytest.mark.parametrize("name", ORDERS)
 def test_who_goes_on_first(name: str) -> None:
     """A new thread runs until it blocks or writes; whoever wakes another one goes on, also where both write."""

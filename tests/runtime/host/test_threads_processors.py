@@ -5,18 +5,17 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
+from places import GRADE
 from sample_folders import folder_of, folders_in
-from verifying import GRADE, differences, verified, written
+from verifying import differences, verified, written
 
 pytestmark = [pytest.mark.ros, pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="there is one processor only")]
 
-ROOT = Path(__file__).parents[3]
 WITH_THREADS = ("threading", "MultiThreadedExecutor", "ThreadPool")
 EXECUTORS = ["MultiThreadedExecutor()", "MultiThreadedExecutor(num_threads=2)", "SingleThreadedExecutor()"]
 #: What a node does, in its constructor. `say` logs, `group()` makes a reentrant callback group.
@@ -70,14 +69,6 @@ executor.spin()
 """
 
 
-@pytest.fixture
-def folder() -> Iterator[Path]:
-    """An empty folder; unlike pytest's own, every user can enter what is above it."""
-    with tempfile.TemporaryDirectory() as name:
-        Path(name).chmod(0o755)
-        yield Path(name)
-
-
 def with_threads() -> list[str]:
     """Return the test submissions that use threads, as `correct/NAME`."""
     found = []
@@ -95,13 +86,13 @@ def sampled(cases: Sequence[str]) -> list[Any]:
 
 
 @pytest.mark.parametrize("names", sampled([f"{body}, {executor}" for body in BODIES for executor in EXECUTORS]))
-def test_what_a_program_does(folder: Path, names: list[str]) -> None:
+def test_what_a_program_does(open_folder: Path, names: list[str]) -> None:
     """Each message and each log record at the same time."""
     programs = {}
     for number, name in enumerate(names):
         body, _, executor = name.partition(", ")
         programs[str(number)] = PROGRAM.format(body=BODIES[body], executor=executor)
-    code, found = verified(written(folder, programs), "--condition", "processors")
+    code, found = verified(written(open_folder, programs), "--condition", "processors")
     assert (code, differences(found), found["not_comparable"]) == (0, {}, [])
 
 
@@ -112,9 +103,9 @@ def test_what_a_submission_does(names: list[str]) -> None:
     assert (code, differences(found)) == (0, {})
 
 
-def test_a_client_that_waits_in_a_callback(folder: Path) -> None:
+def test_a_client_that_waits_in_a_callback(open_folder: Path) -> None:
     """With a single thread in its executor it would wait for ever; a machine with one processor would give it that."""
-    program = folder / "threads.py"
+    program = open_folder / "threads.py"
     body = (
         "self.create_service(Trigger, 'own', lambda a, b: b, callback_group=group()); "
         "c = self.create_client(Trigger, 'own', callback_group=group()); "

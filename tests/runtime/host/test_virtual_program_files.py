@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from places import TESTS
 
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.session import RecordingSession
@@ -23,7 +24,7 @@ from told import Told, differences, told
 
 pytestmark = pytest.mark.ros
 
-PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
+PROGRAMS = TESTS / "programs"
 PARTNER = PROGRAMS / "partner.py"
 GOLDEN = PROGRAMS / "told.json"
 NAMES = sorted(path.stem for path in PROGRAMS.glob("*.py") if path != PARTNER)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hostile import hostile, record, staging
+from hostile import hostile, printed, record, staging
 from mcap.reader import make_reader
 
 from grader.runtime.host.written import ALL_BYTES, FILE_BYTES, FILES
@@ -60,10 +60,6 @@ def run(studio: RecordingSession, tmp_path: Path) -> Run:
 
     tmp_path.chmod(0o755)
     return run_one
-
-
-def printed(trace: Trace) -> list[str]:
-    return [line.text for line in trace.lines() if line.stream == "stdout"]
 
 
 def kept(trace: Trace) -> dict[tuple[str, str], bytes]:

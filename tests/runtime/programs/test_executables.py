@@ -6,13 +6,14 @@ import shutil
 from pathlib import Path
 
 import pytest
+from places import TESTS
 
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.submission import stage_submission
 from grader.runtime.model.submission import StudentFile
 from grader.runtime.programs.executables import find_executable
 
-WORKSPACE = Path(__file__).resolve().parents[2] / "packages" / "workspace"
+WORKSPACE = TESTS / "packages" / "workspace"
 NODES = "src/robot/robot/nodes.py"
 
 

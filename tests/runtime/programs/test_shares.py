@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from decided import grade_until_decided
+from places import TESTS
 from ruamel.yaml import YAML
 
 from grader.grading.app.request import GradeRequest
@@ -14,7 +15,7 @@ from grader.grading.submissions.projects import read_projects
 from grader.runtime.programs.shares import install_shares
 from grader.runtime.ros_installation import RosInstallation
 
-HERE = Path(__file__).resolve().parents[2] / "packages"
+HERE = TESTS / "packages"
 WORKSPACE = HERE / "workspace"
 SETUP = "from glob import glob\nimport os\nfrom setuptools import setup\nsetup(name='own', data_files={})\n"
 

@@ -19,6 +19,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from places import ROOT, SHARED
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -27,7 +28,6 @@ from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.recording.bag import BagMinimum, read_bag
 from grader.runtime.stimuli.recorded import Recording, TimedMessage, window
 
-ROOT = Path(__file__).parents[3]
 OWN = ROOT / "rubrics" / "exercise_2" / "odometry"
 STORE = get_typestore(Stores.ROS2_JAZZY)
 T = STORE.types
@@ -38,7 +38,7 @@ BOTH = pytest.mark.parametrize("plugin", [StoragePlugin.MCAP, StoragePlugin.SQLI
 
 def others(name: str) -> Path:
     """Return a recording that other people made, or skip: they are not part of the project."""
-    path = ROOT.parent / "shared" / "bags" / name
+    path = SHARED / "bags" / name
     if not path.exists():
         pytest.skip(f"{name} is not beside this checkout")
     return path

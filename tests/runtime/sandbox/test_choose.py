@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from places import ROOT
 from sandboxes import USER, find_sandbox, opened_start, unreachable
 
 import grader
@@ -27,7 +28,6 @@ from grader.runtime.sandbox.properties import NO_EXCHANGE
 from grader.runtime.sandbox.tiers import ISOLATING, Plain, isolation_from_name
 from grader.runtime.temp_dirs import OWN
 
-ROOT = Path(__file__).resolve().parents[3]
 MAIN = "from grader.cli.main import main; main()"
 CONTAINER = Path(__file__).with_name("containers.py")
 ALL_HOLD = tuple(Property(name, holds=True, mechanism="a wall") for name in PROPERTIES)

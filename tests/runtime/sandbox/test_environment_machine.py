@@ -6,12 +6,12 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from places import GRADE, ROOT
 from sandboxes import USER, unreachable, user_start
 
 from grader.runtime.ros_installation import find_ros
@@ -20,9 +20,7 @@ from grader.runtime.sandbox.tiers import FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME
 
 pytestmark = pytest.mark.ros
 
-ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "reference" / "machine.md"
-GRADE = Path(sys.executable).with_name("grade")
 #: A shell that hands on as much as possible of what a process inherits.
 ODD_SHELL = "umask 077; ulimit -S -s 1024; trap '' HUP INT TERM USR1; exec nice -n 5 \"$@\""
 
@@ -37,7 +35,7 @@ def documented() -> set[str]:
 
 def rows(program: Path, *options: str, before: tuple[str, ...] = (), **variables: str) -> dict[str, str]:
     """Return what the program printed under `grade observe`, by its row; skips if its tier does not work here."""
-    command = [*before, str(GRADE), "observe", str(program), "--duration", "1", "--json", *options]
+    command = [*before, GRADE, "observe", str(program), "--duration", "1", "--json", *options]
     environment = {**os.environ, **variables}
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600, env=environment)
     if done.stderr.startswith("error: isolation"):
@@ -56,14 +54,6 @@ def program() -> Iterator[Path]:
         yield Path(shutil.copy(Path(__file__).parent / "machine" / "machine.py", folder))
 
 
-@pytest.fixture
-def folder() -> Iterator[Path]:
-    """An empty folder; unlike pytest's own, every user can enter what is above it."""
-    with tempfile.TemporaryDirectory() as name:
-        Path(name).chmod(0o755)
-        yield Path(name)
-
-
 @pytest.fixture(scope="module")
 def usual(program: Path) -> dict[str, str]:
     """What it prints in the strongest sandbox of this machine."""
@@ -75,10 +65,10 @@ def test_the_page_lists_what_the_program_prints(usual: dict[str, str]) -> None:
     assert usual.keys() == documented()
 
 
-def test_on_one_processor_from_an_odd_shell(program: Path, usual: dict[str, str], folder: Path) -> None:
+def test_on_one_processor_from_an_odd_shell(program: Path, usual: dict[str, str], open_folder: Path) -> None:
     """Affinity, priority, umask, limits, signals, time zone, locale, folders and variables are the caller's."""
     before = ("taskset", "-c", "0", "bash", "-c", ODD_SHELL, "bash")
-    variables = {"TZ": "Asia/Kathmandu", "LANG": "de_DE.ISO-8859-1", "LC_ALL": "C", "TMPDIR": str(folder)}
+    variables = {"TZ": "Asia/Kathmandu", "LANG": "de_DE.ISO-8859-1", "LC_ALL": "C", "TMPDIR": str(open_folder)}
     variables |= {"COLUMNS": "20", "TERM": "dumb", "USER": "somebody", "OMP_NUM_THREADS": "9", "PYTHONHASHSEED": "7"}
     assert rows(program, before=before, **variables) == usual
 
@@ -89,7 +79,7 @@ def test_in_another_tier(program: Path, usual: dict[str, str], tier: str) -> Non
     assert rows(program, "--isolation", tier) == usual
 
 
-def test_for_another_user(program: Path, usual: dict[str, str], folder: Path) -> None:
+def test_for_another_user(program: Path, usual: dict[str, str], open_folder: Path) -> None:
     """An ordinary user, whose sandbox has a user namespace, sees what root sees."""
     if os.geteuid() != 0:
         pytest.skip("only root can become another user")
@@ -97,6 +87,6 @@ def test_for_another_user(program: Path, usual: dict[str, str], folder: Path) ->
     before = user_start(ros)
     if why := unreachable(before, ros):
         pytest.skip(why)
-    os.chown(folder, USER, USER)
-    own = {"HOME": str(folder), "XDG_CACHE_HOME": str(folder), "TMPDIR": str(folder)}
+    os.chown(open_folder, USER, USER)
+    own = {"HOME": str(open_folder), "XDG_CACHE_HOME": str(open_folder), "TMPDIR": str(open_folder)}
     assert rows(program, "--isolation", USER_NAME, before=before, **own) == usual

@@ -1,12 +1,10 @@
 """How many names there are in scratch folders, tried in the sandboxes that have their own."""
 
 import os
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from sandboxes import close, find_sandbox, make_submission, start
+from sandboxes import close, find_sandbox, start
 
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import find_ros
@@ -21,13 +19,6 @@ for number in range(700):
 print("ready", flush=True)
 time.sleep(60)
 """
-
-
-@pytest.fixture
-def submission() -> Iterator[Path]:
-    folder = make_submission()
-    yield folder
-    shutil.rmtree(folder)
 
 
 @pytest.mark.parametrize("folder", ["/tmp", "/tmp/work", "/dev/shm"])

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hostile import hostile, record, staging
+from hostile import hostile, printed, record, staging
 from sandboxes import DOMAIN, Sandbox, finish, said, sandbox_or_skip
 
 from grader.runtime.host.originals import wait_until
@@ -129,10 +129,6 @@ def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
 
     tmp_path.chmod(0o755)
     return run_one
-
-
-def printed(trace: Trace) -> list[str]:
-    return [line.text for line in trace.lines() if line.stream == "stdout"]
 
 
 #: Folders of the machine that other tests change meanwhile, where a tier has none of its own.

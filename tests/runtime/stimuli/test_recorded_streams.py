@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import math
 import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from places import GRADE
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -28,7 +28,6 @@ from grader.runtime.model.scenario import ODOMETRY
 from grader.runtime.recording.bag import read_bag
 from grader.runtime.stimuli.recorded import RecordedStream
 
-GRADE = Path(sys.executable).with_name("grade")
 SCAN, POSE = "sensor_msgs/msg/LaserScan", "geometry_msgs/msg/PoseStamped"
 STORE = get_typestore(Stores.ROS2_JAZZY)
 T = STORE.types
@@ -138,7 +137,7 @@ def handed_in(folder: Path, topic: str, type_: str, value: str) -> Path:
 
 def grade(*words: object) -> dict[str, Any]:
     """Return the report of a real run."""
-    command = [str(GRADE), *map(str, words), "--json", "--isolation", "none"]
+    command = [GRADE, *map(str, words), "--json", "--isolation", "none"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.stdout, done.stderr
     report: dict[str, Any] = json.loads(done.stdout)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from decided import grade_until_decided
+from places import SHARED
 
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.app.request import GradeRequest
@@ -35,7 +36,7 @@ from grader.runtime.supervisor.newer_python import (
 from grader.runtime.supervisor.newer_syntax import needed
 
 HERE = sys.version_info[:2]
-CASES = Path(__file__).resolve().parents[4] / "shared" / "cases" / "fidelity"
+CASES = SHARED / "cases" / "fidelity"
 JAZZY = RELEASES["jazzy"].python or (0, 0)
 older = pytest.mark.skipif(JAZZY <= HERE, reason="the Python of Jazzy or a newer one runs here")
 

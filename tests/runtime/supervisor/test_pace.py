@@ -25,6 +25,7 @@ def every(period_ms: float, *, first_ms: float = 0) -> list[float]:
     return [(first_ms + period_ms * n) * NS_PER_MS for n in range(round(10_000 / period_ms) + 1)]
 
 
+@pytest.mark.rule(23)
 @pytest.mark.parametrize("logs", [False, True])
 @pytest.mark.parametrize("period_ms", [10, 50, 1000])
 def test_what_comes_more_slowly_is_told(period_ms: float, logs: bool) -> None:

@@ -196,6 +196,7 @@ def test_a_recording_in_virtual_time_is_the_same_each_time(run: Record) -> None:
     assert len({(s["sec"], s["nanosec"]) for s in stamps}) == len(stamps) > 90
 
 
+@pytest.mark.rule(23)
 def test_time_passes_while_a_program_works_where_it_is_charged(run: Record) -> None:
     """The recording that decides: what a program publishes after its work comes later, and so does its next pause.
 

@@ -6,24 +6,24 @@ import itertools
 import json
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import pytest
+from waiting import wait_for
 
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import ClockKind, Trace
 from grader.runtime.plan import Plan
 from grader.runtime.ros_installation import PythonRuntime
 from grader.runtime.sandbox.exposure import View
 from grader.runtime.sandbox.protocol import Command, Isolation
-from grader.runtime.supervisor import supervisor as module
 from grader.runtime.supervisor.real_time_budget import RealTimeBudget
-from grader.runtime.supervisor.supervisor import Job, Recorder
+from grader.runtime.supervisor.supervisor import OF_WORKERS, ExecutedWorker, Job, Recorder, WorkerLimits
 
 RUNTIME = PythonRuntime(Path(sys.executable), (), (), (), {})
 
@@ -130,7 +130,11 @@ for command in line.makefile("r"):
 
 
 class Stage:
-    """Isolation whose workers behave as a test says, one behaviour for each start and the last for all others."""
+    """Isolation whose workers behave as a test says, one behaviour for each start and the last for all others.
+
+    Attributes:
+        forks: How many forks each worker that was started makes, in order.
+    """
 
     name = "stage"
     submission_seen_at = ""
@@ -139,12 +143,15 @@ class Stage:
 
     def __init__(self, folder: Path, behaviours: list[str]) -> None:
         self._folder = folder
+        self.forks: list[int] = []
         (folder / "behaviours.json").write_text(json.dumps(behaviours), encoding="utf-8")
 
     def worker_command(
         self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: Sequence[int], view: View | None = None
     ) -> Command:
-        command = (sys.executable, "-I", "-S", "-c", WORKER, str(self._folder), argv[-1])
+        self.forks.append(len(json.loads(argv[-1])["lines_of_forks"]))
+        # The supervisor knows a worker by the name of its module.
+        command = (sys.executable, "-I", "-S", "-c", WORKER, str(self._folder), argv[-1], argv[-2])
         return Command(command, dict(environment), tuple(pass_fds))
 
     def pids(self) -> list[int]:
@@ -166,10 +173,16 @@ def make(tmp_path: Path) -> Iterator[Callable[..., tuple[Recorder, Stage]]]:
     """Return a recorder with workers that behave as told; all is ended afterwards."""
     made = []
 
-    def make_one(*behaviours: str, workers: int = 1, domains: Iterator[int] | None = None) -> tuple[Recorder, Stage]:
+    def make_one(
+        *behaviours: str,
+        workers: int = 1,
+        domains: Iterator[int] | None = None,
+        limits: WorkerLimits = OF_WORKERS,
+    ) -> tuple[Recorder, Stage]:
         stage = Stage(tmp_path, list(behaviours))
         domains = itertools.count(10) if domains is None else domains
-        recorder = Recorder(cast("Isolation", stage), RUNTIME, domains, scratch=tmp_path, workers=workers)
+        isolation = cast("Isolation", stage)
+        recorder = Recorder(isolation, RUNTIME, domains, scratch=tmp_path, workers=workers, limits=limits)
         made.append(recorder)
         return recorder, stage
 
@@ -348,24 +361,18 @@ def test_a_problem_without_words_still_has_some(make: Callable[..., tuple[Record
     assert len(problem) > len("worker: ")
 
 
-def test_a_worker_that_hangs_is_given_up(
-    make: Callable[..., tuple[Recorder, Stage]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_worker_that_hangs_is_given_up(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """It is ended, whatever it does."""
-    monkeypatch.setattr(module, "MARGIN_S", 0.05)
-    recorder, stage = make("hangs")
+    recorder, stage = make("hangs", limits=WorkerLimits(margin_s=0.05))
     hurried = replace(plan(), limits=Limits(wall_ns=0))
     (trace,) = recorder.record([Job("exercise 1: alone", hurried)], nothing)
     assert trace.harness_problem.startswith("worker: expected a trace of alone, found none")
     assert not any(map(alive, stage.pids()))
 
 
-def test_an_answer_without_end_is_not_read_to_its_end(
-    make: Callable[..., tuple[Recorder, Stage]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_answer_without_end_is_not_read_to_its_end(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """Memory stays ours."""
-    monkeypatch.setattr(module, "ANSWER_BYTES", 1 << 20)
-    recorder, stage = make("talks without end")
+    recorder, stage = make("talks without end", limits=WorkerLimits(answer_bytes=1 << 20))
     (trace,) = recorder.record(jobs("alone"), nothing)
     assert "did not end" in trace.harness_problem
     assert not any(map(alive, stage.pids()))
@@ -493,14 +500,6 @@ def alive(pid: int) -> bool:
     return stat.rpartition(")")[2].split()[0] not in "ZX"
 
 
-def wait_for(condition: Callable[[], object], seconds: float = 60) -> None:
-    """Wait until a condition holds; fail if it never does."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "it never came to that"
-        time.sleep(0.005)
-
-
 @pytest.mark.parametrize(
     ("told", "kept", "times"),
     [
@@ -540,28 +539,12 @@ def test_a_worn_worker_does_no_more(make: Callable[..., tuple[Recorder, Stage]])
     assert len(stage.pids()) == 3
 
 
-@pytest.fixture
-def forks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Return how many forks each worker has made that was started, in order."""
-    made: list[int] = []
-
-    class Counted(module.ExecutedWorker):
-        def __init__(self, *of: Any, forks: int, executes: bool) -> None:
-            made.append(forks)
-            super().__init__(*of, forks=forks, executes=executes)
-
-    monkeypatch.setattr(module, "ExecutedWorker", Counted)
-    return made
-
-
-def test_worn_workers_are_replaced_by_one_with_forks(
-    make: Callable[..., tuple[Recorder, Stage]], forks: list[int]
-) -> None:
+def test_worn_workers_are_replaced_by_one_with_forks(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """Once none is busy, and some are needed: forks share the memory of the worker that made them."""
-    recorder, _ = make("is worn", workers=3)
+    recorder, stage = make("is worn", workers=3)
     for names in ("abc", "abc", "a", "a"):
         recorder.record(jobs(*names), nothing)
-    assert forks == [2, 2, 2]
+    assert stage.forks == [2, 2, 2]
 
 
 def test_processor_time_of_replaced_workers_is_not_lost(make: Callable[..., tuple[Recorder, Stage]]) -> None:
@@ -572,15 +555,13 @@ def test_processor_time_of_replaced_workers_is_not_lost(make: Callable[..., tupl
     assert recorder.ended_ns >= 200_000_000
 
 
-def test_a_worn_worker_is_not_replaced_while_others_go_on(
-    make: Callable[..., tuple[Recorder, Stage]], forks: list[int]
-) -> None:
+def test_a_worn_worker_is_not_replaced_while_others_go_on(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """Only the last one is, and then by one without forks."""
-    recorder, _ = make(*["is worn"] * 4, "answers", workers=3)
+    recorder, stage = make(*["is worn"] * 4, "answers", workers=3)
     assert len(recorder.record(jobs(*"abcdef"), nothing)) == 6
-    assert forks == [2, 0, 0]
+    assert stage.forks == [2, 0, 0]
     recorder.record(jobs(*"abc"), nothing)
-    assert forks == [2, 0, 0, 2]
+    assert stage.forks == [2, 0, 0, 2]
 
 
 def test_callers_at_the_same_time_wear_workers_and_lose_no_place(make: Callable[..., tuple[Recorder, Stage]]) -> None:
@@ -599,21 +580,21 @@ def test_callers_at_the_same_time_wear_workers_and_lose_no_place(make: Callable[
     assert not any(caller.is_alive() for caller in callers)
 
 
-def test_a_lost_worker_with_forks_is_replaced_by_another(
-    make: Callable[..., tuple[Recorder, Stage]], forks: list[int]
-) -> None:
+def test_a_lost_worker_with_forks_is_replaced_by_another(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """Its forks end with it; the plans that come next find all places taken again."""
     recorder, stage = make("answers", workers=3)
     recorder.record(jobs(*"abc"), nothing)
     wait_for(lambda: len(stage.pids()) == 3)
     for worker in list(recorder._alive):
-        if isinstance(worker, module.ExecutedWorker):
+        if isinstance(worker, ExecutedWorker):
             worker.close()
     traces = recorder.record(jobs(*"abc"), nothing)
     assert [trace.harness_problem for trace in traces] == ["", "", ""]
-    assert forks == [2, 2]
+    assert stage.forks == [2, 2]
 
 
+#: What workers may use that reach it soon.
+SMALL = WorkerLimits(memory_bytes=100 << 20, processor_s=lambda limits, lasts_ns: 1, spare_cpu_s=0)
 LIMITS = {
     "reaches its processor time": "1 s of processor time",
     "computes": "1 s of processor time",
@@ -621,21 +602,12 @@ LIMITS = {
 }
 
 
-@pytest.fixture
-def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Workers may fill little, and are those of the stage."""
-    monkeypatch.setattr(module, "MODULE", b"-c")
-    monkeypatch.setattr(module, "FULL_BYTES", 100 << 20)
-    monkeypatch.setattr(module, "worker_processor_s", lambda limits, lasts_ns: 1)
-    monkeypatch.setattr(module, "SPARE_CPU_S", 0)
-
-
 @pytest.mark.parametrize("behaviour", LIMITS)
 def test_two_workers_at_a_limit_of_theirs_are_the_nodes_doing(
-    make: Callable[..., tuple[Recorder, Stage]], small: None, behaviour: str
+    make: Callable[..., tuple[Recorder, Stage]], behaviour: str
 ) -> None:
     """They do it again and again: a fault of theirs, and no third try."""
-    recorder, stage = make(behaviour, behaviour, "answers")
+    recorder, stage = make(behaviour, behaviour, "answers", limits=SMALL)
     (trace,) = recorder.record(jobs("alone"), nothing)
     words = f"stopped: receiving what the nodes sent took the grader's process to {LIMITS[behaviour]}"
     assert [(fault.process, fault.text) for fault in trace.faults()] == [("a.py", words)]
@@ -643,31 +615,24 @@ def test_two_workers_at_a_limit_of_theirs_are_the_nodes_doing(
 
 
 @pytest.mark.parametrize("behaviour", LIMITS)
-def test_one_worker_at_a_limit_decides_nothing(
-    make: Callable[..., tuple[Recorder, Stage]], small: None, behaviour: str
-) -> None:
+def test_one_worker_at_a_limit_decides_nothing(make: Callable[..., tuple[Recorder, Stage]], behaviour: str) -> None:
     """The plan is tried again."""
-    recorder, _ = make(behaviour, "answers")
+    recorder, _ = make(behaviour, "answers", limits=SMALL)
     assert note(recorder.record(jobs("alone"), nothing)[0]).startswith("worker 1")
 
 
 @pytest.mark.parametrize("first", [*LIMITS, "dies"])
-def test_different_ends_of_workers_decide_nothing(
-    make: Callable[..., tuple[Recorder, Stage]], small: None, first: str
-) -> None:
+def test_different_ends_of_workers_decide_nothing(make: Callable[..., tuple[Recorder, Stage]], first: str) -> None:
     """A limit and a failure without one, in any order."""
-    recorder, _ = make(first, "dies", "answers")
+    recorder, _ = make(first, "dies", "answers", limits=SMALL)
     (trace,) = recorder.record(jobs("alone"), nothing)
     assert trace.harness_problem.startswith("worker: expected a trace of alone, found none")
     assert trace.faults() == ()
 
 
-def test_a_worker_that_took_all_its_time_is_not_tried_again(
-    make: Callable[..., tuple[Recorder, Stage]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_worker_that_took_all_its_time_is_not_tried_again(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """A second try would take as long."""
-    monkeypatch.setattr(module, "MARGIN_S", 0.2)
-    recorder, stage = make("hangs", "answers")
+    recorder, stage = make("hangs", "answers", limits=WorkerLimits(margin_s=0.2))
     recorder.warm_up(1)
     wait_for(lambda: len(stage.pids()) == 1)
     short = replace(plan(), limits=Limits(wall_ns=1))
@@ -688,13 +653,14 @@ def test_without_time_nothing_is_recorded(make: Callable[..., tuple[Recorder, St
 
 @pytest.mark.parametrize(("scenario", "undecided"), [("starved", True), ("alone", False)])
 def test_time_that_others_took_is_nobodys_fault(
-    make: Callable[..., tuple[Recorder, Stage]], monkeypatch: pytest.MonkeyPatch, scenario: str, undecided: bool
+    make: Callable[..., tuple[Recorder, Stage]], scenario: str, undecided: bool
 ) -> None:
     """Workers say how long nodes waited for a processor; where that is much, what is not recorded is not judged."""
     recorder, _ = make("costs")
-    budget = RealTimeBudget(3600)
+    now_s = 0
+    budget = RealTimeBudget(3600, now_ns=lambda: now_s * NS_PER_S)
     (first,) = recorder.record([replace(jobs(scenario)[0], budget=budget)], nothing)
     assert note(first) == "stopped: the recordings of this submission took more than 3600 s of real time"
-    monkeypatch.setattr(RealTimeBudget, "left_ns", 0)
+    now_s = 3600
     (trace,) = recorder.record([replace(jobs("next")[0], budget=budget)], nothing)
     assert (bool(trace.harness_problem), bool(trace.faults())) == (undecided, not undecided)

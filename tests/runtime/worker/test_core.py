@@ -34,6 +34,7 @@ from grader.runtime.worker.core import (
     RunProcess,
     Taken,
 )
+from grader.runtime.worker.delay import HOPELESS_NS, Delay
 
 MS = 1_000_000
 S = 1_000 * MS
@@ -729,6 +730,18 @@ def test_with_a_drawn_order_any_ready_process_may_be_the_first() -> None:
 # ----------------------------------------------------------------------- time that work takes
 
 
+@pytest.mark.rule(21)
+def test_the_work_of_a_whole_run_does_not_outrun_its_time() -> None:
+    """Also where no wake-up is late and no pause put off: one and a half times the time, and two seconds."""
+    delay = Delay()
+    for at in (0, 1, 2):
+        delay.wake(at * S)
+    delay.take(round(1.5 * S) + HOPELESS_NS)
+    assert not delay.hides
+    delay.take(1)
+    assert delay.hides
+
+
 @pytest.mark.rule(22)
 def test_a_pause_is_certainly_counted_from_the_work_before_it_unless_the_program_has_looked() -> None:
     """A look at this instant may be for a deadline; one at an earlier instant, or of a library, is not."""
@@ -776,5 +789,8 @@ def test_where_it_is_charged_the_time_of_work_passes_at_the_next_look(monkeypatc
     host.time.clock.look()
     assert len(host.reports) == 1
     worked.done, worked.free = 0, []
+    host.answers = [answer(10, 50)]
     host.waits_until(10)
-    assert worked.free == [virtual.FREE_NS] == [MS // 2]
+    host.waits_until(20)
+    assert (len(host.reports), host.time.clock.now_ns) == (2, EPOCH_NS + 20 * MS)
+    assert worked.free == [virtual.FREE_NS, virtual.FREE_NS] == [MS // 2, MS // 2]

@@ -76,6 +76,7 @@ def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     return run_all
 
 
+@pytest.mark.rule(16)
 @pytest.mark.parametrize("ending", ENDINGS.values(), ids=ENDINGS)
 def test_what_was_published_before_the_end_is_in_the_trace(run: Callable[..., Trace], ending: str) -> None:
     """Ten messages at one instant, and then the end, one way or another."""
@@ -84,6 +85,7 @@ def test_what_was_published_before_the_end_is_in_the_trace(run: Callable[..., Tr
     assert numbers(trace) == list(range(10)), (trace.notes, trace.faults())
 
 
+@pytest.mark.rule(16)
 @pytest.mark.parametrize("ending", ["hard_exit", "killed", "terminated", "aborted", "interrupted"])
 @pytest.mark.parametrize("thread", [False, True], ids=["", "in_a_thread"])
 def test_who_ends_at_once_ends_at_its_time(run: Callable[..., Trace], ending: str, *, thread: bool) -> None:
@@ -131,6 +133,7 @@ def test_a_context_manager_takes_nothing_with_it(run: Callable[..., Trace]) -> N
     assert numbers(trace) == list(range(10))
 
 
+@pytest.mark.rule(17)
 def test_a_publisher_made_anew_for_every_message_loses_none(run: Callable[..., Trace]) -> None:
     trace = run("""
         rclpy.init()
@@ -194,6 +197,7 @@ rclpy.spin(Listener())
 """
 
 
+@pytest.mark.rule(19)
 @pytest.mark.parametrize(
     "ending", ["node.destroy_node()", "rclpy.shutdown()", "os._exit(0)", "del node, publisher\ngc.collect()"]
 )
@@ -314,6 +318,7 @@ def test_a_client_made_anew_for_each_question_finds_the_graders_server(run: Call
     assert [request.t_ns // NS_PER_S for request in trace.requests("/status", "student")] == [0, 1, 2]
 
 
+@pytest.mark.rule(18)
 @pytest.mark.parametrize("program", ANEW.values(), ids=ANEW)
 def test_a_client_made_anew_for_each_question_finds_another_students_server(
     run: Callable[..., Trace], program: str

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from decided import grade_until_decided
+from places import TESTS
 
 from grader.grading.app.request import GradeRequest
 from grader.grading.model.exercise import Outcome
@@ -17,7 +18,7 @@ from grader.grading.model.report import ExerciseReport
 
 pytestmark = pytest.mark.ros
 
-HERE = Path(__file__).resolve().parents[2] / "packages"
+HERE = TESTS / "packages"
 WORKSPACE = HERE / "workspace"
 LAUNCH, NODES = "src/robot/launch/robot.launch.py", "src/robot/robot/nodes.py"
 Edit = tuple[str, str, str]

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pytest
 from decided import grade_until_decided
+from places import TESTS
 
 from grader.grading.app.request import GradeRequest
-from grader.grading.model.report import Outcome, Report
+from grader.grading.model.exercise import Outcome
+from grader.grading.model.report import Report
 from grader.grading.rubrics.loader import read_rubric
 
-HERE = Path(__file__).resolve().parents[2] / "packages"
+HERE = TESTS / "packages"
 RUBRIC = HERE / "rubrics" / "started.yaml"
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hostile import HOST_LINE
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,7 +16,6 @@ pytest.importorskip("rclpy", reason="needs rclpy")
 
 from hostile import hostile, record
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from test_worker_attacked import LINE
 
 from grader.runtime.message_classes import interface_class, message_class
 from grader.runtime.model.quantities import NS_PER_S
@@ -113,7 +113,9 @@ def test_a_forged_claim_costs_nobody_a_verdict(run: Callable[..., Trace], kind: 
     claim = {"kind": kind, "name": name, "type": "std_srvs/srv/Trigger"}
     report = json.dumps({"kind": "idle", "wake_ns": None, "endpoints": [claim]})
     later = f"if self.count == 20: line().sendall({report.encode()!r} + b'\\n')"
-    trace = run(hostile(before=LINE, later=later), hostile().replace("/cmd_vel", "/other"), duration_ns=3 * NS_PER_S)
+    trace = run(
+        hostile(before=HOST_LINE, later=later), hostile().replace("/cmd_vel", "/other"), duration_ns=3 * NS_PER_S
+    )
     assert trace.harness_problem == ""
     assert len(trace.messages("/other")) == 59
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from places import TESTS
 
 from grader.runtime.model.scenario import FieldSpec
 from grader.runtime.model.trace import Trace
@@ -29,7 +30,7 @@ from grader.runtime.supervisor.supervisor import Job
 
 pytestmark = pytest.mark.ros
 
-NODES = Path(__file__).parents[2] / "service_nodes"
+NODES = TESTS / "service_nodes"
 BATTERY, RELAY, TRIGGER = "/battery/get_status", "/relay", "std_srvs/srv/Trigger"
 ANSWERS: tuple[Mapping[str, FieldSpec], ...] = tuple({"success": True, "message": f"n{number}"} for number in range(3))
 TEXT = "std_msgs/msg/String"

@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from decided import grade_until_decided
+from decided import grade_until_decided, verdicts
 
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.start import grade
 from grader.grading.model.exercise import Outcome
-from grader.grading.model.report import Report, Verdict
 
 pytestmark = pytest.mark.ros
 
@@ -115,10 +114,6 @@ def request(folder: Path, *, follow: str = FOLLOW, world: str = WORLD, clock: st
     (folder / "world.py").write_text(world, encoding="utf-8")
     (folder / "follow.yaml").write_text(RUBRIC, encoding="utf-8")
     return GradeRequest(str(folder / "student"), rubrics=(folder / "follow.yaml",), clock=clock, seed=5)
-
-
-def verdicts(report: Report) -> dict[str, Verdict]:
-    return {verdict.id: verdict for verdict in report.exercises[0].verdicts}
 
 
 def test_a_loop_is_closed_and_is_the_same_in_each_run(tmp_path: Path) -> None:

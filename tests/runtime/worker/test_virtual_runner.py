@@ -247,6 +247,7 @@ def test_a_process_may_go_on_alone_until_somebody_else_wants_something() -> None
     assert free[1][-1] == 1000
 
 
+@pytest.mark.rule(3)
 def test_a_process_that_went_on_alone_takes_time_with_it() -> None:
     """What it reports then happened then; it cannot go further than it was let."""
 
@@ -593,6 +594,7 @@ def test_a_node_is_found_beside_a_namesake(monkeypatch: pytest.MonkeyPatch, whos
         assert any("was not seen in the graph" in note for note in Run(asker).trace.notes) is not namesake
 
 
+@pytest.mark.rule(14)
 @pytest.mark.parametrize("comes", [True, False])
 def test_what_was_not_matched_in_time_is_awaited_again_before_time_goes_on(comes: bool) -> None:
     """A counterpart that was discovered late still belongs to the instant; one that never comes holds up nothing."""
@@ -647,6 +649,7 @@ def test_a_program_that_does_not_settle_is_for_the_other_clock(why: str) -> None
     assert Run(saying({**hung, "unsettled": "please"})).trace.clock_reason == ""
 
 
+@pytest.mark.rule(14)
 def test_messages_that_never_come_are_noted_and_no_longer_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """The counts of the host settle an instant; they are nobody's evidence."""
 

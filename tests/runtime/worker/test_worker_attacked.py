@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hostile import HOST_LINE
 
 from grader.runtime.model.trace import Trace
 from grader.runtime.session import RecordingSession
@@ -29,19 +30,6 @@ from grader.runtime.usage import usage
 
 pytestmark = pytest.mark.ros
 
-#: What a program needs to speak on its line in the place of its host.
-LINE = """
-def line():
-    import stat
-    for name in os.listdir("/proc/self/fd"):
-        try:
-            if stat.S_ISSOCK(os.fstat(int(name)).st_mode):
-                found = socket.socket(fileno=os.dup(int(name)))
-                if found.family == socket.AF_UNIX:
-                    return found
-        except OSError:
-            pass
-"""
 #: What a program needs to speak RTPS in the name of any writer: a submessage to every reader on the machine, which
 #: is DATA, or a GAP over so many sequence numbers.
 FORGE = """
@@ -107,7 +95,7 @@ JUNK = ["send(b'x' * 100 + b'\\n')", "send(b'[' * 100000 + b'\\n')", "send(b'\\x
 def test_junk_on_the_line_ends_the_process_that_sent_it(run: Callable[..., Trace], said: str, clock: str) -> None:
     """Not JSON, too deep, too much: its process is ended, and everybody else goes on."""
     later = f"if self.count == 40:\n    send = line().sendall\n    {said}"
-    trace = run(hostile(before=LINE, later=later), clock=clock, duration_ns=4 * NS_PER_S)
+    trace = run(hostile(before=HOST_LINE, later=later), clock=clock, duration_ns=4 * NS_PER_S)
     (fault,) = trace.faults()
     assert (fault.kind, fault.text) == (FaultKind.KILLED, "stopped: it no longer answered the grader")
     assert len(trace.messages("/cmd_vel")) >= 39
@@ -125,7 +113,7 @@ def test_junk_on_the_line_ends_the_process_that_sent_it(run: Callable[..., Trace
 )
 def test_absurd_reports_change_nothing_that_counts(run: Callable[..., Trace], report: str) -> None:
     """Times, counts and places of a report are bounded before they are used; messages are those that came."""
-    trace = run(hostile(before=LINE, later=f"if self.count == 40: line().sendall({report.encode()!r} + b'\\n')"))
+    trace = run(hostile(before=HOST_LINE, later=f"if self.count == 40: line().sendall({report.encode()!r} + b'\\n')"))
     assert len(trace.messages("/cmd_vel")) == 199
     assert all(len(o.text) <= 500 and 0 <= o.t_ns <= 10 * NS_PER_S for o in trace.faults())
 
@@ -136,7 +124,7 @@ def test_a_report_of_the_far_future_only_ends_the_senders_own_time(run: Callable
         '{"kind": "idle", "wake_ns": 99999999999999999999999999, "sent": {"topic /cmd_vel": 3, "topic /y": -5}, '
         '"endpoints": [1, null, {"kind": "publisher"}, []]}'
     )
-    bad = hostile(before=LINE, later=f"if self.count == 40: line().sendall({report.encode()!r} + b'\\n')")
+    bad = hostile(before=HOST_LINE, later=f"if self.count == 40: line().sendall({report.encode()!r} + b'\\n')")
     good = hostile().replace("/cmd_vel", "/other")
     trace = run(bad, good)
     assert len(trace.messages("/other")) == 199

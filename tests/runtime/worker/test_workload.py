@@ -25,12 +25,14 @@ def delayed(*costs_ms: float, period_ms: int = 50) -> Delay:
     return delay
 
 
+@pytest.mark.rule(21)
 def test_work_within_the_period_delays_nothing() -> None:
     """However often: what was there before the next wake-up is no delay."""
     delay = delayed(*[45] * 200)
     assert (delay.wake_ups, delay.late, delay.hides) == (200, 0, False)
 
 
+@pytest.mark.rule(21)
 def test_work_beyond_the_period_adds_up() -> None:
     """Each wake-up inherits the delay of the one before: 60 ms of 50 are 40 ms late after four, and more after five."""
     assert not delayed(*[50] * 100).hides
@@ -66,6 +68,7 @@ def put_off(*costs_ms: float, period_ms: int = 50, certain: bool = True) -> Dela
     return delay
 
 
+@pytest.mark.rule(22)
 def test_a_pause_after_work_puts_off_what_comes_next() -> None:
     """A loop that works for 5 ms and sleeps for 50 runs at 18 Hz, and is never late by what a timer would need."""
     assert put_off(*[7] * 100).hides
@@ -74,6 +77,7 @@ def test_a_pause_after_work_puts_off_what_comes_next() -> None:
     assert not put_off(*[20] * 20, period_ms=1000).hides
 
 
+@pytest.mark.rule(22)
 def test_a_pause_after_work_and_a_look_at_a_clock_may_put_off_what_comes_next() -> None:
     """It may be until a deadline, so that only another recording can tell; from far less work on."""
     assert [put_off(*[cost] * 100, certain=False).may_drift for cost in (0.3, 1.5, 2.0, 30)] == [
@@ -91,6 +95,7 @@ def test_some_long_work_between_pauses_is_no_habit() -> None:
     assert not put_off(45, 45, 45, *[1.5] * 100).hides
 
 
+@pytest.mark.rule(21)
 def test_the_start_delays_nothing() -> None:
     """A program that imports for ten seconds only starts later."""
     delay = Delay()
@@ -205,6 +210,7 @@ def clocks(monkeypatch: pytest.MonkeyPatch) -> Clocks:
     return clocks
 
 
+@pytest.mark.rule(20)
 def test_one_message_of_a_step_forgives_a_wait_and_only_where_messages_were_announced(clocks: Clocks) -> None:
     """Whatever a process says, and however often."""
     clocks.step(100, 100, arrivals=1)
@@ -216,6 +222,7 @@ def test_one_message_of_a_step_forgives_a_wait_and_only_where_messages_were_anno
     assert 300 * MS - clocks.workload.waited_ns == 2 * ARRIVAL_NS
 
 
+@pytest.mark.rule(20)
 def test_only_the_thread_that_waited_longest_is_taken_to_have_run(clocks: Clocks) -> None:
     """A hundred threads that each wait for a millisecond do not excuse a step of 100 ms."""
     clocks.starved_ns = {str(n): MS for n in range(100)}
@@ -226,6 +233,7 @@ def test_only_the_thread_that_waited_longest_is_taken_to_have_run(clocks: Clocks
     assert clocks.workload.waited_ns == 99 * MS
 
 
+@pytest.mark.rule(20)
 def test_threads_of_the_middleware_excuse_nothing(clocks: Clocks) -> None:
     """As long as the program has one thread, only its waits count."""
     clocks.starved_ns = {"1": MS, "2": 100 * MS}
@@ -233,6 +241,7 @@ def test_threads_of_the_middleware_excuse_nothing(clocks: Clocks) -> None:
     assert clocks.workload.waited_ns == 99 * MS
 
 
+@pytest.mark.rule(20)
 def test_work_while_the_grader_makes_a_process_wait_is_in_the_account(clocks: Clocks) -> None:
     """While its endpoints are matched, and while another step is not its own; discovery itself may take a while."""
     for number in range(2, 42):
@@ -256,6 +265,7 @@ def test_threads_that_compute_between_two_steps_are_in_the_account(clocks: Clock
         assert clocks.workload.delay.hides is (busy > 50)
 
 
+@pytest.mark.rule(21)
 @pytest.mark.parametrize("report", [{}, {"moved": 10}, {"charged": True, "moved": 10}, {"arrivals": 3}])
 def test_no_report_makes_a_process_faster_than_it_is(clocks: Clocks, report: dict[str, Any]) -> None:
     """Real time less waits for a processor, against virtual time: the bound of the whole run needs no report at all."""

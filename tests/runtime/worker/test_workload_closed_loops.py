@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from places import SHARED
 
 from grader.runtime.model.trace import Trace
 from grader.runtime.session import RecordingSession
@@ -15,7 +16,7 @@ from grader.runtime.model.quantities import NS_PER_S
 
 pytestmark = pytest.mark.ros
 
-CASES = Path(__file__).resolve().parents[4] / "shared" / "cases" / "fidelity"
+CASES = SHARED / "cases" / "fidelity"
 BEFORE = """
 import rclpy
 from rclpy.node import Node

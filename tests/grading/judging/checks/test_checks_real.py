@@ -4,6 +4,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import pytest
+from places import ROOT, TESTS
 
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.start import grade
@@ -12,9 +13,8 @@ from grader.grading.judging.run_check import check_name
 from grader.grading.rubrics.builtin import builtin_rubrics
 from grader.grading.rubrics.loader import read_rubric
 
-ROOT = Path(__file__).resolve().parents[4]
-REAL = ROOT / "tests" / "real_checks"
-NODES = ROOT / "tests" / "service_nodes"
+REAL = TESTS / "real_checks"
+NODES = TESTS / "service_nodes"
 #: Rubrics that are asked of real nodes, here or in the tests of whole submissions.
 RUBRICS = [p for p in (*builtin_rubrics().values(), *REAL.glob("*.yaml")) if ".selftest." not in p.name]
 RUBRICS += [p.parent / f"{p.parent.name}.yaml" for p in (ROOT / "examples").glob("*/README.md")]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from tracing import driving, position_logs
+from wordings import plain
 
 from grader.grading.judging.checks.waiting import WaitsGracefully
 from grader.runtime.model.errors import HarnessError
@@ -11,10 +12,6 @@ from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import FaultKind
 
 WAITS = WaitsGracefully("odom_subscriber.py", "/odom", 5 * NS_PER_S)
-
-
-def plain(x: float, y: float) -> str:
-    return f"x={x:.2f} y={y:.2f}"
 
 
 def test_waiting_and_then_working_is_met() -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from places import ROOT
 from ruamel.yaml import YAML
 from tracing import (
     FLOAT32,
@@ -35,7 +36,7 @@ HERE = Path(__file__).parent
 FLOAT64 = "std_msgs/msg/Float64"
 STRING = "std_msgs/msg/String"
 BATTERY = "/battery/get_status"
-EXAMPLES = Path(__file__).resolve().parents[4] / "examples"
+EXAMPLES = ROOT / "examples"
 #: The rubrics whose programs may be spoilt: together they ask most checks.
 RUBRICS = (*builtin_rubrics().values(), *(p.parent / f"{p.parent.name}.yaml" for p in EXAMPLES.glob("*/README.md")))
 EXERCISES: dict[Path, Exercise] = {path: read_rubric(path) for path in RUBRICS}

@@ -6,8 +6,8 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+from parsed_page import MARKUP, Page
 from report_samples import criterion, exercise, report
-from test_report_html import MARKUP, Page
 
 from grader.grading.model.exercise import Audience, Location, Outcome
 from grader.grading.model.report import Report

@@ -6,13 +6,10 @@ import base64
 import hashlib
 import json
 import re
-from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
-from html.parser import HTMLParser
-from typing import Any
 
 import pytest
+from parsed_page import MARKUP, Page
 from report_samples import (
     ENVIRONMENT,
     SAMPLES,
@@ -43,58 +40,6 @@ from grader.grading.model.chart import (
 from grader.grading.model.report import Report, Reproduction
 from grader.grading.reporting.html.assets import bundle
 from grader.grading.reporting.html.render import render_html
-
-MARKUP = (
-    '"><img src=x onerror=alert(1)>',
-    "</script><script>alert(1)</script>",
-    "<!--<script>",
-    "{{ 7 * 7 }}{% raw %}",
-    "' onmouseover='alert(1)",
-    "\u2028alert(1)\u2029",
-    "javascript:alert(1)",
-    "]]>&lt;b&gt;",
-)
-VOID = {"meta", "link", "img", "br", "hr", "input"}
-
-
-class Page(HTMLParser):
-    """What a parser finds in a page."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__(convert_charrefs=True)
-        self.tags: Counter[str] = Counter()
-        self.attributes: list[Any] = []
-        self.open: list[Any] = []
-        self.texts: list[Any] = []
-        self.raw: dict[Any, Any] = {}
-        self.feed(text)
-        self.close()
-
-    def handle_starttag(self, tag: str, attrs: Sequence[tuple[str, str | None]]) -> None:
-        self.tags[tag] += 1
-        self.attributes += [(tag, name, value) for name, value in attrs]
-        if tag not in VOID:
-            self.open.append((tag, dict(attrs)))
-
-    def handle_startendtag(self, tag: str, attrs: Sequence[tuple[str, str | None]]) -> None:
-        self.tags[tag] += 1
-        self.attributes += [(tag, name, value) for name, value in attrs]
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open, f"</{tag}> closes nothing"
-        assert self.open[-1][0] == tag, f"</{tag}> closes <{self.open[-1][0]}>"
-        self.open.pop()
-
-    def handle_data(self, data: str) -> None:
-        tag = self.open[-1] if self.open else ("", {})
-        if tag[0] in ("script", "style"):
-            self.raw[tag[1].get("id", tag[0])] = self.raw.get(tag[1].get("id", tag[0]), "") + data
-        else:
-            self.texts.append(data)
-
-    @property
-    def text(self) -> str:
-        return " ".join(" ".join(self.texts).split())
 
 
 def pictured(text: str = "fine") -> Report:

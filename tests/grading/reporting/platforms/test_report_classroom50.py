@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import jsonschema
 import pytest
+from places import SHARED
 from report_samples import HANDED_IN, SAMPLES, criterion, exercise, middling, report, undecided
 
 from grader.grading.model.exercise import Outcome
 from grader.grading.model.report import Report, Verdict
 from grader.grading.reporting.platforms.classroom50 import render_classroom50
 
-SCHEMA = Path(__file__).resolve().parents[5] / "shared" / "formats" / "classroom50-result-v1.schema.json"
+SCHEMA = SHARED / "formats" / "classroom50-result-v1.schema.json"
 
 
 def result(sample: Report) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from places import SHARED
 
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.model.report import Summary
@@ -13,7 +14,7 @@ from grader.runtime.model.trace import ClockKind
 
 pytestmark = pytest.mark.ros
 
-CASES = Path(__file__).resolve().parents[5] / "shared" / "cases" / "fidelity"
+CASES = SHARED / "cases" / "fidelity"
 HEAD = """
 import threading
 import time

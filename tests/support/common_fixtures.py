@@ -1,0 +1,65 @@
+"""Fixtures that tests of several folders use: sessions for recordings, and folders.
+
+Every run of pytest loads this module, so a fixture imports what it needs.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from grader.runtime.session import RecordingSession
+
+
+@pytest.fixture(scope="module")
+def studio() -> Iterator[RecordingSession]:
+    """The strongest sandbox of this machine, with warm workers."""
+    from hostile import staging
+
+    from grader.runtime.session import open_session
+
+    with open_session("auto") as studio:
+        yield staging(studio)
+
+
+@pytest.fixture(scope="module")
+def one_worker() -> Iterator[RecordingSession]:
+    """The strongest sandbox of this machine, with one worker."""
+    from hostile import staging
+
+    from grader.runtime.session import open_session
+
+    with open_session("auto", 1) as studio:
+        yield staging(studio)
+
+
+@pytest.fixture
+def submission() -> Iterator[Path]:
+    """A folder that students' processes may see."""
+    from sandboxes import make_submission
+
+    folder = make_submission()
+    yield folder
+    shutil.rmtree(folder)
+
+
+@pytest.fixture
+def open_folder() -> Iterator[Path]:
+    """An empty folder; unlike pytest's own, every user can enter what is above it."""
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
+@pytest.fixture
+def into(tmp_path: Path) -> Path:
+    """An empty folder for what a test unpacks or copies."""
+    folder = tmp_path / "into"
+    folder.mkdir()
+    return folder
