@@ -371,7 +371,12 @@ _BOUND = re.compile(
     r"_?(MOST|MAX|LONGEST|LARGEST|DEEPEST)(_|$)|.*(?<!NS_PER)_(BYTES|CHARACTERS|S|NS|MS|LIMIT|TRIES)$|_?(TRIES|DEPTH)$"
 )
 #: Packages whose bounds only shorten what is shown.
-_SHOWN = ("grader/grading/reporting/", "grader/course/mutation/", "grader/runtime/ros_packages/")
+_SHOWN = (
+    "grader/course/class_page/",
+    "grader/course/mutation/",
+    "grader/grading/reporting/",
+    "grader/runtime/ros_packages/",
+)
 _UNITS = {name: value for name, value in vars(quantities).items() if isinstance(value, int)}
 
 

@@ -146,13 +146,6 @@ if TYPE_CHECKING:
     from grader.grading.judging.values import published_numbers as published_numbers
     from grader.grading.judging.values import student_endpoints as student_endpoints
     from grader.grading.judging.values import value_at as value_at
-    from grader.grading.judging.wording import in_unit as in_unit
-    from grader.grading.judging.wording import listed as listed
-    from grader.grading.judging.wording import moment as moment
-    from grader.grading.judging.wording import number as number
-    from grader.grading.judging.wording import numbers as numbers
-    from grader.grading.judging.wording import quote as quote
-    from grader.grading.judging.wording import span as span
     from grader.grading.model.chart import Band as Band
     from grader.grading.model.chart import Chart as Chart
     from grader.grading.model.chart import Level as Level
@@ -173,6 +166,13 @@ if TYPE_CHECKING:
     from grader.grading.model.report import Report as Report
     from grader.grading.model.report import Summary as Summary
     from grader.grading.model.report import Verdict as Verdict
+    from grader.grading.model.wording import in_unit as in_unit
+    from grader.grading.model.wording import listed as listed
+    from grader.grading.model.wording import moment as moment
+    from grader.grading.model.wording import number as number
+    from grader.grading.model.wording import numbers as numbers
+    from grader.grading.model.wording import quote as quote
+    from grader.grading.model.wording import span as span
     from grader.grading.reporting.escape import csv_cell as csv_cell
     from grader.grading.reporting.escape import shown as shown
     from grader.grading.reporting.escape import shown_lines as shown_lines
@@ -284,7 +284,7 @@ CONTENTS: dict[str, dict[str, str]] = {
     },
     "Text": {
         "grader.runtime.model.quantities": "NS_PER_S seconds counted within NS_PER_MS",
-        "grader.grading.judging.wording": "moment span number numbers quote listed in_unit",
+        "grader.grading.model.wording": "moment span number numbers quote listed in_unit",
     },
     "Charts": {
         "grader.grading.judging.plots": "Drawing Plot threshold_drawing",

@@ -5,12 +5,17 @@ import functools
 import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from places import ROOT
 from sample_folders import GROUPS, folders_in
+
+if TYPE_CHECKING:
+    import grimp
 
 PACKAGE = ROOT / "grader"
 
@@ -150,6 +155,7 @@ PURE = (
     "grading/model",
     "grading/judging",
     "grading/reporting",
+    "course/class_page",
     "course/mutation/operators",
 )
 
@@ -412,6 +418,65 @@ def test_every_folder_of_code_has_tests() -> None:
         if folder.parts and folder.parts[0] in MIRRORED and not list((TESTS / folder).glob("test_*.py"))
     }
     assert without <= set(TESTED_ELSEWHERE)
+
+
+#: The parts, and where the lists of their doors stand: the modules that others may import.
+DOORS = {f"doors-of-{part}": f"grader.{part}" for part in ("runtime", "grading", "course")}
+
+
+def doors_of(contract: str) -> list[tuple[str, str]]:
+    """Return who may import what of a part, as patterns of module names."""
+    settings = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = {one["id"]: one for one in settings["tool"]["importlinter"]["contracts"]}
+    pairs = (line.split(" -> ") for line in contracts[contract]["ignore_imports"])
+    return [(importer, imported) for importer, imported in pairs]
+
+
+def opened(door: tuple[str, str], one: tuple[str, str]) -> bool:
+    """Return whether a door lets an import pass; `*` stands for one name, and `**` for any."""
+    patterns = (re.escape(side).replace(r"\*\*", ".+").replace(r"\*", "[^.]+") for side in door)
+    return all(re.fullmatch(pattern, module) for pattern, module in zip(patterns, one, strict=True))
+
+
+def from_outside(graph: "grimp.ImportGraph", part: str) -> set[tuple[str, str]]:
+    """Return the imports of modules of a part by modules outside of it, as pairs of importer and imported."""
+    inside = {part, *graph.find_descendants(part)}
+    return {
+        (importer, module)
+        for module in inside
+        for importer in graph.find_modules_that_directly_import(module)
+        if importer not in inside
+    }
+
+
+@pytest.fixture(scope="module")
+def graph() -> "grimp.ImportGraph":
+    return pytest.importorskip("grimp").build_graph("grader", cache_dir=None)  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize("contract", DOORS)
+def test_a_part_is_imported_by_its_doors_alone(contract: str, graph: "grimp.ImportGraph") -> None:
+    """And every door is used by somebody: one that nobody needs is closed."""
+    doors, imports = doors_of(contract), from_outside(graph, DOORS[contract])
+    assert [one for one in sorted(imports) if not any(opened(door, one) for door in doors)] == []
+    assert [door for door in doors if not any(opened(door, one) for one in imports)] == []
+
+
+@pytest.mark.parametrize(
+    ("contract", "importer", "imported"),
+    [
+        ("doors-of-runtime", "grader.cli.main", "grader.runtime.supervisor.supervisor"),
+        ("doors-of-runtime", "grader.grading.app.grade", "grader.runtime.serialization"),
+        ("doors-of-grading", "grader.course.packaging", "grader.grading.judging.diagnosis.rules"),
+        ("doors-of-course", "grader.cli.batch", "grader.course.classroom.cluster.dispatcher"),
+    ],
+)
+def test_an_import_from_the_inside_of_a_part_is_found(
+    contract: str, importer: str, imported: str, graph: "grimp.ImportGraph"
+) -> None:
+    """The rule can fail."""
+    assert {importer, imported} <= graph.modules
+    assert not any(opened(door, (importer, imported)) for door in doors_of(contract))
 
 
 def modules_of(tests: Path) -> list[Path]:

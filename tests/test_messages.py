@@ -196,7 +196,7 @@ def test_the_phrases_of_pages_are_checked() -> None:
     """Those of a run, of a class and of similar submissions, in templates and scripts."""
     pages = {each.place.rpartition(":")[0] for each in sentences() if each.kind == "page"}
     assert {path.partition("/assets/")[0].partition("/templates/")[0] for path in pages} == {
-        "grader/grading/reporting/class_page",
+        "grader/course/class_page",
         "grader/grading/reporting/html",
         "grader/course/similarity",
     }

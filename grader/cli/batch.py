@@ -100,8 +100,7 @@ def command(  # noqa: PLR0913  one parameter an option
     """
     if similarity:
         require("--similarity", "copydetect", "similarity")
-    from grader.course.classroom.class_run import grade_class
-    from grader.course.classroom.grading import ClassRequest
+    from grader.course.classroom.class_run import ClassRequest, grade_class
     from grader.course.classroom.outputs import platforms, render_summary, summary_json
     from grader.course.classroom.schedulers import opened
     from grader.course.classroom.watching import shown_watcher
@@ -148,7 +147,7 @@ def command(  # noqa: PLR0913  one parameter an option
 
 def _code(graded: Graded) -> int:
     """Return the exit code: mistakes in a rubric come first, then what failed here, then unusable submissions."""
-    from grader.course.classroom.gradebook import Status
+    from grader.course.classroom.class_run import Status
 
     if graded.book.author_mistakes:
         return UNUSABLE

@@ -36,8 +36,8 @@ def _list(*, folders: tuple[Path, ...], as_json: bool) -> int:
 
 
 def _print(folders: tuple[Path, ...], *, ready: bool, as_json: bool) -> int:
-    from grader.grading.app.interface_packages import described
     from grader.grading.reporting.interface_list import packages_to_json, render_packages
+    from grader.runtime.interface_packages import described
 
     found = described(folders, ready=ready)
     print_result(

@@ -247,6 +247,8 @@ class _Grading:
 
             open_page(self.page)
             self.page = None
+        from grader.grading.model.report import exit_code
+
         return exit_code(seen, self.min_score)
 
     def each_save(self, started: float) -> int:

@@ -24,7 +24,7 @@ from grader.runtime.model.errors import ALL_MET, NOT_ALL_MET, UNUSABLE, GraderEr
 from grader.runtime.model.extras import require
 
 if TYPE_CHECKING:
-    from grader.course.mutation.results import SelftestResult
+    from grader.course.mutation.running import SelftestResult
 
 
 def _all_rubrics(ctx: click.Context, param: click.Parameter, named: tuple[Path, ...]) -> tuple[Path, ...]:

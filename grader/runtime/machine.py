@@ -1,4 +1,4 @@
-"""Describes this machine, as far as grading depends on it, and adapts time-outs to its load."""
+"""Describes this machine as far as recording depends on it: its software, its settings, and what its sandboxes hold."""
 
 from __future__ import annotations
 
@@ -11,71 +11,23 @@ import stat
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import grader
-from grader.runtime.host.originals import wait_until
-from grader.runtime.model.checkup import Fact
+from grader.runtime.model.checkup import Fact, TierReport
+from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.quantities import GIB, MIB
 from grader.runtime.model.releases import release_of
-from grader.runtime.ros_installation import RosInstallation
+from grader.runtime.ros_installation import RosInstallation, find_ros
+from grader.runtime.sandbox.bubblewrap import ENTERABLE
+from grader.runtime.sandbox.choose import inspect_tier, inspect_tiers, sandbox_memory
+from grader.runtime.sandbox.exposure import some_user
 from grader.runtime.sandbox.properties import confined, install_command, setting_command
-from grader.runtime.weaknesses import BUBBLEWRAP, FAST_DDS, LINUX, kernel_version, known, version_of
-
-#: How long to wait for an endpoint or a message that was announced.
-SETTLE_S = 5.0
-#: On a busy machine, time-outs are multiplied by the load per processor, up to this factor.
-MOST_BUSY = 4.0
-#: After this many time-outs, further waits are brief; after `MOST_LOSSES`, nothing is waited for again.
-LOSSES, BRIEF_S, MOST_LOSSES = 3, 0.05, 20
-
-
-def load_per_processor() -> float:
-    """Return the load average per processor, from 1 to `MOST_BUSY`; 1 if the system does not provide it."""
-    try:
-        return min(MOST_BUSY, max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)))
-    except OSError:
-        return 1.0
-
-
-class Patience:
-    """The time-out of one recording, which gets short after repeated losses.
-
-    Args:
-        full_s: Time-out of the first waits, on an idle machine.
-    """
-
-    def __init__(self, full_s: float = SETTLE_S) -> None:
-        self._full_s = full_s * load_per_processor()
-        self._losses = 0
-
-    @property
-    def wait_s(self) -> float:
-        """Time-out of the next wait, in seconds."""
-        return self._full_s if self._losses < LOSSES else BRIEF_S
-
-    @property
-    def is_left(self) -> bool:
-        """Whether it is worth waiting again for something that did not come."""
-        return self._losses < MOST_LOSSES
-
-    @property
-    def has_lost(self) -> bool:
-        """Whether any wait timed out."""
-        return self._losses > 0
-
-    def wait(self, condition: Callable[[], bool], *, pause_s: float = 0.00015) -> bool:
-        """Wait until a condition holds; return whether it did before the time-out."""
-        came = wait_until(condition, self.wait_s, pause_s=pause_s)
-        if not came:
-            self.lose()
-        return came
-
-    def lose(self) -> None:
-        """Count one wait that timed out."""
-        self._losses += 1
-
+from grader.runtime.sandbox.tiers import is_for_others, isolation_from_name
+from grader.runtime.supervisor.byte_code import byte_code
+from grader.runtime.supervisor.memory_groups import group_fact
+from grader.runtime.weaknesses import BUBBLEWRAP, FAST_DDS, LINUX, kernel_version, known, repaired_here, version_of
 
 #: Disk space that staged submissions, recordings and reports may need at the same time.
 MIN_SCRATCH_BYTES = 512 * MIB
@@ -89,6 +41,66 @@ _CREATE_RULESET, _ASK_VERSION = 444, 1  # linux/landlock.h; the number is the sa
 #: Where the kernel exposes its settings.
 SETTINGS_FOLDER = Path("/proc/sys")
 _PERSISTENT = "/etc/sysctl.d/60-rclpy-grader.conf"
+
+
+#: The installation, or why there is none that can be used.
+Found = tuple[RosInstallation | None, tuple[Fact, ...]]
+
+
+def ros_here(find: Callable[[], RosInstallation] = find_ros) -> Found:
+    """Find the ROS installation, or report as a fact why it cannot be used."""
+    try:
+        return find(), ()
+    except EnvironmentFault as fault:
+        return None, (Fact("ROS 2", fault.message.removeprefix("ROS 2: "), fits=False, remedy=fault.hint),)
+
+
+def prepared(ros: RosInstallation) -> tuple[Fact, ...]:
+    """Report what makes recording fast, or its limits sure: byte code, groups of memory, tests of sandboxes."""
+    return byte_code(ros.runtime), group_fact(), sandbox_memory(ros)
+
+
+def sandboxes(ros: RosInstallation) -> tuple[TierReport, ...]:
+    """Test every sandbox and return the reports, strongest first; `none` comes last."""
+    return inspect_tiers(ros)
+
+
+def sandbox(name: str) -> TierReport:
+    """Return the report on one sandbox, from its last test if nothing has changed since.
+
+    Raises:
+        EnvironmentFault: This machine lacks ROS.
+    """
+    return inspect_tier(name, find_ros())
+
+
+def can_fork(name: str) -> bool:
+    """Return whether students' nodes are forked in a sandbox, not executed; raises EnvironmentFault without it."""
+    return isolation_from_name(name).can_fork
+
+
+def node_start(name: str, *, can_fork: bool) -> Fact:
+    """Report how students' nodes are started in a sandbox."""
+    if can_fork:
+        return Fact("start of nodes", "each is forked from a process that has imported ROS")
+    text = "each executes Python and imports ROS, which takes longer: to be forked"
+    return Fact("start of nodes", f"{text} into {name}, it needs Linux {'.'.join(map(str, ENTERABLE))} or newer")
+
+
+def weaknesses_here(ros: RosInstallation | None) -> Iterator[Fact]:
+    """Yield the known weaknesses of the software in use, without those that are repaired here."""
+    yield from weaknesses(ros, repaired_here())
+
+
+def easiest_remedy(tiers: Sequence[TierReport]) -> str:
+    """Return the easiest fix of a sandbox; running as another user comes last, because it takes the most effort."""
+    ordered = sorted(tiers, key=lambda tier: is_for_others(tier.name))
+    return next((tier.remedy for tier in ordered if tier.remedy), "")
+
+
+def other_user() -> int:
+    """Return a user that no other grader on this machine uses."""
+    return some_user()
 
 
 def software(ros: RosInstallation | None) -> Iterator[Fact]:

@@ -1,9 +1,12 @@
-"""Sets up and closes what recordings need (ROS, a sandbox, workers, a folder), and chooses the clock."""
+"""The door of the runtime: opens sessions, in which runs are recorded, tests of rubrics run, and own nodes stepped.
+
+A session has what recordings need (ROS, a sandbox, workers, a folder), and chooses the clock.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import chain
@@ -13,15 +16,42 @@ from typing import TypeVar
 from grader.runtime.domains import private_domains, shared_domains
 from grader.runtime.model.checkup import Property
 from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.projects import Project
 from grader.runtime.model.trace import Trace
+from grader.runtime.programs.shares import install_shares
 from grader.runtime.ros_installation import RosInstallation, find_ros
-from grader.runtime.sandbox.choose import OWN_PROGRAMS, choose_isolation
+from grader.runtime.sandbox.choose import OWN_PROGRAMS, TierChoice, choose_isolation
 from grader.runtime.sandbox.protocol import Isolation
 from grader.runtime.supervisor.byte_code import compile_own
 from grader.runtime.supervisor.pace import keeps_pace
 from grader.runtime.supervisor.real_time_budget import RealTimeBudget
-from grader.runtime.supervisor.supervisor import Job, Recorder
+from grader.runtime.supervisor.stepping import SteppedRun
+from grader.runtime.supervisor.supervisor import MARGIN_S, TRIES, Job, Recorder, WorkerLostError
+from grader.runtime.supervisor.test_runs import VARIABLE, TestJob, collected_tests, record_tests
 from grader.runtime.temp_dirs import scratch_folder
+
+__all__ = [
+    "AUTO",
+    "MORE_IN_CLASS",
+    "NO_ISOLATION",
+    "OWN_PROGRAMS",
+    "VIRTUAL",
+    "WALL",
+    "Job",
+    "RealTimeBudget",
+    "RecordingSession",
+    "SteppedRun",
+    "TestJob",
+    "TierChoice",
+    "WorkerLostError",
+    "attempt_s",
+    "collected_tests",
+    "open_session",
+    "planned_clock",
+    "runs_a_test",
+    "sandbox_here",
+    "workers_for",
+]
 
 #: The name of a run without a sandbox in reports.
 NO_ISOLATION = "none"
@@ -141,6 +171,25 @@ class RecordingSession:
             tell(key, repeated)
         return {key: traces[key] for key in jobs}
 
+    def record_tests(
+        self,
+        jobs: Mapping[Key, TestJob],
+        progress: Callable[[str], None],
+        budget: RealTimeBudget | None = None,
+    ) -> dict[Key, Trace]:
+        """Run tests of rubrics and return their traces, in the same order; raises EnvironmentFault without pytest."""
+        return record_tests(self.recorder, jobs, progress, budget)
+
+    def install_shares(
+        self, root: Path, projects: Sequence[Project], prefix: Path
+    ) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Install the shared files of a staged submission's packages below a prefix.
+
+        Returns:
+            The folders of AMENT_PREFIX_PATH, none if there is no package; and sentences about what cannot be installed.
+        """
+        return install_shares(root, projects, prefix, self.ros)
+
     def _charged(
         self, jobs: Mapping[Key, Job], budget: RealTimeBudget, progress: Callable[[str], None], share: float = 1.0
     ) -> dict[Key, Trace]:
@@ -183,6 +232,28 @@ class RecordingSession:
             if keeps_pace(plain, trace) or (number == 0 and surely_slow()):
                 return replace(trace, notes=(*trace.notes, CHARGED_NOTE))
         return replace(held_up, harness_problem=held_up.harness_problem or UNCLEAR)
+
+
+def sandbox_here(wanted: str) -> TierChoice:
+    """Choose the sandbox that a session would use on this machine, which may be tested for it.
+
+    Args:
+        wanted: As for `open_session`.
+
+    Raises:
+        EnvironmentFault: This machine lacks ROS or the requested tier.
+    """
+    return choose_isolation(wanted, find_ros())
+
+
+def attempt_s(budget_s: float) -> float:
+    """Return the real time, in seconds, in which a session gives up what has a budget, and each worker that hangs."""
+    return budget_s + TRIES * MARGIN_S
+
+
+def runs_a_test() -> bool:
+    """Return whether this process runs the tests of a rubric: its programs run in the session of another process."""
+    return bool(os.environ.get(VARIABLE))
 
 
 def workers_for(processors: int, more: int = MORE_ALONE) -> int:

@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from grader.grading.judging.wording import listed, nearest
+from grader.grading.model.wording import listed, nearest
 from grader.runtime.message_classes import built, message_class
 from grader.runtime.model.author_files import line_of, words_of
 from grader.runtime.model.errors import GraderError, HarnessError, SubmissionError
@@ -26,9 +26,8 @@ from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.trace import Message
 from grader.runtime.plan import Plan, PlannedStart, derive
 from grader.runtime.recording.codec import from_json, observation_to_json, to_json
+from grader.runtime.session import TestJob, WorkerLostError
 from grader.runtime.steps import LaunchFailedError
-from grader.runtime.supervisor.supervisor import WorkerLostError
-from grader.runtime.supervisor.test_runs import TestJob
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
 from grader.world.programs import Found, Runnable
 from grader.world.world import World

@@ -13,12 +13,9 @@ from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
 
-from grader.grading.app.interface_packages import is_installed, modules_named
-from grader.grading.app.programs import package_of, workspace_of
-from grader.grading.app.ros_packages import LENDABLE
-from grader.runtime.interfaces.definitions import InterfacePackage, find_packages, shipped_packages
+from grader.runtime.interface_packages import InterfacePackage, is_brought, modules_named, unbuilt
 from grader.runtime.model.errors import GraderError
-from grader.runtime.ros_installation import find_ros
+from grader.runtime.programs.executables import package_of, workspace_of
 
 #: The largest file that is searched for the names of packages.
 MOST_BYTES = 1 << 20
@@ -35,8 +32,7 @@ def workspace_around(folder: Path) -> Path | None:
 
 @cache
 def _unbuilt(workspace: Path) -> tuple[InterfacePackage, ...]:
-    ros = find_ros(workspaces=True)
-    return tuple(package for package in find_packages(workspace) if not is_installed(package.name, ros))
+    return unbuilt(workspace)
 
 
 @cache
@@ -55,7 +51,7 @@ def modules_for(folder: Path) -> tuple[Path, ...]:
     paths = folder.glob("*.py") if workspace is None else workspace.rglob("*.py")
     sources = [path.read_bytes() for path in sorted(paths) if path.is_file() and path.stat().st_size <= MOST_BYTES]
     own = () if workspace is None else _unbuilt(workspace)
-    return modules_named(sources, own, find_ros(workspaces=True))
+    return modules_named(sources, own)
 
 
 def find_package(folder: Path, name: str, target: ModuleType | None = None) -> ModuleSpec | None:
@@ -82,9 +78,7 @@ def _places(folder: Path, name: str) -> tuple[Path, ...]:
     workspace = workspace_around(folder)
     if workspace is not None and name in {package.name for package in _unbuilt(workspace)}:
         return modules_for(folder)
-    if name in LENDABLE or name in {package.name for package in shipped_packages()}:
-        return modules_named([name.encode()], (), find_ros(workspaces=True))
-    return ()
+    return modules_named([name.encode()], ()) if is_brought(name) else ()
 
 
 def let_import(folders: Sequence[str]) -> None:

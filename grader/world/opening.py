@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault
-from grader.runtime.sandbox.choose import OWN_PROGRAMS
-from grader.runtime.session import RecordingSession, open_session
-from grader.runtime.supervisor.test_runs import VARIABLE
+from grader.runtime.session import OWN_PROGRAMS, RecordingSession, open_session, runs_a_test
 from grader.world.world import World
 
 
@@ -75,7 +72,7 @@ def open_worlds(folder: Path) -> Iterator[Worlds]:
     Raises:
         EnvironmentFault: This machine lacks ROS.
     """
-    if os.environ.get(VARIABLE):
+    if runs_a_test():
         raise EnvironmentFault("a test of a rubric runs programs in no world of its own", "use the fixture `ros`")
     with open_session(OWN_PROGRAMS, workers=1) as session:
         yield Worlds(session, folder)

@@ -10,15 +10,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
-from grader.grading.app.programs import package_of, workspace_of
-from grader.grading.judging.wording import listed, nearest
-from grader.grading.submissions.projects import read_projects
+from grader.grading.model.wording import listed, nearest
+from grader.grading.submissions.submission import read_projects
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.projects import Project
 from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.trace import Fault, LogRecord, OutputLine
-from grader.runtime.programs.executables import Executable, executables, find_executables
+from grader.runtime.programs.executables import Executable, executables, find_executables, package_of, workspace_of
 from grader.world.errors import NoMessage
 
 Value = TypeVar("Value")

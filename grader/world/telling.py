@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from grader.grading.judging.findings import explain_no_message, explain_no_server, explain_no_subscription, not_met
-from grader.grading.judging.wording import listed, moment, nearest, quote, span
 from grader.grading.model.exercise import Finding
+from grader.grading.model.wording import listed, moment, nearest, quote, span
 from grader.runtime.model.trace import (
     Delivery,
     Endpoint,

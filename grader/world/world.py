@@ -12,7 +12,6 @@ from pathlib import Path
 from random import Random
 from typing import Any, ParamSpec, TypeVar
 
-from grader.grading.app.programs import package_of
 from grader.runtime.message_classes import built, plain_fields
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
@@ -33,7 +32,7 @@ from grader.runtime.model.trace import (
     Trace,
 )
 from grader.runtime.plan import Plan, PlannedConnection, PlannedStart, derive, ros_arguments
-from grader.runtime.programs.shares import install_shares
+from grader.runtime.programs.executables import package_of
 from grader.runtime.serialization import (
     QoSProfile,
     parameter_message,
@@ -44,9 +43,9 @@ from grader.runtime.serialization import (
     type_name,
     type_of_part,
 )
-from grader.runtime.session import RecordingSession
+from grader.runtime.session import RecordingSession, SteppedRun
+from grader.runtime.simulation import Moment, Simulation
 from grader.runtime.simulation.loading import made
-from grader.runtime.simulation.participant import Moment, Simulation
 from grader.runtime.steps import (
     Advance,
     CallService,
@@ -59,8 +58,7 @@ from grader.runtime.steps import (
     Simulate,
     StartProcesses,
 )
-from grader.runtime.stimuli.goals import PlannedGoal
-from grader.runtime.supervisor.stepping import SteppedRun
+from grader.runtime.stimuli import PlannedGoal
 from grader.world import telling
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
 from grader.world.interfaces import let_import, modules_for
@@ -302,7 +300,7 @@ class World:
     def _plan_of(self, found: Found, start: PlannedStart, env: Mapping[str, str]) -> Plan:
         package = package_of(found.root / Path(found.file).parent) if found.projects else found.root
         installed = self.session.folder / f"installed_{derive(0, str(found.root))[:16]}"
-        prefixes, _ = install_shares(found.root, found.projects, installed, self.session.ros)
+        prefixes, _ = self.session.install_shares(found.root, found.projects, installed)
         return replace(
             self._plan,
             processes=((start.process, found.file),),

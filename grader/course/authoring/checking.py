@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.grading.app.bags import recordings_of
-from grader.grading.app.interface_packages import known_interfaces
+from grader.grading.app.interfaces import known_interfaces
 from grader.grading.app.test_files import collect_tests
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.tested import TESTED
@@ -19,15 +19,14 @@ from grader.grading.model.exercise import Criterion, Exercise, named, roles_of
 from grader.grading.rubrics.check_parameters import manual_of
 from grader.grading.rubrics.draws import First
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric
+from grader.grading.rubrics.mistakes import Mistake, TreePath, YamlTree, read_yaml
 from grader.grading.rubrics.simulations import Offered, offered
-from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlTree, read_yaml
-from grader.grading.submissions.collected import shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError, RecordingError, RubricError
 from grader.runtime.model.quantities import duration
 from grader.runtime.model.scenario import Scenario, is_launch_file, shortest
-from grader.runtime.stimuli.recorded import RecordedStream
-from grader.runtime.stimuli.simulation import Simulated
+from grader.runtime.model.wording import shown
+from grader.runtime.stimuli import RecordedStream, Simulated
 
 #: The points of a rubric should add up to a multiple of this, for easy arithmetic.
 ROUND = 5

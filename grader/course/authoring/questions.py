@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from grader.course.authoring.skeleton import DraftCriterion, DraftQuantity, as_id, in_seconds
 from grader.grading.judging.summary import summarise
 from grader.grading.judging.values import carries_number, leaves, student_endpoints
-from grader.grading.judging.wording import number
 from grader.grading.model.report import TopicSummary
+from grader.grading.model.wording import number
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S, counted, seconds
 from grader.runtime.model.trace import Delivery, Message, Offer, Trace

@@ -9,8 +9,8 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 
 from grader.grading.rubrics.schema import FILE
-from grader.grading.submissions.collected import listed
 from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.wording import listed
 
 
 @dataclass(frozen=True, slots=True)

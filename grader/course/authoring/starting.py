@@ -21,12 +21,12 @@ from grader.course.authoring.skeleton import (
 )
 from grader.grading.app.grade import Progress
 from grader.grading.app.inputs import FIRST_S, NOTHING, SentMessages, copied, period_s
-from grader.grading.app.interface_packages import known_interfaces
+from grader.grading.app.interfaces import known_interfaces
 from grader.grading.app.observe import ObserveRequest, undisturbed, watch
 from grader.grading.judging.findings import fault_sentence
 from grader.grading.judging.values import carries_number, student_endpoints
-from grader.grading.judging.wording import quote
 from grader.grading.model.exercise import Exercise
+from grader.grading.model.wording import quote
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric
 from grader.grading.rubrics.simulations import offered
@@ -35,7 +35,7 @@ from grader.runtime.model.errors import GraderError, RubricError, SubmissionErro
 from grader.runtime.model.quantities import NS_PER_S, seconds
 from grader.runtime.model.scenario import ODOMETRY, Scenario
 from grader.runtime.model.trace import FaultKind, Trace
-from grader.runtime.stimuli.simulation import Simulated
+from grader.runtime.stimuli import Simulated
 
 _VALUES = (1, 2, 3, 4)
 _CALLS = 3

@@ -11,11 +11,18 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
-from grader.grading.rubrics.mistakes import mistakes_of, nearest
-from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
-from grader.grading.submissions.collected import listed, shown
+from grader.grading.rubrics.mistakes import (
+    Mistake,
+    TreePath,
+    YamlSyntaxError,
+    YamlTree,
+    mistakes_of,
+    nearest,
+    read_yaml,
+)
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError
+from grader.runtime.model.wording import listed, shown
 
 #: A file of some thousand students with reasons has less.
 MAX_BYTES = 1 << 20

@@ -7,11 +7,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePath
 
-from grader.course.classroom.gradebook import Gradebook, Row, Status, decision_line, exactly, exercises_of, remarks
-from grader.course.classroom.roster import Person
-from grader.course.classroom.store import Conditions
-from grader.course.classroom.watching import clock_time
-from grader.grading.reporting.class_page.contents import (
+from grader.course.class_page.class_links import ClassLinks
+from grader.course.class_page.contents import (
     ClassPage,
     Listing,
     PageEntry,
@@ -20,8 +17,11 @@ from grader.grading.reporting.class_page.contents import (
     RunFacts,
     StudentRow,
 )
-from grader.grading.reporting.class_page.render import REPORT_PAGE, result_link
-from grader.grading.reporting.html.class_links import ClassLinks
+from grader.course.class_page.render import REPORT_PAGE, result_link
+from grader.course.classroom.gradebook import Gradebook, Row, Status, decision_line, exactly, exercises_of, remarks
+from grader.course.classroom.roster import Person
+from grader.course.classroom.store import Conditions
+from grader.course.classroom.watching import clock_time
 from grader.grading.reporting.json_report import ReportData
 from grader.runtime.model.checkup import NO_SANDBOX
 from grader.runtime.model.dataclass import dataclass

@@ -16,6 +16,8 @@ from functools import partial
 from pathlib import Path
 
 import grader
+from grader.course.class_page.class_links import with_class_links
+from grader.course.class_page.contents import PageLink
 from grader.course.classroom.adjustments import Adjustments, read_adjustments, with_criteria
 from grader.course.classroom.class_page import RunOfClass, folders_of, links_between, title_of, without_folders
 from grader.course.classroom.final_marks import MARK, dump_mark, kept_mark, shown_mark
@@ -43,20 +45,28 @@ from grader.course.similarity.library import ComparedProgram, Handed, Similar
 from grader.course.similarity.pages import MOST_PAGES, OVERVIEW, page_name, render_overview, render_pair, render_table
 from grader.grading.app.bags import read_given, read_recordings, recordings_digest
 from grader.grading.app.grade import read_exercises, wanted_files
-from grader.grading.app.interface_packages import offered_digest
+from grader.grading.app.interfaces import rubric_folders
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.seeds import kept_key
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.grading_options import GradingOptions, values
-from grader.grading.reporting.class_page.contents import PageLink
 from grader.grading.reporting.escape import json_value
-from grader.grading.reporting.html.class_links import with_class_links
 from grader.grading.reporting.html.final_mark import render_refusal, with_final_mark
 from grader.grading.reporting.json_report import ReportData
 from grader.grading.reporting.rejudged import ReportChange, change, render_changes_table
 from grader.grading.rubrics.draws import First
+from grader.runtime.interface_packages import offered_digest
 from grader.runtime.model.errors import ClassError, GraderError, HarnessError, SubmissionError
 from grader.runtime.temp_dirs import scratch_folder
+
+__all__ = [
+    "ClassRequest",
+    "Status",
+    "compare_class",
+    "conditions_of",
+    "grade_class",
+    "link_of_earlier_run",
+]
 
 SIMILARITY_FOLDER, SIMILARITY_TABLE = "similarity", "similarity.csv"
 #: Adjustments in the results folder, which count where no others are named.
@@ -154,7 +164,7 @@ def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Condi
         rubrics=tuple((exercise.id, exercise.digest) for exercise in exercises),
         recording=recordings_digest(read_given(grading, read_recordings(grading, exercises))),
         options=GradingOptions(**values(grading)),
-        interfaces=offered_digest(grading.interfaces, exercises),
+        interfaces=offered_digest(grading.interfaces, rubric_folders(exercises)),
     )
 
 

@@ -15,19 +15,23 @@ from pathlib import Path
 
 from grader.grading.submissions.archives import (
     ARCHIVE_SUFFIXES,
+    FILE,
+    FOLDER,
     HEAD_BYTES,
+    Member,
+    UnusableArchiveError,
     archive_kind,
     is_tar,
     tar_members,
     unpacked,
     zip_members,
 )
-from grader.grading.submissions.collected import collision, is_skipped, listed, name_problem, shown, why_skipped
-from grader.grading.submissions.members import FILE, FOLDER, Member, UnusableArchiveError
+from grader.grading.submissions.collected import collision, is_skipped, name_problem, why_skipped
 from grader.runtime.files import write_whole
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, HarnessError
 from grader.runtime.model.limits import MAX_ARCHIVE_BYTES
+from grader.runtime.model.wording import listed, shown
 
 #: Groups that a pattern may have; with `file`, several files of one student form one submission.
 GROUPS = ("name", "user", "email", "id", "late", "file")

@@ -28,8 +28,7 @@ from grader.grading.rubrics.draws import Recorded
 from grader.grading.submissions.submission import collect_submission, stage_collected, stage_submission
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, GraderError, HarnessError, SubmissionError, VariantError
-from grader.runtime.session import MORE_IN_CLASS, workers_for
-from grader.runtime.supervisor.supervisor import MARGIN_S, TRIES
+from grader.runtime.session import MORE_IN_CLASS, attempt_s, workers_for
 from grader.runtime.temp_dirs import scratch_folder
 
 #: Values of `--rerun`; each includes new and changed submissions.
@@ -121,7 +120,7 @@ def is_due(kept: Kept, key: str, rerun: str) -> bool:
 
 def deadline_s(budget_s: float) -> float:
     """Return the real time after which an attempt is killed; all its inner limits have expired by then."""
-    return budget_s + TRIES * MARGIN_S + _BEYOND_S
+    return attempt_s(budget_s) + _BEYOND_S
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,11 @@ from pathlib import Path
 
 from grader.course.classroom.downloads import AUTO, PATTERNS, DownloadLayout, Named, layout_of, unpack_download
 from grader.grading.submissions.archives import ARCHIVE_SUFFIXES
-from grader.grading.submissions.collected import is_skipped_file, is_skipped_folder, name_problem, shown, why_skipped
-from grader.grading.submissions.staging import read_start
+from grader.grading.submissions.collected import is_skipped_file, is_skipped_folder, name_problem, why_skipped
+from grader.grading.submissions.submission import read_start
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, HarnessError, SubmissionError
+from grader.runtime.model.wording import shown
 
 #: Longest name, in bytes of UTF-8, not counting the suffix that makes it unique.
 MAX_BYTES = 80

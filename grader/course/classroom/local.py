@@ -22,9 +22,7 @@ from grader.course.classroom import store as kept
 from grader.course.classroom.store import Conditions, ResultStatus, State
 from grader.runtime.model.checkup import NO_SANDBOX, missing
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.ros_installation import find_ros
-from grader.runtime.sandbox.choose import choose_isolation
-from grader.runtime.session import WALL
+from grader.runtime.session import WALL, sandbox_here
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +106,7 @@ class LocalScheduler:
 
     def prepare(self, isolation: str) -> Sequence[str]:
         """Find ROS and test the sandbox; see `ClassScheduler`."""
-        choice = choose_isolation(isolation, find_ros())
+        choice = sandbox_here(isolation)
         name = choice.isolation.name
         warnings = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
         if choice.isolation.shares_network and name != NO_SANDBOX:

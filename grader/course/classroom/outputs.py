@@ -8,6 +8,8 @@ from dataclasses import field
 from fractions import Fraction
 from pathlib import Path
 
+from grader.course.class_page.contents import PageLink
+from grader.course.class_page.render import class_assets, render_class
 from grader.course.classroom.class_page import RunOfClass, class_page
 from grader.course.classroom.gradebook import Gradebook, Row, Status, decision_line, number, remarks, render_gradebook
 from grader.course.classroom.platforms import (
@@ -20,8 +22,6 @@ from grader.course.classroom.platforms import (
 )
 from grader.course.classroom.roster import Table, read_table
 from grader.grading.model.report import JsonObject
-from grader.grading.reporting.class_page.contents import PageLink
-from grader.grading.reporting.class_page.render import class_assets, render_class
 from grader.grading.reporting.escape import json_value, shown
 from grader.grading.reporting.json_report import json_text
 from grader.grading.reporting.rejudged import ReportChange, change_summary

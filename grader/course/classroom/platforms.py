@@ -13,9 +13,9 @@ from grader.course.classroom.gradebook import Gradebook, Row, exercises_of, numb
 from grader.course.classroom.roster import Person, Table, row_of
 from grader.grading.reporting.escape import shown as safe
 from grader.grading.reporting.json_report import CriterionData, json_text
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError
+from grader.runtime.model.wording import listed, shown
 
 #: The columns that Canvas requires before the scores, in this order.
 CANVAS_COLUMNS = ("Student", "ID", "SIS User ID", "SIS Login ID", "Section")

@@ -29,15 +29,14 @@ from grader.course.classroom.store import ResultStatus, State
 from grader.grading.model.grading_options import paths
 from grader.runtime.model.checkup import NO_SANDBOX, missing
 from grader.runtime.model.errors import EnvironmentFault, GraderError, HarnessError
-from grader.runtime.ros_installation import find_ros
-from grader.runtime.sandbox.choose import TierChoice, choose_isolation
+from grader.runtime.session import TierChoice, sandbox_here
 from grader.runtime.temp_dirs import scratch_folder
 
 
 def fitness(isolation: str, machine: str) -> Fitness:
     """Find out whether this machine can grade in the requested sandbox."""
     try:
-        choice = choose_isolation(isolation, find_ros())
+        choice = sandbox_here(isolation)
     except EnvironmentFault as fault:
         return Fitness(machine, fault.message, fault.hint)
     except Exception as error:  # any failure makes this machine unfit, but not the others
@@ -52,7 +51,7 @@ def fitness(isolation: str, machine: str) -> Fitness:
 def grade_job(terms: Terms, job: GradingJob, machine: str, on_step: Callable[[str], None]) -> JobResult:
     """Grade a submission in its own process, in a sandbox chosen here; an exception of `on_step` aborts it."""
     try:
-        choice = choose_isolation(terms.conditions.options.isolation, find_ros())
+        choice = sandbox_here(terms.conditions.options.isolation)
     except EnvironmentFault as fault:
         return JobResult(machine, unfit=fault.message, hint=fault.hint)
     try:

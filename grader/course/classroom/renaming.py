@@ -11,10 +11,10 @@ from pathlib import Path, PurePosixPath
 from grader.course.classroom.adjustments import Decision
 from grader.course.classroom.intake import HandedInEntry
 from grader.grading.rubrics.mistakes import nearest
-from grader.grading.submissions.collected import Collected, first_of, shown
-from grader.grading.submissions.staging import write_files
-from grader.grading.submissions.submission import every_file
+from grader.grading.submissions.collected import Collected
+from grader.grading.submissions.submission import every_file, write_files
 from grader.runtime.model.errors import ClassError, SubmissionError
+from grader.runtime.model.wording import first_of, shown
 
 _RENAMED = "renamed"
 

@@ -13,9 +13,9 @@ from fractions import Fraction
 from pathlib import Path
 
 from grader.course.classroom.intake import HandedInEntry
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError
+from grader.runtime.model.wording import listed, shown
 
 #: Largest CSV file that is read, and most rows.
 MAX_BYTES = 8 << 20

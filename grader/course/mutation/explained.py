@@ -12,11 +12,18 @@ from typing import Annotated, Literal, NoReturn
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
 from grader.grading.model.exercise import Exercise
-from grader.grading.rubrics.mistakes import mistakes_of, nearest
-from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
-from grader.grading.submissions.collected import listed, shown
+from grader.grading.rubrics.mistakes import (
+    Mistake,
+    TreePath,
+    YamlSyntaxError,
+    YamlTree,
+    mistakes_of,
+    nearest,
+    read_yaml,
+)
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
+from grader.runtime.model.wording import listed, shown
 
 SCHEMA = "grader/selftest-notes/v1"
 MAX_BYTES = 256 * 1024

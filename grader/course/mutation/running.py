@@ -29,22 +29,27 @@ from grader.course.mutation.results import (
 )
 from grader.grading.app.bags import Recordings, read_recordings
 from grader.grading.app.grade import Progress, plan_jobs, plan_tests, read_exercises
-from grader.grading.app.interface_packages import provide
+from grader.grading.app.interfaces import provided_for
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.seeds import PRACTICE
 from grader.grading.judging.judge_run import judge_exercise
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.rubric_files import notes_on, rubric_file
-from grader.grading.submissions.collected import shown
 from grader.grading.submissions.sources import read_sources
 from grader.grading.submissions.submission import stage_submission
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
-from grader.runtime.session import RecordingSession, open_session
-from grader.runtime.supervisor.supervisor import Job
-from grader.runtime.supervisor.test_runs import TestJob, record_tests
+from grader.runtime.model.wording import shown
+from grader.runtime.session import Job, RecordingSession, TestJob, open_session
+
+__all__ = [
+    "SelftestOptions",
+    "SelftestResult",
+    "TrialRunner",
+    "selftest",
+]
 
 #: Programs per worker that are recorded before they are judged; limited because traces are large.
 _AT_ONCE = 6
@@ -71,7 +76,7 @@ class TrialRunner:
         """Grade a complete submission; the traces are those of its scenarios."""
         jobs = plan_jobs(self.request, [self.exercise], submission, self.bags, self.seed, self.interfaces)
         recorded = self.session.record(jobs, self.request.clock, self.progress)
-        recorded |= record_tests(self.session.recorder, self._tests(submission), self.progress)
+        recorded |= self.session.record_tests(self._tests(submission), self.progress)
         self.recordings += len(recorded)
         traces = {scenario: trace for (_, scenario), trace in recorded.items()}
         return result_of(judge_exercise(self.exercise, traces, submission, read_sources(submission))), traces
@@ -90,7 +95,7 @@ class TrialRunner:
             }
             recorded = self.session.record(jobs, self.request.clock, self.progress)
             tests = {(c.id, key[1]): job for c in chunk for key, job in self._tests(submissions[c.id]).items()}
-            recorded |= record_tests(self.session.recorder, tests, self.progress)
+            recorded |= self.session.record_tests(tests, self.progress)
             self.recordings += len(recorded)
             for candidate in chunk:
                 own = {scenario: trace for (id_, scenario), trace in recorded.items() if id_ == candidate.id}
@@ -181,7 +186,7 @@ def _bench(  # noqa: PLR0913  each comes from a different stage
         reference=reference,
         sources=_sources(reference, exercise),
         progress=progress,
-        interfaces=provide(session, [exercise], (), reference).folders,
+        interfaces=provided_for(session, [exercise], (), reference).folders,
         workers=options.jobs or 1,
     )
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from grader.course.mutation.explained import SCHEMA
 from grader.course.mutation.results import SelftestResult, Trial
 from grader.grading.model.rubric_files import notes_on
-from grader.grading.submissions.collected import shown
 from grader.runtime.model.errors import GraderError
+from grader.runtime.model.wording import shown
 
 #: Most lines of a change that stand above an entry.
 _MOST_LINES = 8

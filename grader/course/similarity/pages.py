@@ -10,8 +10,8 @@ from functools import cache
 from jinja2 import Template
 from markupsafe import Markup
 
+from grader.course.class_page.render import REPORT_PAGE, result_link
 from grader.course.similarity.library import Handed, Side, Similar
-from grader.grading.reporting.class_page.render import REPORT_PAGE, result_link
 from grader.grading.reporting.escape import csv_cell, shown
 from grader.grading.reporting.html.assets import bundle, page_environment
 from grader.runtime.model.dataclass import dataclass

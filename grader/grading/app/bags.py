@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 from grader.grading.model.exercise import Exercise, recordings_in
 from grader.grading.rubrics.builtin import builtin_recording
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.compiled import compiled, state_of
 from grader.runtime.model.errors import RecordingError
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import ODOMETRY
+from grader.runtime.model.wording import listed, shown
 from grader.runtime.recording.bag import BagMinimum, Define, read_bag, topics_in
 from grader.runtime.shipped import PACKAGE, shipped
-from grader.runtime.stimuli.recorded import RecordedStream, Recording
+from grader.runtime.stimuli import RecordedStream, Recording
 
 if TYPE_CHECKING:
     from grader.grading.app.request import GradeRequest
@@ -124,7 +124,7 @@ def _define(folders: tuple[Path, ...]) -> Define:
 
     def definition(type_: str) -> str | None:
         # Takes long, and is seldom needed.
-        from grader.grading.app.interface_packages import known_interfaces  # noqa: PLC0415
+        from grader.grading.app.interfaces import known_interfaces  # noqa: PLC0415
 
         known = known_interfaces(folders)
         found = known.definition(type_) if known is not None else None

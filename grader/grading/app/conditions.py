@@ -24,14 +24,10 @@ from grader.grading.model.conditions import (
     USUAL,
     ZONE,
 )
+from grader.runtime import machine
 from grader.runtime.model.checkup import missing
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault
-from grader.runtime.ros_installation import find_ros
-from grader.runtime.sandbox.choose import inspect_tier
-from grader.runtime.sandbox.exposure import some_user
-from grader.runtime.sandbox.protocol import Isolation
-from grader.runtime.sandbox.tiers import isolation_from_name
 
 #: Busy loops for each processor under `load`: a node then gets a third of one.
 LOOPS = 2
@@ -69,13 +65,13 @@ class Surroundings:
     processors: tuple[int, ...]  # that may be used
     is_root: bool
     python: str  # the interpreter that another user has to start
-    tier: Callable[[str], Isolation]  # returns a sandbox by its name; raises EnvironmentFault if it is not there
+    can_fork: Callable[[str], bool]  # whether a sandbox can fork nodes; raises EnvironmentFault if it is not there
 
 
 def surroundings() -> Surroundings:
     """Return those of this process."""
     processors = tuple(sorted(os.sched_getaffinity(0)))
-    return Surroundings(processors, os.geteuid() == 0, sys.executable, isolation_from_name)
+    return Surroundings(processors, os.geteuid() == 0, sys.executable, machine.can_fork)
 
 
 #: The first recording, which the others are compared with.
@@ -112,7 +108,7 @@ def _processors(isolation: str, here: Surroundings) -> VerifyCondition:
 
 
 def _executed(isolation: str, here: Surroundings) -> VerifyCondition:
-    forks = here.tier(isolation).can_fork
+    forks = here.can_fork(isolation)
     lacks = "" if forks else f"in the sandbox {isolation}, each is executed anyway"
     return VerifyCondition(EXECUTED, "each program executed, not forked", lacks, executes=True)
 
@@ -122,7 +118,7 @@ def _user(isolation: str, here: Surroundings) -> VerifyCondition:
     words = "as another user"
     if not here.is_root:
         return VerifyCondition(USER, words, "only root can become another user")
-    user = some_user()
+    user = machine.other_user()
     return VerifyCondition(USER, words, _unreachable(user, here.python), isolation="auto", user=user)
 
 
@@ -149,8 +145,8 @@ def _sandbox(name: str, here: Surroundings, *, asked: bool) -> VerifyCondition:
     """Return the condition of another sandbox; unless asked for, only one that holds completely is tried."""
     words = f"in the sandbox {name}"
     try:
-        here.tier(name)
-        report = inspect_tier(name, find_ros())
+        here.can_fork(name)
+        report = machine.sandbox(name)
     except EnvironmentFault as fault:
         return VerifyCondition(name, words, fault.message.partition(": ")[2], isolation=name)
     open_ones = [found.name for found in missing(report.properties)]
@@ -161,7 +157,7 @@ def _sandbox(name: str, here: Surroundings, *, asked: bool) -> VerifyCondition:
 
 
 def _together(isolation: str, here: Surroundings) -> VerifyCondition:
-    forks = here.tier(isolation).can_fork
+    forks = here.can_fork(isolation)
     return VerifyCondition(
         TOGETHER,
         "in another order, on one processor, elsewhere, with other hashes" + ", executed" * forks,

@@ -4,28 +4,21 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from grader.grading.app.grade import Progress
-from grader.grading.app.interface_packages import described
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.model import entry_points
 from grader.grading.model.report import Summary
 from grader.grading.reporting.formats import EVIDENCE, FORMATS, format_of
 from grader.grading.submissions.foreign_archives import install_command, is_installed
-from grader.runtime.machine import software, system, weaknesses
+from grader.runtime import machine
+from grader.runtime.interface_packages import described
 from grader.runtime.model.checkup import NO_SANDBOX, Checkup, Exchange, Fact, TierReport
 from grader.runtime.model.errors import EnvironmentFault, GraderError
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.ros_installation import RosInstallation, find_ros
-from grader.runtime.sandbox.bubblewrap import ENTERABLE
-from grader.runtime.sandbox.choose import inspect_tiers, sandbox_memory
-from grader.runtime.sandbox.tiers import is_for_others, isolation_from_name
-from grader.runtime.supervisor.byte_code import byte_code
-from grader.runtime.supervisor.memory_groups import group_fact
-from grader.runtime.weaknesses import repaired_here
 
 #: Messages that the trial node sends, one every 0.1 s starting at 0.1 s, and how long it is observed.
 TRIAL_MESSAGES = 10
@@ -48,18 +41,19 @@ rclpy.spin(node)
 Look = Callable[[ObserveRequest, Progress], Summary]
 
 
-def examine(progress: Progress, find: Callable[[], RosInstallation] = find_ros) -> Checkup:
+def examine(progress: Progress, find: Callable[[], machine.Found] = machine.ros_here) -> Checkup:
     """Find out what this machine can do; takes a few seconds."""
     progress("looking for ROS 2")
-    ros, lack = _ros(find)
-    known = weaknesses(ros, repaired_here())
-    facts = (*software(ros), *lack, *system(), *known, _archives(), *_interfaces(ros), *_added())
+    ros, lack = find()
+    known = machine.weaknesses_here(ros)
+    own = () if ros is None else _interfaces(ros.distro)
+    facts = (*machine.software(ros), *lack, *machine.system(), *known, _archives(), *own, *_added())
     if ros is None:
         return Checkup(facts, None, (), "", "", Limits())
     progress("looking at the byte code")
-    facts += (byte_code(ros.runtime), group_fact(), sandbox_memory(ros))
+    facts += machine.prepared(ros)
     progress("trying every sandbox")
-    return concluded(facts, inspect_tiers(ros), progress)
+    return concluded(facts, machine.sandboxes(ros), progress)
 
 
 def concluded(
@@ -75,26 +69,10 @@ def concluded(
     """
     used = next((tier.name for tier in tiers if tier.usable), "")
     tier = used or NO_SANDBOX
-    facts += (node_start(tier, can_fork=isolation_from_name(tier).can_fork),)
+    facts += (machine.node_start(tier, can_fork=machine.can_fork(tier)),)
     progress("exchanging messages")
     exchange = _exchange(tier, progress, look)
-    return Checkup(facts, exchange, tiers, used, "" if used else _remedy(tiers), Limits())
-
-
-def _ros(find: Callable[[], RosInstallation]) -> tuple[RosInstallation | None, tuple[Fact, ...]]:
-    """Find the ROS installation, or report as a fact why it cannot be used."""
-    try:
-        return find(), ()
-    except EnvironmentFault as fault:
-        return None, (Fact("ROS 2", fault.message.removeprefix("ROS 2: "), fits=False, remedy=fault.hint),)
-
-
-def node_start(tier: str, *, can_fork: bool) -> Fact:
-    """Report how students' nodes are started in a tier."""
-    if can_fork:
-        return Fact("start of nodes", "each is forked from a process that has imported ROS")
-    text = "each executes Python and imports ROS, which takes longer: to be forked"
-    return Fact("start of nodes", f"{text} into {tier}, it needs Linux {'.'.join(map(str, ENTERABLE))} or newer")
+    return Checkup(facts, exchange, tiers, used, "" if used else machine.easiest_remedy(tiers), Limits())
 
 
 def _archives() -> Fact:
@@ -104,17 +82,13 @@ def _archives() -> Fact:
     return Fact("archives", "zip and tar; .rar and .7z need libarchive", remedy=install_command())
 
 
-def _interfaces(ros: RosInstallation | None) -> tuple[Fact, ...]:
+def _interfaces(distro: str) -> tuple[Fact, ...]:
     """Report whether interface packages can be built, and which ones are ready."""
-    if ros is None:
-        return ()
     try:
         ready = [package.name for package in described(()) if package.folder]
     except (GraderError, ImportError) as error:
         text = error.message if isinstance(error, GraderError) else str(error)
-        hint = (
-            f"install the generators: pip install ros-{ros.distro}-rosidl-generator-py ros-{ros.distro}-rosidl-parser"
-        )
+        hint = f"install the generators: pip install ros-{distro}-rosidl-generator-py ros-{distro}-rosidl-parser"
         return (Fact("interfaces", f"packages cannot be built here: {text}", fits=False, remedy=hint),)
     text = "built from their definitions, without a compiler"
     return (Fact("interfaces", f"{text}; ready: {', '.join(ready)}" if ready else text),)
@@ -150,12 +124,6 @@ def _added_scheduler(name: str, package: str) -> Fact:
     except EnvironmentFault as fault:
         return Fact("class scheduler", fault.message, remedy=fault.hint)
     return Fact("class scheduler", f"{name} of {package}")
-
-
-def _remedy(tiers: Sequence[TierReport]) -> str:
-    """Return the easiest fix; running as another user comes last, because it takes the most effort."""
-    ordered = sorted(tiers, key=lambda tier: is_for_others(tier.name))
-    return next((tier.remedy for tier in ordered if tier.remedy), "")
 
 
 def _exchange(tier: str, progress: Progress, look: Look) -> Exchange:

@@ -21,7 +21,7 @@ from grader.grading.rubrics.units import format_quantity
 from grader.runtime.model.errors import GraderError
 from grader.runtime.model.quantities import Unit, duration
 from grader.runtime.model.scenario import Connection, Scenario
-from grader.runtime.stimuli.phrases import time_phrase
+from grader.runtime.stimuli import time_phrase
 
 #: Most names suggested for an unknown one.
 OFFERED = 3

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 import grader
 from grader.grading.app.bags import Recordings, read_given, read_recordings, recordings_digest, refuse_unplayed
-from grader.grading.app.interface_packages import Provided, definitions, known_interfaces, provide
+from grader.grading.app.interfaces import definitions, known_interfaces, provided_for
 from grader.grading.app.request import GradeRequest, reproduction
 from grader.grading.app.seeds import PRACTICE_NOTE
 from grader.grading.app.spot_checks import SpotChecks, check
@@ -23,20 +23,25 @@ from grader.grading.model.exercise import Exercise, exercise_name
 from grader.grading.model.report import Environment, Report
 from grader.grading.model.run import Run
 from grader.grading.rubrics.builtin import builtin_exercises, exercise_ids
-from grader.grading.submissions.collected import listed, shown
 from grader.grading.submissions.sources import HASHES, read_reaches, read_sources
 from grader.grading.submissions.submission import stage_collected, stage_submission
+from grader.runtime.interface_packages import Provided
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EvidenceError, SubmissionError
 from grader.runtime.model.releases import TRIED
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
+from grader.runtime.model.wording import listed, shown
 from grader.runtime.plan import derive, known_programs, plan_scenario
-from grader.runtime.programs.shares import install_shares
-from grader.runtime.session import AUTO, NO_ISOLATION, RecordingSession, planned_clock
-from grader.runtime.supervisor.real_time_budget import RealTimeBudget
-from grader.runtime.supervisor.supervisor import Job
-from grader.runtime.supervisor.test_runs import TestJob, record_tests
+from grader.runtime.session import (
+    AUTO,
+    NO_ISOLATION,
+    Job,
+    RealTimeBudget,
+    RecordingSession,
+    TestJob,
+    planned_clock,
+)
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
@@ -102,7 +107,7 @@ def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
         first = None if later else take
         budget = RealTimeBudget(request.time_budget_s, spent_s=ready.provided.spent_s)
         traces = session.record(ready.jobs, request.clock, progress, first, budget=budget)
-        tested = record_tests(session.recorder, ready.tests, progress, budget)
+        tested = session.record_tests(ready.tests, progress, budget)
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
@@ -153,14 +158,14 @@ def prepared(
         played = recordings_digest(read_given(request, recordings))
         seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
         environment = environment_of(session)
-        provided = provide(session, exercises, request.interfaces, submission, request.time_budget_s)
+        provided = provided_for(session, exercises, request.interfaces, submission, request.time_budget_s)
         submission = replace(submission, notes=(*submission.notes, *provided.problems))
         kept = _kept(request, exercises, submission, played, seed, environment, provided.offered)
         done = {exercise for exercise, _ in kept}
         unrecorded = [exercise for exercise in exercises if exercise.id not in done]
         prefixes: tuple[str, ...] = ()
         if unrecorded:
-            prefixes, problems = install_shares(submission.root, submission.projects, Path(prefix), session.ros)
+            prefixes, problems = session.install_shares(submission.root, submission.projects, Path(prefix))
             submission = replace(submission, notes=(*submission.notes, *problems))
         reaches = read_reaches(submission.root)
         folders, own_hashes = provided.folders, not HASHES.isdisjoint(reaches)

@@ -12,14 +12,14 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from grader.grading.app.interface_packages import known_interfaces
+from grader.grading.app.interfaces import known_interfaces
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric
 from grader.grading.rubrics.yaml_tree import YamlSyntaxError, read_yaml
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError, RubricError
 from grader.runtime.model.scenario import Stimulus
-from grader.runtime.simulation.robots import SIMULATIONS
+from grader.runtime.model.wording import listed, shown
+from grader.runtime.simulation import SIMULATIONS
 
 #: Time before the first message, in seconds, to observe how the nodes wait.
 FIRST_S = 1.0

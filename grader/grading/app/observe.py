@@ -9,26 +9,23 @@ from pathlib import Path
 from grader.grading.app.bags import observed, recordings_of
 from grader.grading.app.grade import Progress
 from grader.grading.app.inputs import NamedSimulation, SentMessages, messages, simulated
-from grader.grading.app.interface_packages import provide
 from grader.grading.app.programs import find_targets, stage
 from grader.grading.app.seeds import PRACTICE
 from grader.grading.judging.summary import summarise
 from grader.grading.judging.values import student_endpoints
 from grader.grading.model.report import Summary
 from grader.grading.submissions.sources import source_text
+from grader.runtime.interface_packages import provide
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
-from grader.runtime.model.limits import Limits
+from grader.runtime.model.limits import MOST_LAUNCHED, Limits
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import Scenario, Span, is_launch_file
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
 from grader.runtime.plan import plan_scenario
-from grader.runtime.programs.shares import install_shares
-from grader.runtime.session import open_session, planned_clock
-from grader.runtime.stimuli.recorded import RecordedStream
-from grader.runtime.supervisor.supervisor import Job
-from grader.runtime.worker.launching import NODES
+from grader.runtime.session import Job, open_session, planned_clock
+from grader.runtime.stimuli import RecordedStream
 
 #: When a given recording starts playing; before that the nodes receive nothing of it.
 RECORDED_AFTER_NS = NS_PER_S
@@ -90,9 +87,9 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         submission = stage(targets, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, recordings=recordings, clock=clock)
-        provided = provide(session, (), request.interfaces, submission)
+        provided = provide(session, submission, course=request.interfaces)
         installed = session.folder / "installed"
-        prefixes, _ = install_shares(submission.root, submission.projects, installed, session.ros)
+        prefixes, _ = session.install_shares(submission.root, submission.projects, installed)
         plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)
         trace = session.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
         sources = _sources(trace, submission)
@@ -115,6 +112,6 @@ def undisturbed(request: ObserveRequest, names: Sequence[str]) -> Scenario:
     """Return the scenario of programs with the simulations and the recording of a request, and no messages."""
     played = observed(request.bags, RECORDED_AFTER_NS, max(NS_PER_S, request.duration_ns - RECORDED_AFTER_NS))
     stimuli = (*simulated(request.simulations, request.interfaces), *played)
-    launched = sum(map(is_launch_file, names)) * NODES
+    launched = sum(map(is_launch_file, names)) * MOST_LAUNCHED
     limits = Limits(participants=Limits().participants + len(names) + launched)
     return Scenario("observed", tuple(names), Span(request.duration_ns), stimuli, limits=limits)

@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from grader.grading.submissions.collected import Collected, first_of, listed
+from grader.grading.submissions.collected import Collected
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.submission import collect_submission, stage_collected, stage_submission
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.projects import Project
 from grader.runtime.model.submission import Submission
-from grader.runtime.programs.executables import executables, find_executables
+from grader.runtime.model.wording import first_of, listed
+from grader.runtime.programs.executables import executables, find_executables, package_of, workspace_of
 
 #: What can be named.
 _WHAT = "name .py files, launch files, packages, workspaces, FOLDER/EXECUTABLE or FOLDER/PACKAGE/EXECUTABLE"
@@ -22,8 +23,6 @@ _WHAT = "name .py files, launch files, packages, workspaces, FOLDER/EXECUTABLE o
 _SHOWN = 12
 #: The most programs that are observed together: each is a process with a sandbox, 70 MB and a DDS participant.
 MOST_PROGRAMS = 40
-#: How far above a package the folder `src` of its workspace may be: packages lie in it or in a repository in it.
-MOST_LEVELS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,16 +184,3 @@ def _stage_apart(targets: Sequence[Target], into: Path) -> Submission:
                 f"{name}: expected a file of the submission, found one in a folder that a tool created"
             )
     return submission
-
-
-def package_of(folder: Path) -> Path:
-    """Return the package that a folder is in; the folder itself if it is in none."""
-    return next((up for up in (folder, *folder.parents) if (up / "package.xml").is_file()), folder)
-
-
-def workspace_of(package: Path) -> Path:
-    """Return the folder with the packages that one may need: the `src` above it, or the next if it holds others."""
-    source = next((up for up in package.parents[:MOST_LEVELS] if up.name == "src"), package.parent)
-    found = (manifest for level in ("*", "*/*") for manifest in source.glob(f"{level}/package.xml"))
-    beside = (manifest for manifest in found if manifest.parent != package)
-    return source if (package / "package.xml").is_file() and any(beside) else package

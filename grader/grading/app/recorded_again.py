@@ -24,7 +24,6 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
 from grader.runtime.recording.codec import beside_trace, from_json, trace_to_json
 from grader.runtime.session import AUTO, RecordingSession, open_session
-from grader.runtime.supervisor.test_runs import record_tests
 
 #: As the command line does: imports make many objects and no garbage.
 COLLECT_AFTER = 200_000
@@ -100,7 +99,7 @@ def _recorded(session: RecordingSession, recordings: Recordings, number: int) ->
             jobs = {key: ready.jobs[key] for key in (reversed(keys) if recordings.reverses else keys)}
             traces = session.record(jobs, AUTO, lambda _: None, on_wall=False)
             tests = {key: job for key, job in ready.tests.items() if not wanted.scenarios or key in wanted.scenarios}
-            traces |= record_tests(session.recorder, tests, lambda _: None)
+            traces |= session.record_tests(tests, lambda _: None)
             lines = [
                 {
                     "number": number,

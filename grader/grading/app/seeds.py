@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.grading.model.exercise import Drawn, Exercise, Value
-from grader.grading.submissions.collected import shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import KeyFileError, VariantError
+from grader.runtime.model.wording import shown
 
 if TYPE_CHECKING:
     from grader.grading.rubrics.draws import Options

@@ -15,8 +15,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import ClockKind, Trace
 from grader.runtime.plan import Plan, derive
-from grader.runtime.session import WALL
-from grader.runtime.supervisor.supervisor import Job
+from grader.runtime.session import WALL, Job
 
 if TYPE_CHECKING:
     from grader.grading.judging.beginnings import BeginningJudge

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader.grading.app.interface_packages import modules_for
+from grader.grading.app.interfaces import modules_for
 from grader.grading.model.exercise import Exercise
-from grader.grading.submissions.collected import shown
 from grader.runtime.model.errors import RubricError
-from grader.runtime.supervisor.test_runs import collected_tests
+from grader.runtime.model.wording import shown
+from grader.runtime.session import collected_tests
 
 
 def collect_tests(path: Path, exercise: Exercise, course: tuple[Path, ...] = ()) -> None:

@@ -23,11 +23,11 @@ from grader.grading.evidence.store import Evidence, open_evidence, run_of
 from grader.grading.judging.repetition import events, first_difference
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.verification import ConditionState, Difference, LeftOutScenario, Place, Tried, Verification
-from grader.grading.submissions.collected import shown
 from grader.grading.submissions.submission import collect_submission, stage_collected
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EvidenceError, HarnessError
 from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.wording import shown
 from grader.runtime.recording.codec import to_json
 from grader.runtime.recording.packed import trace_from_json
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 
-from grader.grading.judging.wording import quote
 from grader.grading.model.exercise import Check, Finding, Location, Problem, ProblemKind
+from grader.grading.model.wording import quote
 from grader.runtime.model.author_files import AuthorMistake, line_of, words_of
 
 

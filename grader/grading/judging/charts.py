@@ -10,8 +10,8 @@ from itertools import pairwise
 from grader.grading.judging.logs.outputs import printed_lines
 from grader.grading.judging.texts import clean
 from grader.grading.judging.values import Reading
-from grader.grading.judging.wording import listed, number, quote
 from grader.grading.model.chart import Band, Chart, Level, Look, Panel, Point, Series, Stretch, Tone, VerticalLine
+from grader.grading.model.wording import listed, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import seconds, within
 from grader.runtime.model.trace import LogRecord, OutputLine, Request, Response, Trace

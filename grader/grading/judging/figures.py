@@ -15,7 +15,6 @@ from grader.grading.judging.logs.outputs import printed_lines
 from grader.grading.judging.plots import chart_of, shows_graph
 from grader.grading.judging.recorded_values import recorded_values
 from grader.grading.judging.values import on_student_topic
-from grader.grading.judging.wording import quote
 from grader.grading.model.chart import (
     Chart,
     Excerpt,
@@ -30,6 +29,7 @@ from grader.grading.model.chart import (
 )
 from grader.grading.model.exercise import Criterion, Exercise, Location, has, reads_sources
 from grader.grading.model.report import ExerciseReport
+from grader.grading.model.wording import quote
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.quantities import counted, seconds
 from grader.runtime.model.scenario import Scenario

@@ -9,8 +9,8 @@ from fractions import Fraction
 
 from grader.grading.judging.facts import OtherEnd
 from grader.grading.judging.values import HIDDEN_TOPICS, student_endpoints
-from grader.grading.judging.wording import listed, moment, nearest, quote, span
 from grader.grading.model.exercise import Finding, Location, Problem, ProblemKind, exact_share
+from grader.grading.model.wording import listed, moment, nearest, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S, counted, seconds
 from grader.runtime.model.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace, UnmetPolicy

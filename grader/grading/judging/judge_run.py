@@ -13,7 +13,6 @@ from grader.grading.judging.figures import excerpts_for, illustrated
 from grader.grading.judging.findings import FAULT_KEY, SEND_LATER, fault_evidence
 from grader.grading.judging.run_check import Answer, check_name, run_check
 from grader.grading.judging.values import HIDDEN_TOPICS, on_student_topic
-from grader.grading.judging.wording import listed, quote
 from grader.grading.model.exercise import Criterion, Exercise, Finding, Outcome, named, roles_of, variant_notes
 from grader.grading.model.report import (
     AUTHOR_MISTAKE,
@@ -25,6 +24,7 @@ from grader.grading.model.report import (
     Verdict,
 )
 from grader.grading.model.run import Run
+from grader.grading.model.wording import listed, quote
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.scenario import Scenario, is_launch_file

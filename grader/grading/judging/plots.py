@@ -34,9 +34,9 @@ from grader.grading.judging.values import (
     shown,
     value_at,
 )
-from grader.grading.judging.wording import in_unit, listed, number, quote
 from grader.grading.model.chart import Band, Chart, Level, Look, Panel, Series, Stretch, Tone
 from grader.grading.model.exercise import NODE_GRAPH, has, named, roles_of
+from grader.grading.model.wording import in_unit, listed, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, counted, seconds

@@ -8,8 +8,8 @@ from itertools import islice
 
 from grader.grading.judging.texts import clean
 from grader.grading.judging.values import HIDDEN_TOPICS, as_number
-from grader.grading.judging.wording import quote
 from grader.grading.model.chart import Column, TopicValues
+from grader.grading.model.wording import quote
 from grader.runtime.model.quantities import seconds
 from grader.runtime.model.trace import Delivery, Message, Trace
 

@@ -12,8 +12,8 @@ from grader.grading.judging.findings import AT_ONCE_NS, fault_place, faulted, fi
 from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package, lacking_python
 from grader.grading.judging.launched import excuses
 from grader.grading.judging.values import student_endpoints
-from grader.grading.judging.wording import quote, span
 from grader.grading.model.exercise import Criterion, Exercise, Finding, ask, of_beginning, reads_sources
+from grader.grading.model.wording import quote, span
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError

@@ -15,7 +15,7 @@ from itertools import pairwise
 from types import MappingProxyType
 
 from grader.grading.judging.values import Reading
-from grader.grading.judging.wording import number
+from grader.grading.model.wording import number
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, counted, within
 

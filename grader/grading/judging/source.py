@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import Any, TypeVar
 
-from grader.grading.judging.wording import quote
 from grader.grading.model.exercise import Location
+from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
 
 #: Longer files are not parsed, in characters: student nodes are far shorter.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from grader.grading.judging.findings import faulted, met, not_met
-from grader.grading.judging.wording import quote
 from grader.grading.model.exercise import Finding
+from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.trace import Fault, FaultKind, Trace

@@ -10,8 +10,8 @@ from functools import lru_cache, wraps
 from types import MappingProxyType
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from grader.grading.judging.wording import number, quote
 from grader.grading.model.exercise import Check
+from grader.grading.model.wording import number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_MS, FieldNumber, Pattern, within
 from grader.runtime.model.trace import ClockKind, Delivery, Endpoint, Message, Trace

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, TypeGuard
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.trace import Trace
-from grader.runtime.stimuli.recorded import RecordedStream
+from grader.runtime.stimuli import RecordedStream
 
 
 class ProblemKind(Enum):

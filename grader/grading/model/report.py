@@ -13,6 +13,7 @@ from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.checkup import Property
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ALL_MET, NOT_ALL_MET, UNDECIDED, UNUSABLE
+from grader.runtime.model.packages import BroughtPackage
 from grader.runtime.model.trace import ClockKind, Endpoint, Fault, GraphSnapshot, LogRecord, Offer, OutputLine, Start
 
 #: JSON values, as in reports, evidence and decoded messages.
@@ -132,26 +133,6 @@ class Reproduction:
     command: tuple[str, ...] = ()
     rubrics: tuple[tuple[str, str], ...] = ()  # exercise id and digest of its rubric, in the order graded
     recording: str = ""  # digest of the recordings that were played; empty if none was
-
-
-@dataclass(frozen=True, slots=True)
-class BroughtPackage:
-    """An interface package that a run used and that is not installed."""
-
-    name: str
-    origin: str  # who brought it: `rubric`, `class` (with `--interfaces`), `grader` or `submission`
-    digest: str  # of its definitions
-
-
-@dataclass(frozen=True, slots=True)
-class DescribedPackage:
-    """An interface package that nodes can use, for `grade interfaces`."""
-
-    name: str
-    origin: str  # as in `BroughtPackage`
-    digest: str  # of its definitions
-    types: tuple[str, ...]  # e.g. `lab_msgs/msg/Level`, sorted
-    folder: str  # where its modules are kept; empty if the installed package of this name is used instead
 
 
 @dataclass(frozen=True, slots=True)

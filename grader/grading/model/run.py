@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field
 
-from grader.grading.model.report import BroughtPackage, Environment, Reproduction
+from grader.grading.model.report import Environment, Reproduction
 from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.packages import BroughtPackage
 from grader.runtime.model.submission import Definition, Submission
 from grader.runtime.model.trace import Trace
 

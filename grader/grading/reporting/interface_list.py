@@ -6,9 +6,9 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from grader.grading.model.report import DescribedPackage
 from grader.grading.reporting.escape import json_value, shown
 from grader.grading.reporting.page import Page
+from grader.runtime.model.packages import DescribedPackage
 
 SCHEMA = "grader/runtime/interfaces/v1"
 _ORIGINS = {"class": "from the folder given", "grader": "comes with the grader"}

@@ -11,10 +11,10 @@ from typing import Any
 
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.rubric_files import rubrics_in
-from grader.grading.submissions.collected import shown
 from grader.runtime.compiled import compiled, state_in, state_of_package
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
+from grader.runtime.model.wording import shown
 from grader.runtime.shipped import shipped
 
 

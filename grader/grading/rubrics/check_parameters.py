@@ -61,7 +61,7 @@ from grader.grading.rubrics.units import format_quantity
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import DurationNs, FieldOf, Hertz, Kind, Least, Unit
 from grader.runtime.model.scenario import FieldSpec
-from grader.runtime.stimuli.simulation import Simulated
+from grader.runtime.stimuli import Simulated
 
 T = TypeVar("T")
 

@@ -41,8 +41,7 @@ from grader.runtime.model.scenario import (
     TimeBetween,
     Written,
 )
-from grader.runtime.stimuli.calls import ServiceCalls
-from grader.runtime.stimuli.recorded import RecordedStream
+from grader.runtime.stimuli import RecordedStream, ServiceCalls
 
 #: Maximum number of decimals with which a text shows a drawn number.
 DECIMALS = 9

@@ -19,12 +19,12 @@ from grader.grading.rubrics.model import RubricShape
 from grader.grading.rubrics.simulations import Offered, offered, simulated_in
 from grader.grading.rubrics.types import build
 from grader.grading.rubrics.yaml_tree import Mistake, Position, TreePath, YamlTree
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import FieldOf
 from grader.runtime.model.scenario import Stimulus
 from grader.runtime.model.submission import Definition
+from grader.runtime.model.wording import listed, shown
 
 #: Numbers of type_description_interfaces/msg/FieldType: a nested message, integers, floating-point numbers, and so on.
 #: Arrays add 48, bounded sequences 96 and unbounded ones 144.

@@ -59,7 +59,6 @@ from grader.grading.rubrics.yaml_tree import (
     end_of,
     read_yaml,
 )
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.limits import MAX_RUBRIC_BYTES, Limits
@@ -77,6 +76,7 @@ from grader.runtime.model.scenario import (
     longest,
     shortest,
 )
+from grader.runtime.model.wording import listed, shown
 
 
 def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:

@@ -10,8 +10,19 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlTree, nearest_position
-from grader.grading.submissions.collected import listed, shown
+from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, nearest_position, read_yaml
+from grader.runtime.model.wording import listed, shown
+
+__all__ = [
+    "Mistake",
+    "TreePath",
+    "YamlSyntaxError",
+    "YamlTree",
+    "found",
+    "mistakes_of",
+    "nearest",
+    "read_yaml",
+]
 
 #: pydantic's kind of error -> what was expected.
 _EXPECTED: Mapping[str, str] = {

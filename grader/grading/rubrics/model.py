@@ -39,14 +39,11 @@ from grader.grading.rubrics.types import (
     wrong,
 )
 from grader.grading.rubrics.variants import VariantsField
-from grader.grading.submissions.collected import listed
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.scenario import Connection, Span, Stimulus
-from grader.runtime.simulation.robots import SIMULATIONS
-from grader.runtime.stimuli import KINDS
-from grader.runtime.stimuli.calls import ServiceCalls
-from grader.runtime.stimuli.recorded import RecordedStream
-from grader.runtime.stimuli.simulation import Simulated
+from grader.runtime.model.wording import listed
+from grader.runtime.simulation import SIMULATIONS
+from grader.runtime.stimuli import KINDS, RecordedStream, ServiceCalls, Simulated
 
 _EVENTS = (DUE_DATE, PUBLISHED)
 _EXPECTED = f"a date such as 2026-12-01, {listed(_EVENTS)}"

@@ -20,14 +20,12 @@ from grader.grading.rubrics.author_modules import OwnHints, module_of, rules_in
 from grader.grading.rubrics.check_parameters import choice_model, simulation_shape
 from grader.grading.rubrics.mistakes import nearest
 from grader.grading.rubrics.types import BESIDE
-from grader.grading.submissions.collected import shown
 from grader.runtime.interfaces.definitions import files_in
 from grader.runtime.model.author_files import line_of, words_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
-from grader.runtime.simulation import loading
-from grader.runtime.simulation.participant import Simulation
-from grader.runtime.simulation.robots import SIMULATIONS
+from grader.runtime.model.wording import shown
+from grader.runtime.simulation import SIMULATIONS, Simulation, loading
 
 #: Largest file of checks, in bytes.
 MAX_BYTES = 256 * 1024

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 from pydantic import Field, PlainValidator, WithJsonSchema
 
 from grader.grading.rubrics.types import MatchingText, Shape, wrong
-from grader.grading.submissions.collected import shown
 from grader.runtime.model.scenario import RunOptions
+from grader.runtime.model.wording import shown
 
 _NODE = r"[A-Za-z_][A-Za-z0-9_]*"
 _ROS = r"[~/A-Za-z_][A-Za-z0-9_/]*"

@@ -12,13 +12,13 @@ from typing import Any
 from grader.grading.rubrics.model import RubricShape, ScenarioShape
 from grader.grading.rubrics.types import build
 from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlTree
-from grader.grading.submissions.collected import shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.scenario import Between, Choose, FieldSpec, Stimulus, Written
+from grader.runtime.model.wording import shown
+from grader.runtime.simulation import SHORTEST_PERIOD_NS, Moment, Output
 from grader.runtime.simulation.loading import begin_of, guarded, made
-from grader.runtime.simulation.participant import SHORTEST_PERIOD_NS, Moment, Output
-from grader.runtime.stimuli.simulation import Simulated
+from grader.runtime.stimuli import Simulated
 
 #: How many steps and messages of a step are tried.
 STEPS, OUTPUTS = 3, 20

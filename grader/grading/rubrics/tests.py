@@ -18,9 +18,9 @@ from pydantic_core import PydanticCustomError
 
 from grader.grading.rubrics.own_checks import OwnFile
 from grader.grading.rubrics.types import read_points
-from grader.grading.submissions.collected import shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
+from grader.runtime.model.wording import shown
 
 #: Most tests in a file, with those that parametrisation makes: each is a run of its own.
 MOST_TESTS = 200

@@ -24,9 +24,9 @@ from pydantic_core import PydanticCustomError
 
 from grader.grading.judging.series import FormulaError, curve
 from grader.grading.rubrics.units import QuantityError, missing_unit, parse_quantity, quantity_example, quantity_pattern
-from grader.grading.submissions.collected import listed
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import Unit
+from grader.runtime.model.wording import listed
 
 
 def wrong(expected: str, hint: str = "") -> PydanticCustomError:

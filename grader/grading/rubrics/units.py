@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from decimal import Decimal
 from fractions import Fraction
 
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import GIB, KIB, MIB, NS_PER_MS, NS_PER_S, Unit
+from grader.runtime.model.wording import listed, shown
 
 
 class QuantityError(ValueError):

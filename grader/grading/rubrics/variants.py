@@ -17,8 +17,8 @@ from grader.grading.model.exercise import Value, Variant
 from grader.grading.rubrics.mistakes import nearest
 from grader.grading.rubrics.types import Id, Shape, must, wrong
 from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlTree
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.wording import listed, shown
 
 #: Key of a placeholder for a value: `{variant: rate}`.
 REFERENCE = "variant"

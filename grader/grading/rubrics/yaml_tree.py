@@ -12,8 +12,8 @@ from ruamel.yaml.error import MarkedYAMLError, StreamMark, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
-from grader.grading.submissions.collected import shown
 from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.wording import shown
 
 #: Deepest nesting, and most values after expanding aliases: a small file can expand to billions of values.
 MAX_DEPTH = 24

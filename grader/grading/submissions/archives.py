@@ -23,7 +23,6 @@ from grader.grading.submissions.collected import (
     generated_folders,
     is_skipped,
     name_problem,
-    shown,
 )
 from grader.grading.submissions.foreign_archives import KINDS, foreign_members, is_installed
 from grader.grading.submissions.members import FEWER, FILE, FOLDER, LINK, REPACK, Member, UnusableArchiveError
@@ -42,6 +41,23 @@ from grader.runtime.model.limits import (
     MAX_XZ_BYTES,
     RATIO_FREE_BYTES,
 )
+from grader.runtime.model.wording import shown
+
+__all__ = [
+    "ARCHIVE_SUFFIXES",
+    "FILE",
+    "FOLDER",
+    "HAND_IN_ZIP",
+    "HEAD_BYTES",
+    "Member",
+    "UnusableArchiveError",
+    "archive_kind",
+    "collect_archive",
+    "is_tar",
+    "tar_members",
+    "unpacked",
+    "zip_members",
+]
 
 HAND_IN_ZIP = "pack the folder with your .py files as a zip"
 

@@ -13,9 +13,9 @@ from functools import partial
 from typing import BinaryIO
 
 from grader.grading.submissions.members import FEWER, FILE, FOLDER, LINK, Member, UnusableArchiveError
+from grader.runtime.contained import run_contained
 from grader.runtime.model import extras
 from grader.runtime.model.errors import HarnessError
-from grader.runtime.supervisor.contained import run_contained
 
 #: Kind of archive -> names of the format in libarchive, and the first bytes that tell them apart.
 _FORMATS = {"7z": ("7zip", b""), "rar": ("rar5", b"Rar!\x1a\x07\x01"), "old rar": ("rar", b"Rar!\x1a\x07\x00")}

@@ -30,7 +30,7 @@ from typing import Any, TypeVar
 
 from grader.grading.submissions.cmake_files import Contents, contents_of
 from grader.grading.submissions.setup_files import LimitError, given_to_setup
-from grader.runtime.supervisor.confinement import confine
+from grader.runtime.contained import confine
 
 #: Why a file was not read: it is not valid in its format, or reading it would take too much.
 INVALID, TOO_COSTLY = "invalid", "too costly"

@@ -15,12 +15,13 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from grader.grading.submissions.collected import first_of, name_problem
+from grader.grading.submissions.collected import name_problem
+from grader.runtime.contained import run_contained
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.limits import MAX_FILES, MAX_NAME_BYTES, MAX_PATH_BYTES
 from grader.runtime.model.projects import Project
+from grader.runtime.model.wording import first_of
 from grader.runtime.programs.executables import CMAKE_LISTS, files_below, project_folders
-from grader.runtime.supervisor.contained import run_contained
 
 MODULE = "grader.grading.submissions.project_reader"
 #: The files of a package that are read.

@@ -11,14 +11,26 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
-from grader.grading.submissions.collected import Collected, first_of, listed, shown
+from grader.grading.submissions.collected import Collected
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.staging import collect_folder, read_start, write_files
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.limits import MAX_ARCHIVE_BYTES, MAX_FILE_BYTES
 from grader.runtime.model.projects import Project
 from grader.runtime.model.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
+from grader.runtime.model.wording import first_of, listed, shown
 from grader.runtime.programs.executables import Executable, executables, find_executables
+
+__all__ = [
+    "collect_submission",
+    "every_file",
+    "not_there",
+    "read_projects",
+    "read_start",
+    "stage_collected",
+    "stage_submission",
+    "write_files",
+]
 
 #: Names at least this similar are shown as a possible misspelling.
 SIMILARITY = 0.8

@@ -26,7 +26,7 @@ try:
 except (ImportError, OSError, TypeError, AttributeError):  # without the C library its name is None
     libarchive = None
 
-from grader.runtime.supervisor.confinement import confine
+from grader.runtime.contained import confine
 
 DAMAGED, ENCRYPTED, TOO_MANY, TOO_MUCH, NO_LIBRARY = 10, 11, 12, 13, 14
 FAULTS = (DAMAGED, ENCRYPTED, TOO_MANY, TOO_MUCH, NO_LIBRARY)

@@ -32,6 +32,8 @@ MAX_ENTRIES = 20_000
 MAX_PATH_BYTES = 2_000
 #: The longest name of one file or folder on Linux (NAME_MAX).
 MAX_NAME_BYTES = 255
+#: The most nodes that a launch file may start: each is a process with a sandbox and a DDS participant.
+MOST_LAUNCHED = 16
 
 #: The most bytes of an archive, which is read into memory.
 MAX_ARCHIVE_BYTES = 64 << 20

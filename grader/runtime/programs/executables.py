@@ -14,6 +14,8 @@ from grader.runtime.model.projects import Project
 CMAKE_LISTS = CMAKE
 #: The most files of a package that are searched for a module or a program.
 MOST_FILES = 2_000
+#: How far above a package the folder `src` of its workspace may be: packages lie in it or in a repository in it.
+MOST_LEVELS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,3 +180,16 @@ class _Files:
 
     def _is_inside(self, path: Path) -> bool:
         return path.is_file() and path.resolve() == self._root.resolve() / path.relative_to(self._root)
+
+
+def package_of(folder: Path) -> Path:
+    """Return the package that a folder is in; the folder itself if it is in none."""
+    return next((up for up in (folder, *folder.parents) if (up / "package.xml").is_file()), folder)
+
+
+def workspace_of(package: Path) -> Path:
+    """Return the folder with the packages that one may need: the `src` above it, or the next if it holds others."""
+    source = next((up for up in package.parents[:MOST_LEVELS] if up.name == "src"), package.parent)
+    found = (manifest for level in ("*", "*/*") for manifest in source.glob(f"{level}/package.xml"))
+    beside = (manifest for manifest in found if manifest.parent != package)
+    return source if (package / "package.xml").is_file() and any(beside) else package

@@ -6,7 +6,16 @@ A rubric uses one as a stimulus: `simulation: {differential_drive: {x: {between:
 writes another as a class in a file that the rubric lists under `simulations`.
 """
 
-from grader.runtime.simulation.participant import Moment, Output, Simulation
-from grader.runtime.simulation.robots import DifferentialDrive, Turtle, Unicycle
+from grader.runtime.simulation.participant import SHORTEST_PERIOD_NS, Moment, Output, Simulation
+from grader.runtime.simulation.robots import SIMULATIONS, DifferentialDrive, Turtle, Unicycle
 
-__all__ = ["DifferentialDrive", "Moment", "Output", "Simulation", "Turtle", "Unicycle"]
+__all__ = [
+    "SHORTEST_PERIOD_NS",
+    "SIMULATIONS",
+    "DifferentialDrive",
+    "Moment",
+    "Output",
+    "Simulation",
+    "Turtle",
+    "Unicycle",
+]

@@ -19,11 +19,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TypeAlias
 
+from grader.runtime.contained import run_contained
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.releases import release_of
 from grader.runtime.model.trace import Fault, FaultKind, NewerPython, Trace
 from grader.runtime.programs.inert import text_of
-from grader.runtime.supervisor.contained import run_contained
 
 Version: TypeAlias = tuple[int, int]
 HERE: Version = sys.version_info[:2]

@@ -23,7 +23,7 @@ from typing import Any, TypeAlias
 
 import libcst as cst
 
-from grader.runtime.supervisor.confinement import confine
+from grader.runtime.contained import confine
 
 Version: TypeAlias = tuple[int, int]
 #: The version that this process runs on.

@@ -9,7 +9,6 @@ from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.trace import Observation
 from grader.runtime.plan import Plan
 from grader.runtime.recording.codec import to_json
-from grader.runtime.recording.packed import observations_from_json
 from grader.runtime.steps import Command, Finish, LaunchFailedError
 from grader.runtime.supervisor.supervisor import TRIES, Recorder, WorkerLostError, WorkerProcess
 
@@ -126,6 +125,8 @@ class SteppedRun:
             return None
 
     def _adopt(self, told: Mapping[str, Any]) -> list[Observation]:
+        from grader.runtime.recording.packed import observations_from_json  # noqa: PLC0415 - as in the supervisor
+
         self.now_ns, self.full = told["now_ns"], told["full"]
         self.ended = dict(told["ended"])
         return observations_from_json(told["news"])

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Any
 
-from grader.runtime.machine import Patience
 from grader.runtime.model.trace import GraphSnapshot
+from grader.runtime.patience import Patience
 from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.worker.claims import CHANNELS, answers, meets, serves
 from grader.runtime.worker.core import Core

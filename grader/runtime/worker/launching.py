@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.limits import MOST_LAUNCHED
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import (
     ClockKind,
@@ -43,8 +44,8 @@ from grader.runtime.worker.student_process import NodeProcess
 
 #: The most real time that a launch file may take, and how often it is looked at, in seconds.
 LONGEST_S, LOOK_S = 60.0, 0.02
-#: The most nodes, things left out, arguments of a node and characters of a text that are taken from a description.
-NODES, LEFT_OUT, ARGUMENTS, CHARACTERS, FILE_CHARACTERS = 16, 50, 200, 1_000, 1 << 20
+#: The most things left out, arguments of a node and characters of a text that are taken from a description.
+LEFT_OUT, ARGUMENTS, CHARACTERS, FILE_CHARACTERS = 50, 200, 1_000, 1 << 20
 #: What packages and programs are called; anything else that a launch file names is quoted.
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,100}")
 #: Commands that neither send nor change anything in the ROS graph, whatever their arguments; and those of `ros2`, by
@@ -171,7 +172,7 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
         else:
             (notes if _is_harmless(words) else left_out).append(text)
     made = EvaluatedLaunch()
-    for node in _dicts(report.get("nodes"), NODES):
+    for node in _dicts(report.get("nodes"), MOST_LAUNCHED):
         package, wanted = _text(node.get("package")), _text(node.get("executable"))
         # Reported by a process that the student's code shares: only a package that is there is named.
         near = _text(node.get("near")) if has_package(plan.projects, _text(node.get("near"))) else ""

@@ -23,12 +23,12 @@ from typing import TYPE_CHECKING, Any
 
 from grader.runtime.host import machine
 from grader.runtime.host.starter import CONNECTED
-from grader.runtime.machine import load_per_processor
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import GIB, MIB, NS_PER_S
 from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.trace import ClockKind, Delivery, FaultKind, Mark, Message, Observation, Trace
+from grader.runtime.patience import load_per_processor
 from grader.runtime.plan import Plan
 from grader.runtime.recording.codec import beside_trace, from_json, observation_to_json, trace_to_json
 from grader.runtime.ros_installation import MESSAGE_PACKAGES, PythonRuntime

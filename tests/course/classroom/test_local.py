@@ -241,8 +241,7 @@ def test_submissions_that_could_reach_each_other_go_one_at_a_time(
     """Where the sandbox leaves them one network; without a sandbox it is the user's wish."""
     isolation = SimpleNamespace(name=tier, shares_network=shares)
     choice = SimpleNamespace(isolation=isolation, containment=())
-    monkeypatch.setattr("grader.course.classroom.local.find_ros", lambda: None)
-    monkeypatch.setattr("grader.course.classroom.local.choose_isolation", lambda wanted, ros: choice)
+    monkeypatch.setattr("grader.course.classroom.local.sandbox_here", lambda wanted: choice)
     here = scheduler(jobs=3)
     warnings = here.prepare(tier)
     together = []

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 
 import pytest
 
-from grader.grading.app.doctor import concluded, examine, node_start
+from grader.grading.app.doctor import concluded, examine
 from grader.grading.app.grade import Progress
 from grader.grading.app.observe import ObserveRequest
 from grader.grading.reporting.doctor import checkup_to_json, render_checkup
@@ -57,7 +57,7 @@ def test_it_says_where_nodes_cannot_be_forked() -> None:
     """Every start takes longer there: entering all namespaces at once needs a newer kernel."""
     (fact,) = concluded((), (HOLDS,), say_nothing, Look()).facts
     assert fact == Fact("start of nodes", "each is forked from a process that has imported ROS")
-    executed = node_start("bubblewrap", can_fork=False)
+    executed = machine.node_start("bubblewrap", can_fork=False)
     assert executed.value.endswith("to be forked into bubblewrap, it needs Linux 5.8 or newer")
 
 
@@ -87,7 +87,7 @@ def test_without_ros_the_rest_is_told() -> None:
     def none() -> NoReturn:
         raise EnvironmentFault("ROS 2: expected rclpy, found none in this environment", "pip install it")
 
-    checkup = examine(say_nothing, none)
+    checkup = examine(say_nothing, lambda: machine.ros_here(none))
     assert not checkup.safe
     text = render_checkup(checkup, width=200, colour=False)
     assert text.startswith("grading is NOT SAFE here\n  ROS 2: expected rclpy, found none in this environment\n")

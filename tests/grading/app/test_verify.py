@@ -10,7 +10,6 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -340,10 +339,9 @@ def test_what_this_machine_cannot_make_is_named() -> None:
         raise EnvironmentFault(f"isolation {name}: expected bubblewrap, found none")
 
     for name in SANDBOXES:
-        assert made(name, "none", tier=cannot).not_tried == "expected bubblewrap, found none"
-    forkless = SimpleNamespace(can_fork=False)
-    assert made("executed", tier=lambda _: forkless).not_tried == "in the sandbox landlock, each is executed anyway"
-    assert not made("together", tier=lambda _: forkless).executes
+        assert made(name, "none", can_fork=cannot).not_tried == "expected bubblewrap, found none"
+    assert made("executed", can_fork=lambda _: False).not_tried == "in the sandbox landlock, each is executed anyway"
+    assert not made("together", can_fork=lambda _: False).executes
 
 
 def test_no_sandbox_is_tried_that_holds_less_unless_it_is_named() -> None:

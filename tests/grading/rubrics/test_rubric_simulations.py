@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.course.packaging import Chosen, classroom50
-from grader.grading.app.interface_packages import known_interfaces
+from grader.grading.app.interfaces import known_interfaces
 from grader.grading.rubrics.loader import read_rubric, side_files
 from grader.grading.rubrics.schema import rubric_schema
 from grader.runtime.model.errors import RubricError

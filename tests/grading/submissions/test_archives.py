@@ -29,9 +29,9 @@ from hypothesis.strategies._internal.core import DataObject
 from grader.grading.submissions import archives, foreign_archives
 from grader.grading.submissions.foreign_archives import is_installed
 from grader.grading.submissions.submission import stage_submission
+from grader.runtime import contained
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.submission import Submission
-from grader.runtime.supervisor import contained
 
 WANTED = ("velocity_publisher.py", "odom_subscriber.py")
 FILES = {"velocity_publisher.py": b"x = 1\n", "pkg/helper.py": b"", "pkg/data.bin": bytes(range(256)) * 40}
@@ -493,7 +493,7 @@ def test_a_process_that_reads_what_students_made_can_do_nothing_else() -> None:
     """No file, socket, process, signal or memory beyond its limit, though a library were taken over."""
     code = """
 import os, resource, socket
-from grader.runtime.supervisor.confinement import confine
+from grader.runtime.contained import confine
 confine({"memory": 768 << 20, "processor": 60, "output": 1 << 20})
 tries = {
     "read": lambda: open("/etc/hostname"), "write": lambda: open("/tmp/x", "w"), "net": socket.socket,

@@ -25,8 +25,8 @@ from sensor_msgs.msg import Image, PointField
 from std_msgs.msg import Header
 
 from grader.grading.app.observe import ObserveRequest, observe
-from grader.grading.app.ros_packages import LENDABLE, LENT, lent_to
 from grader.grading.judging.installation import NOT_LENT
+from grader.runtime.lending import LENDABLE, LENT, lent_to
 from grader.runtime.model.quantities import NS_PER_S
 
 

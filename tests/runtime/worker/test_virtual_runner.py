@@ -27,7 +27,7 @@ from scripted import (
     wait,
 )
 
-from grader.runtime import machine
+from grader.runtime import patience
 from grader.runtime.host import clock as host_clock
 from grader.runtime.host.clock import EPOCH_NS
 from grader.runtime.model.limits import Limits
@@ -55,8 +55,8 @@ from grader.runtime.worker.virtual_runner import VirtualRunner
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing in these tests is on its way in real time."""
-    monkeypatch.setattr(discovery, "Patience", lambda *_: machine.Patience(0.0))
-    monkeypatch.setattr(machine, "BRIEF_S", 0.0)
+    monkeypatch.setattr(discovery, "Patience", lambda *_: patience.Patience(0.0))
+    monkeypatch.setattr(patience, "BRIEF_S", 0.0)
 
 
 class Run:
@@ -234,7 +234,7 @@ def test_messages_of_one_instant_come_in_one_order(monkeypatch: pytest.MonkeyPat
         yield from wait(100, sent={"topic /a": 2, "topic /b": 2})
         yield idle()
 
-    monkeypatch.setattr(discovery, "Patience", lambda *_: machine.Patience(5.0))
+    monkeypatch.setattr(discovery, "Patience", lambda *_: patience.Patience(5.0))
     monkeypatch.setattr(ScriptedObserver, "take", take_one)
     assert Run(program).seen() == ["50 from /a: 2", "50 from /a: 4", "50 from /b: 1", "50 from /b: 3"]
 
@@ -581,7 +581,7 @@ def test_what_a_latched_publisher_of_another_process_keeps_is_announced_once() -
 @pytest.mark.parametrize("whose", ["gone.py", "a.py"])
 def test_a_node_is_found_beside_a_namesake(monkeypatch: pytest.MonkeyPatch, whose: str) -> None:
     """The middleware tells the services of one of them; a process that left may stay, and a node until it is freed."""
-    monkeypatch.setattr(discovery, "Patience", lambda *_: machine.Patience(0.05))
+    monkeypatch.setattr(discovery, "Patience", lambda *_: patience.Patience(0.05))
 
     def asker(me: ScriptedStudent, world: World) -> Program:
         others = [claim("node", "/asker")] if namesake else []
@@ -610,7 +610,7 @@ def test_what_was_not_matched_in_time_is_awaited_again_before_time_goes_on(comes
     (me,) = run.students
     asked = [n for n, told in enumerate(me.heard) if "match" in told]
     first_later = next(n for n, told in enumerate(me.heard) if told.get("now_ns", 0) > EPOCH_NS)
-    assert sum(n < first_later for n in asked) == (2 if comes else machine.MOST_LOSSES)
+    assert sum(n < first_later for n in asked) == (2 if comes else patience.MOST_LOSSES)
     assert max(asked) < first_later
     assert me.times_ms()[-1] >= 500
 

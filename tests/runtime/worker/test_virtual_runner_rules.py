@@ -16,7 +16,7 @@ pytest.importorskip("rclpy")
 
 from scripted import MS, Behaviour, Program, ScriptedObserver, ScriptedStudent, World, claim, idle, plan, wait
 
-from grader.runtime import machine
+from grader.runtime import patience
 from grader.runtime.host.ledger import Ledger
 from grader.runtime.model.trace import GraphSnapshot, Message, OutputLine, Trace
 from grader.runtime.worker import discovery
@@ -95,7 +95,7 @@ class Run:
 @pytest.fixture
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Give waits far more time than a few looks at the graph take."""
-    monkeypatch.setattr(discovery, "Patience", lambda *_: machine.Patience(6.0))
+    monkeypatch.setattr(discovery, "Patience", lambda *_: patience.Patience(6.0))
 
 
 @pytest.mark.rule(11)

@@ -25,9 +25,9 @@ from grader.grading.judging.values import (
     shown,
     value_at,
 )
-from grader.grading.judging.wording import listed, moment, nearest, number, quote, span
 from grader.grading.model.chart import Look, Panel, Tone
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.wording import listed, moment, nearest, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import DurationNs, FieldOf, counted, seconds

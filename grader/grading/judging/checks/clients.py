@@ -24,9 +24,9 @@ from grader.grading.judging.logs.outputs import printed_lines, student_records
 from grader.grading.judging.plots import Drawing
 from grader.grading.judging.service_calls import LATENESS_NS, Call, calls_of
 from grader.grading.judging.values import RuleOrValue, breach, broken_rules, rules_text
-from grader.grading.judging.wording import moment, number, quote, span
 from grader.grading.model.chart import Band
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.wording import moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_S, DurationNs, FieldOf, counted, seconds

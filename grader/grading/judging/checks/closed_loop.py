@@ -10,8 +10,8 @@ from grader.grading.judging.checks.fields import InRange
 from grader.grading.judging.findings import explain_fault, faulted, first_fault, met, not_met
 from grader.grading.judging.plots import Drawing, Plot, value_panels
 from grader.grading.judging.values import JITTER_NS, FieldRule, delivered, number_at, value_at
-from grader.grading.judging.wording import moment, number, span
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.wording import moment, number, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import DurationNs, FieldOf, Topic, counted, seconds

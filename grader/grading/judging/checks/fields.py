@@ -30,9 +30,9 @@ from grader.grading.judging.values import (
     text_at,
     value_at,
 )
-from grader.grading.judging.wording import in_unit, moment, number, numbers, quote
 from grader.grading.model.chart import Band
 from grader.grading.model.exercise import Finding, Problem, ProblemKind, Roles
+from grader.grading.model.wording import in_unit, moment, number, numbers, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern, counted, seconds, within
 from grader.runtime.model.trace import Delivery, Fault, Message, Trace

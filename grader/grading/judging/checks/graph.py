@@ -8,8 +8,8 @@ from typing import ClassVar, Literal
 
 from grader.grading.judging.findings import explain_fault, explain_no_subscription, faulted, first_fault, met, not_met
 from grader.grading.judging.values import student_endpoints
-from grader.grading.judging.wording import listed, moment, nearest, number, quote
 from grader.grading.model.exercise import NODE_GRAPH, Finding, Problem, ProblemKind
+from grader.grading.model.wording import listed, moment, nearest, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import DurationNs, counted, seconds

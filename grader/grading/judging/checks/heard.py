@@ -19,8 +19,8 @@ from grader.grading.judging.logs.matching import says
 from grader.grading.judging.logs.outputs import Output, in_window, printed_lines, student_records
 from grader.grading.judging.service_calls import calls_of
 from grader.grading.judging.values import JITTER_NS, heard_from_ns, shown, student_endpoints, value_at
-from grader.grading.judging.wording import moment, quote, span
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.wording import moment, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_S, DurationNs, FieldOf, counted, seconds

@@ -25,9 +25,9 @@ from grader.grading.judging.findings import (
 from grader.grading.judging.logs.outputs import Output, is_no_node, numbers_in, printed_lines, shape_of, student_records
 from grader.grading.judging.plots import Drawing, Plot
 from grader.grading.judging.values import JITTER_NS, LONGEST_MATCHED, number_at, published
-from grader.grading.judging.wording import listed, moment, number, quote, span
 from grader.grading.model.chart import Band, Level, Look, Panel, Tone
 from grader.grading.model.exercise import Finding, Location, ProblemKind, Roles
+from grader.grading.model.wording import listed, moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import DurationNs, FieldOf, Pattern, counted, seconds, within
 from grader.runtime.model.trace import LogRecord, Message, Trace

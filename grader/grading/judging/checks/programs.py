@@ -31,9 +31,9 @@ from grader.grading.judging.service_calls import (
 )
 from grader.grading.judging.source import Source, read, subtree
 from grader.grading.judging.values import FieldRule, Reading, as_number, published, shown, value_at
-from grader.grading.judging.wording import listed, moment, number, quote, span
 from grader.grading.model.chart import Look, Panel
 from grader.grading.model.exercise import Finding, Location, ProblemKind, Roles
+from grader.grading.model.wording import listed, moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_S, DurationNs, FieldOf, counted, seconds, within

@@ -21,9 +21,9 @@ from grader.grading.judging.findings import (
     partly,
 )
 from grader.grading.judging.values import published
-from grader.grading.judging.wording import moment, number, quote, span
 from grader.grading.model.chart import Band, Chart, Level, Panel, Point, Tone
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.wording import moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, counted, seconds, within
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Trace

@@ -38,9 +38,9 @@ from grader.grading.judging.values import (
     number_at,
     student_endpoints,
 )
-from grader.grading.judging.wording import moment, number, numbers, quote
 from grader.grading.model.chart import Look, Panel, Tone
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.wording import moment, number, numbers, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, FieldOf, counted, seconds

@@ -12,8 +12,8 @@ from grader.grading.judging.plots import Drawing
 from grader.grading.judging.series import curve
 from grader.grading.judging.service_calls import LATENESS_NS, Call, calls_of
 from grader.grading.judging.values import FewSuffice, RuleOrValue, breach, broken_rules, number_at, rules_text
-from grader.grading.judging.wording import moment, number, quote, span
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.wording import moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import (

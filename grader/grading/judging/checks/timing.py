@@ -42,9 +42,9 @@ from grader.grading.judging.values import (
     student_endpoints,
     value_at,
 )
-from grader.grading.judging.wording import listed, moment, number, quote, span
 from grader.grading.model.chart import Band, Level, Stretch, Tone
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.wording import listed, moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, counted, seconds, within

@@ -18,9 +18,9 @@ from grader.grading.judging.findings import (
 )
 from grader.grading.judging.plots import Drawing, Plot, value_panels
 from grader.grading.judging.values import FieldRule, equals, leaves, number_at, published, student_endpoints, text_at
-from grader.grading.judging.wording import listed, moment, number, numbers, quote
 from grader.grading.model.chart import Level
 from grader.grading.model.exercise import NODE_GRAPH, Finding, ProblemKind, Roles
+from grader.grading.model.wording import listed, moment, number, numbers, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import SLACK, FieldNumber, FieldOf, Hertz, counted, seconds, within
 from grader.runtime.model.trace import Message, Trace, unusual_request

@@ -9,9 +9,9 @@ from grader.grading.judging.checks.logs import complained
 from grader.grading.judging.findings import fault_hint, fault_sentence, first_fault, met, not_met
 from grader.grading.judging.logs.outputs import student_records, written
 from grader.grading.judging.plots import Drawing, Plot
-from grader.grading.judging.wording import moment, number, quote, span
 from grader.grading.model.chart import Stretch
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.wording import moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import DurationNs, seconds

@@ -25,9 +25,9 @@ from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, in_order, u
 from grader.grading.judging.diagnosis.wiring import bare_statements
 from grader.grading.judging.findings import FAULT_KEY, fault_evidence, fault_hint, fault_sentence
 from grader.grading.judging.source import Source, argument, chain, first_line, last_name, read, text_of
-from grader.grading.judging.wording import quote
 from grader.grading.model.exercise import Criterion, Exercise, Finding, Outcome
 from grader.grading.model.report import Verdict
+from grader.grading.model.wording import quote
 from grader.runtime.model.author_files import AuthorMistake, line_of, words_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.submission import Submission

@@ -17,8 +17,8 @@ from grader.grading.judging.diagnosis.names import (
 )
 from grader.grading.judging.diagnosis.rules import Clue, Crash, crash_rule
 from grader.grading.judging.source import Source, chain, covers, last_name
-from grader.grading.judging.wording import quote
 from grader.grading.model.exercise import Location
+from grader.grading.model.wording import quote
 from grader.runtime.model.submission import EXPORT_NOTEBOOK
 from grader.runtime.model.trace import Fault, FaultKind, StartWay
 

@@ -24,8 +24,8 @@ from grader.grading.judging.diagnosis.wiring import (
 from grader.grading.judging.facts import LogFacts, LogPaceFacts, WrongLogFacts
 from grader.grading.judging.logs.outputs import printed_lines, student_records
 from grader.grading.judging.source import Source, argument, chain, last_name, text_of
-from grader.grading.judging.wording import number
 from grader.grading.model.exercise import Location, Outcome, ProblemKind
+from grader.grading.model.wording import number
 
 _HANDLERS = ("FileHandler", "RotatingFileHandler", "TimedRotatingFileHandler", "WatchedFileHandler")
 _OPENS = ("open", "io.open", "codecs.open")

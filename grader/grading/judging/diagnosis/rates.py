@@ -28,8 +28,8 @@ from grader.grading.judging.diagnosis.wiring import (
 )
 from grader.grading.judging.facts import RateFacts
 from grader.grading.judging.source import Loop, Source, argument, chain, first_line, last_name
-from grader.grading.judging.wording import number
 from grader.grading.model.exercise import ProblemKind
+from grader.grading.model.wording import number
 from grader.runtime.model.dataclass import dataclass
 
 #: Largest relative difference between the rate in the text and the measured one.

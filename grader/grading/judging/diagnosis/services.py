@@ -30,8 +30,8 @@ from grader.grading.judging.source import (
     parameters,
     text_of,
 )
-from grader.grading.judging.wording import quote
 from grader.grading.model.exercise import ProblemKind, named, roles_of
+from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
 
 _THREADS = {"Thread", "start_new_thread", "ThreadPoolExecutor"}

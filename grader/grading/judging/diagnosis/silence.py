@@ -55,8 +55,8 @@ from grader.grading.judging.source import (
     text_of,
 )
 from grader.grading.judging.values import carries_number, student_endpoints
-from grader.grading.judging.wording import quote
 from grader.grading.model.exercise import Location, Outcome, ProblemKind, named, roles_of
+from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import seconds
 from grader.runtime.model.trace import first_unmet, unusual_request

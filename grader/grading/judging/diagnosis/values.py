@@ -22,8 +22,8 @@ from grader.grading.judging.diagnosis.wiring import (
 from grader.grading.judging.facts import DrawFacts, SeriesFacts
 from grader.grading.judging.source import Source, chain, first_line, last_name, words
 from grader.grading.judging.values import as_number, leaves, number_path, published, published_numbers, value_at
-from grader.grading.judging.wording import moment, number
 from grader.grading.model.exercise import ProblemKind
+from grader.grading.model.wording import moment, number
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.trace import Message
 

@@ -21,7 +21,7 @@ from grader.grading.judging.source import (
     subtree,
     text_of,
 )
-from grader.grading.judging.wording import quote
+from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
 
 #: Names that stand for names, and operators in operators: a program of the course needs two or three.

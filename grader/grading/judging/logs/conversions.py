@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from grader.grading.judging.logs.matching import CONVERSION, shows_about
 from grader.grading.judging.texts import Printed
-from grader.grading.judging.wording import number
+from grader.grading.model.wording import number
 from grader.runtime.model.dataclass import dataclass
 
 #: Factors that have a name, as text shows them.

@@ -11,7 +11,7 @@ from functools import lru_cache
 from grader.grading.judging.logs.outputs import Output, numbers_in
 from grader.grading.judging.texts import Printed, clean, printed_numbers, with_decimal_points
 from grader.grading.judging.values import as_number
-from grader.grading.judging.wording import quote
+from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import counted
 from grader.runtime.model.trace import LogRecord

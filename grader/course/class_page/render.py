@@ -12,10 +12,8 @@ from urllib.parse import quote
 from jinja2 import Template
 from markupsafe import Markup
 
-from grader.grading.model.exercise import Outcome, exercise_name
-from grader.grading.reporting import wording
-from grader.grading.reporting.class_page.causes import CommonCause, causes
-from grader.grading.reporting.class_page.contents import (
+from grader.course.class_page.causes import CommonCause, causes
+from grader.course.class_page.contents import (
     ClassPage,
     Distribution,
     ExerciseCount,
@@ -24,6 +22,8 @@ from grader.grading.reporting.class_page.contents import (
     distribution,
     exercise_counts,
 )
+from grader.grading.model.exercise import Outcome, exercise_name
+from grader.grading.reporting import wording
 from grader.grading.reporting.escape import script_json, shown
 from grader.grading.reporting.html.assets import Bundle, bundle, page_environment
 from grader.grading.reporting.json_report import ReportData
@@ -130,7 +130,7 @@ def page_link(link: PageLink) -> str:
 
 @cache
 def _template() -> Template:
-    templates = page_environment("grader.grading.reporting.class_page")
+    templates = page_environment("grader.course.class_page")
     templates.filters |= {"points": _points, "percent": _percent}
     templates.globals |= {
         "embedded": Markup,

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.grading.submissions.collected import listed, shown
+from grader.runtime.model.wording import listed, shown
 
 
 @given(st.text(st.characters(exclude_categories=())), st.integers(min_value=3, max_value=100))

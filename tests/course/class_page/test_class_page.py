@@ -16,7 +16,8 @@ from urllib.parse import unquote
 import class_reports
 import pytest
 
-from grader.grading.reporting.class_page.contents import (
+from grader.course.class_page.class_links import ClassLinks, with_class_links
+from grader.course.class_page.contents import (
     ClassPage,
     Listing,
     PageEntry,
@@ -26,8 +27,7 @@ from grader.grading.reporting.class_page.contents import (
     distribution,
     exercise_counts,
 )
-from grader.grading.reporting.class_page.render import class_assets, page_link, render_class, result_link
-from grader.grading.reporting.html.class_links import ClassLinks, with_class_links
+from grader.course.class_page.render import class_assets, page_link, render_class, result_link
 from grader.grading.reporting.html.render import render_html
 from grader.grading.reporting.json_report import report_to_json
 

@@ -11,11 +11,11 @@ import pytest
 from report_samples import report as whole
 from tracing import TWIST, Recording, twist
 
+from grader.course.class_page.causes import CauseKind, causes, kind_of
 from grader.grading.judging.checks.logs import UsesLogger
 from grader.grading.judging.checks.rate import TopicRate
 from grader.grading.judging.judge_run import judge_exercise
 from grader.grading.model.exercise import Check, Criterion, Exercise
-from grader.grading.reporting.class_page.causes import CauseKind, causes, kind_of
 from grader.grading.reporting.json_report import report_to_json
 from grader.runtime.model.quantities import Hertz
 from grader.runtime.model.scenario import Scenario, Span

@@ -18,26 +18,37 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.grading.app.ros_packages import LENDABLE, LENT, Lent, copied, lent_to
-from grader.grading.model.exercise import Exercise
-from grader.grading.model.report import BroughtPackage, DescribedPackage
-from grader.grading.submissions.collected import listed, shown
 from grader.runtime.interfaces.build import BuiltInterfaces, build
 from grader.runtime.interfaces.definitions import InterfacePackage, digest, files_in, find_packages, shipped_packages
 from grader.runtime.interfaces.program import needed
+from grader.runtime.lending import LENDABLE, LENT, Lent, copied, lent_to
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault, RubricError
-from grader.runtime.model.submission import Definition, Submission
-from grader.runtime.model.trace import Delivery, Message, Trace
+from grader.runtime.model.packages import BroughtPackage, DescribedPackage
+from grader.runtime.model.submission import Submission
+from grader.runtime.model.wording import listed, shown
 from grader.runtime.ros_installation import RosInstallation, find_ros
-from grader.runtime.session import RecordingSession
 from grader.runtime.shipped import PACKAGE
 from grader.runtime.supervisor.confined_build import Build, build_confined, told_of
 from grader.runtime.supervisor.real_time_budget import FOREVER_S
 from grader.runtime.temp_dirs import kept_interfaces, make_room
 
 if TYPE_CHECKING:
-    from grader.grading.rubrics.interfaces import Interfaces
+    from grader.runtime.session import RecordingSession
+
+__all__ = [
+    "FOREVER_S",
+    "InterfacePackage",
+    "Provided",
+    "built_from",
+    "described",
+    "is_brought",
+    "modules_named",
+    "offered_digest",
+    "provide",
+    "type_folders",
+    "unbuilt",
+]
 
 #: Who brings a package; where several bring one of the same name, the first one counts.
 RUBRIC, CLASS, GRADER, SUBMISSION = "rubric", "class", "grader", "submission"
@@ -74,6 +85,11 @@ class Provided:
         """Where the modules of packages are that the submission does not bring."""
         trusted = self.builds[: len(self.builds) - self.own_builds]
         return tuple(BuiltInterfaces(prefix, ()).python for prefix in trusted)
+
+    @property
+    def shares(self) -> tuple[Path, ...]:
+        """Where all descriptions of types are, the first one first."""
+        return tuple(BuiltInterfaces(prefix, ()).share for prefix in self.builds)
 
     @property
     def folders(self) -> tuple[Path, ...]:
@@ -135,49 +151,64 @@ def _own_temporary() -> Path:
 _folders: list[tempfile.TemporaryDirectory[str]] = []
 
 
-@cache
-def known_interfaces(course: tuple[Path, ...] = ()) -> Interfaces | None:
-    """Return the types that nodes can use: installed, of the class, and shipped; None without ROS."""
-    from grader.grading.rubrics.interfaces import Interfaces  # noqa: PLC0415 - takes long, as reading rubrics does
+@dataclass(frozen=True, slots=True)
+class TypeFolders:
+    """The `share` folders with the types that nodes can use, besides those of authors."""
 
+    installed: tuple[Path, ...]
+    shipped: tuple[Path, ...]  # of what ships with the grader and is not installed
+
+
+def type_folders() -> TypeFolders | None:
+    """Return where the descriptions of types are; None without ROS."""
     try:
         ros = find_ros()
     except EnvironmentFault:
         return None
-    ready = [package for package in shipped_packages() if not is_installed(package.name, ros)]
-
-    def looked_in(folders: Sequence[Path]) -> Sequence[Path]:
-        own = [offer.package for offer in offers(folders, (), ros)]
-        return [built(needed(own, [*_of_class(course, ros), *ready]), ros).share] if own else []
-
-    return Interfaces(ros.share, [built(ready, ros).share] if ready else [], looked_in).including(course)
+    ready = _ready(ros)
+    return TypeFolders(tuple(ros.share), (built(ready, ros).share,) if ready else ())
 
 
-def _of_class(course: tuple[Path, ...], ros: RosInstallation) -> list[InterfacePackage]:
+def built_from(folders: Iterable[Path], course: Iterable[Path] = ()) -> BuiltInterfaces | None:
+    """Build the packages in the folders of rubrics, which may use those of a course; None if all are installed.
+
+    Raises EnvironmentFault without ROS, DefinitionError with file and line.
+    """
+    ros = find_ros()
+    own = [offer.package for offer in offers(folders, (), ros)]
+    return built(needed(own, [*_of_class(course, ros), *_ready(ros)]), ros) if own else None
+
+
+def _ready(ros: RosInstallation) -> list[InterfacePackage]:
+    return [package for package in shipped_packages() if not is_installed(package.name, ros)]
+
+
+def _of_class(course: Iterable[Path], ros: RosInstallation) -> list[InterfacePackage]:
     return [offer.package for offer in offers((), course, ros)]
 
 
-def modules_for(exercise: Exercise, course: tuple[Path, ...] = ()) -> tuple[Path, ...]:
-    """Return where the modules of a rubric's own interface packages are; empty if it brings none."""
-    if not exercise.interfaces:
-        return ()
-    ros = find_ros()
-    own = [offer.package for offer in offers(map(Path, exercise.interfaces), course, ros)]
-    ready = [package for package in shipped_packages() if not is_installed(package.name, ros)]
-    return (built(needed(own, [*_of_class(course, ros), *ready]), ros).python,)
+def unbuilt(workspace: Path) -> tuple[InterfacePackage, ...]:
+    """Return the packages in a workspace of one's own that nobody has installed; raises DefinitionError."""
+    ros = find_ros(workspaces=True)
+    return tuple(package for package in find_packages(workspace) if not is_installed(package.name, ros))
 
 
-def modules_named(sources: Iterable[bytes], own: Sequence[InterfacePackage], ros: RosInstallation) -> tuple[Path, ...]:
+def is_brought(name: str) -> bool:
+    """Return whether the grader brings a package of this name, which is used where none is installed."""
+    return name in LENDABLE or name in {package.name for package in shipped_packages()}
+
+
+def modules_named(sources: Iterable[bytes], own: Sequence[InterfacePackage]) -> tuple[Path, ...]:
     """Return where the modules of packages are, those given and those of the grader that own programs name.
 
     Args:
         sources: The text of the programs, which need no sandbox.
-        own: Message packages that lie beside them.
-        ros: What is installed, which nothing replaces.
+        own: Message packages that lie beside them; nothing that is installed is replaced.
 
     Raises:
         DefinitionError: A definition cannot be used; it has file and line.
     """
+    ros = find_ros(workspaces=True)
     taken = {package.name for package in own}
     ready = [p for p in shipped_packages() if p.name not in taken and not is_installed(p.name, ros)]
     names = {*(package.name for package in ready), *LENDABLE}
@@ -206,33 +237,36 @@ def described(course: tuple[Path, ...], *, ready: bool = True) -> list[Described
     return found
 
 
-def offered_digest(course: Sequence[Path], exercises: Iterable[Exercise]) -> str:
-    """Return the digest of all packages of rubrics and class; empty if there are none."""
-    packages = packages_in(dict.fromkeys((*(Path(f) for e in exercises for f in e.interfaces), *course)))
+def offered_digest(course: Iterable[Path], rubric: Iterable[Path]) -> str:
+    """Return the digest of all packages in the folders of a class and of rubrics; empty if there are none."""
+    packages = packages_in(dict.fromkeys((*rubric, *course)))
     return _digest(packages) if packages else ""
 
 
-def provide(
+def provide(  # noqa: PLR0913 - who brings packages, and who needs them
     session: RecordingSession,
-    exercises: Sequence[Exercise],
-    course: Sequence[Path],
     submission: Submission,
+    *,
+    course: Sequence[Path] = (),
+    rubric: Sequence[Path] = (),
+    text: bytes = b"",
     budget_s: float = FOREVER_S,
 ) -> Provided:
     """Build what a run needs: the packages of rubrics and class, those of the grader that it names, and a submission's.
 
     Args:
         session: Its sandbox and limits hold for the packages of the submission.
-        exercises: The exercises to grade.
-        course: The folders of the class.
         submission: The staged submission.
+        course: The folders of the class.
+        rubric: The folders of rubrics.
+        text: Names types that the run uses besides those that the programs name.
         budget_s: Real time that may be spent on the packages of the submission.
     """
     ros, root = session.ros, submission.root
-    given = offers((Path(folder) for e in exercises for folder in e.interfaces), course, ros)
+    given = offers(rubric, course, ros)
     taken = {offer.package.name for offer in given}
     ready = [p for p in shipped_packages() if p.name not in taken and not is_installed(p.name, ros)]
-    texts = chain([repr(exercises).encode("utf-8", "replace")], _programs(root))
+    texts = chain([text], _programs(root))
     names = {*(package.name for package in ready), *LENDABLE}
     mentioned = _named_in(texts, names)
     lent = lent_to(mentioned, lambda name: is_installed(name, ros))
@@ -253,24 +287,11 @@ def provide(
         own = replace(again, spent_s=own.spent_s + again.spent_s)
         builds += [_copied(folder, root.parent) for folder in own.builds]
     packages = tuple(sorted([*brought, *own.packages], key=lambda package: package.name))
-    offered = offered_digest(course, exercises)
+    offered = offered_digest(course, rubric)
     lent_at = (copied(lent.names, session.folder),) if lent.names else ()
     notes = tuple(_notes(packages, lent))
     own_builds = len(builds) - given_builds
     return Provided(packages, tuple(builds), offered, notes, own.problems, lent_at, own.spent_s, own_builds)
-
-
-def definitions(traces: Iterable[Trace], provided: Provided) -> dict[str, Definition]:
-    """Return the definitions of the recorded message types that are not installed, for evidence."""
-    if not provided.builds:
-        return {}
-    from grader.grading.rubrics.interfaces import Interfaces  # noqa: PLC0415 - as above
-
-    names = {package.name for package in provided.packages}
-    types = {o.type for trace in traces for o in trace.observations if isinstance(o, (Message, Delivery))}
-    wanted = sorted(type_ for type_ in types if type_.partition("/")[0] in names and "/msg/" in type_)
-    known = Interfaces([BuiltInterfaces(prefix, ()).share for prefix in provided.builds])
-    return {type_: found for type_ in wanted if (found := known.definition(type_)) is not None}
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,16 +22,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from grader.cli import main
 from grader.course.classroom.store import Conditions
-from grader.grading.app import interface_packages
-from grader.grading.app.interface_packages import (
-    GRADER,
-    RUBRIC,
-    SUBMISSION,
-    Provided,
-    known_interfaces,
-    offered_digest,
-    provide,
-)
+from grader.grading.app.interfaces import known_interfaces
 from grader.grading.app.keeping import EvidenceWriter
 from grader.grading.app.rejudge import judgement, rejudge
 from grader.grading.app.request import GradeRequest
@@ -42,6 +33,15 @@ from grader.grading.model.report import Report
 from grader.grading.reporting.json_report import report_to_json
 from grader.grading.rubrics.interfaces import Interfaces
 from grader.grading.submissions.projects import read_projects
+from grader.runtime import interface_packages
+from grader.runtime.interface_packages import (
+    GRADER,
+    RUBRIC,
+    SUBMISSION,
+    Provided,
+    offered_digest,
+    provide,
+)
 from grader.runtime.model.submission import Submission
 from grader.runtime.ros_installation import find_ros
 from grader.runtime.session import RecordingSession, open_session
@@ -150,7 +150,7 @@ def provided(
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
     submission = Submission("own", str(folder), folder / "own", "", projects=read_projects(folder / "own")[0])
-    return provide(session, (), (), submission, budget_s)
+    return provide(session, submission, budget_s=budget_s)
 
 
 @pytest.mark.sandbox

@@ -8,8 +8,8 @@ from dataclasses import field
 from fractions import Fraction
 from typing import Any
 
+from grader.course.class_page.contents import LOST
 from grader.grading.model.exercise import Outcome
-from grader.grading.reporting.class_page.contents import LOST
 from grader.grading.reporting.json_report import ReportData
 from grader.runtime.model.dataclass import dataclass
 

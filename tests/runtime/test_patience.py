@@ -7,9 +7,9 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from grader.runtime import machine
+from grader.runtime import patience
 from grader.runtime.host import originals
-from grader.runtime.machine import BRIEF_S, LOSSES, MOST_BUSY, SETTLE_S, Patience
+from grader.runtime.patience import BRIEF_S, LOSSES, MOST_BUSY, SETTLE_S, Patience
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def waited(monkeypatch: pytest.MonkeyPatch) -> list[float]:
         found.append(seconds)
         return condition()
 
-    monkeypatch.setattr(machine, "wait_until", wait_until)
+    monkeypatch.setattr(patience, "wait_until", wait_until)
     monkeypatch.setattr("os.getloadavg", lambda: (0.0, 0.0, 0.0))
     return found
 
