@@ -247,7 +247,6 @@ class _Grading:
 
             open_page(self.page)
             self.page = None
-        from grader.grading.model.report import exit_code
 
         return exit_code(seen, self.min_score)
 

@@ -142,7 +142,6 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
 
             data = report_to_json(told(report, for_whom))
             _add_marks([(report.name, folder, page, data) for page in pages])
-    from grader.grading.model.report import exit_code
 
     return exit_code(told(report, for_whom), min_score)
 
