@@ -35,7 +35,8 @@ _MARKDOWN_SIGNS = frozenset("\\`*_[]~$<>&|#@")
 _NOTHING_VISIBLE = "&#8203;"
 # Text that GitHub turns into a mention, reference, link or picture without any Markdown syntax.
 _LINKED = re.compile(r"(?i)(?P<before>(?:https?|ftp|www|GH|:[a-z0-9_+-]{1,40}(?=:)))(?P<sign>[:.-])")
-_LISTED = re.compile(r"(?P<number>[0-9]{0,9})(?P<sign>[-+=.)])")
+# What begins a list, a rule, or the line below the head of a table: `- x`, `1. x`, `===`, `:-`.
+_LISTED = re.compile(r"(?P<number>[0-9]{0,9})(?P<sign>[-+=.)]|:(?=-))")
 _BACKTICKS = re.compile("`+")
 
 # Characters that make spreadsheets read a cell as a formula; Excel also accepts the full-width forms.

@@ -97,6 +97,8 @@ PLACES = {
 @pytest.mark.parametrize("place", PLACES)
 @given(text=ANYTHING)
 @example(text="- x")
+@example(text=":-")
+@example(text=":-:")
 @example(text="1. x")
 @example(text="12) x")
 @example(text="===")
