@@ -123,7 +123,7 @@ def test_what_a_replaced_function_raises_is_the_program_s(run: Run) -> None:
         ("ledger", "BACKGROUND_SERVICES", "5", "ledger.py"),
         ("ledger", "_is_background", "lambda: None", "ledger.py"),
         ("ros", "BACKGROUND", "5", "ros.py"),
-        ("ros", "MESSAGES_PER_FLUSH", "None", "ros.py"),
+        ("ledger", "MESSAGES_PER_FLUSH", "None", "ledger.py"),
         ("virtual", "MOST_MOVES", "{}", "virtual.py"),
     ],
 )
