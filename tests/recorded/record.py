@@ -15,10 +15,9 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 
-from places import GRADE
-
 sys.path.append(str(Path(__file__).resolve().parent.parent / "support"))
 from archive import SEED, Recorded, charted, judged, recorded_in, recorded_of, told, write_archive
+from places import GRADE
 from ruamel.yaml import YAML
 from sample_folders import ARCHIVE, CHARTS, GOLDEN, collection_of, collections, expected, expected_in, table
 
