@@ -130,6 +130,7 @@ def asked_of_probe(bait: Bait) -> dict[str, Any]:
     """Return the supervisor's part of the probe's arguments; the worker adds the rest."""
     hidden = (
         bait.canary,
+        PACKAGE / "runtime" / "model" / "trace.py",
         PACKAGE / "grading" / "model" / "report.py",
         PACKAGE / "grading" / "judging" / "__init__.py",
         *map(Path, MACHINES),
