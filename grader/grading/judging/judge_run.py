@@ -332,7 +332,8 @@ class VerdictBuilder:
         reason = f"{unnamed}: {looked_for.problem or 'not in the submission'}"
         found = () if looked_for.problem else (*similar, *others)
         reason += f"; found {listed(found, len(found))}{' instead' if similar else ''}" if found else ""
-        return _without_points(criterion, Outcome.NOT_MET, reason, hint=hint, evidence=evidence)
+        verdict = _without_points(criterion, Outcome.NOT_MET, reason, hint=hint, evidence=evidence)
+        return replace(verdict, missing_file=unnamed)
 
 
 def _how_to_install(executable: str, submission: Submission) -> str:

@@ -43,7 +43,7 @@ class Verdict:
     location: Location | None = None  # place in the student's file
     evidence: Mapping[str, Any] = field(default_factory=dict)  # plain JSON values
     blocked_by: str = ""  # id of the criterion that has to be met before this one can be judged; empty if there is none
-    missing_file: str = ""  # the missing file that both need, if that is the reason; empty otherwise
+    missing_file: str = ""  # the missing file that it needs, if that is the reason; empty otherwise
     # Id of the criterion that lost its points for the same cause and explains it; empty if none does
     same_cause_as: str = ""
     # The problem that its check found, for programs; None if the check finds only one, or a fault

@@ -58,7 +58,7 @@ def _outlines(page: Page, exercises: Sequence[ExerciseReport], first: Verdict | 
     """Write each exercise in short; of those that nothing was handed in for, only what is missing."""
     follows = False
     for exercise in exercises:
-        missing = [str(v.missing_file or v.evidence.get("missing", "")) for v in exercise.verdicts]
+        missing = [v.missing_file for v in exercise.verdicts]
         absent = bool(missing) and all(missing)
         if not (absent and follows):
             page.blank()

@@ -106,20 +106,15 @@ def first_to_fix(report: Report) -> tuple[ExerciseReport, Verdict] | None:
 
     An exercise that nothing was handed in for comes first only if there is no other.
     """
-    begun = [e for e in report.exercises if not all(map(_needs_absent, e.verdicts))] or report.exercises
+    begun = [e for e in report.exercises if not all(map(_is_absent, e.verdicts))] or report.exercises
     lost = [(e, v) for e in begun for v in e.verdicts if v.outcome in _LOST and not v.same_cause_as]
     return next((found for found in lost if not _is_absent(found[1])), lost[0] if lost else None)
 
 
-def _needs_absent(verdict: Verdict) -> bool:
-    """Return whether a verdict says only that a file is missing."""
-    return bool(verdict.missing_file) or _is_absent(verdict)
-
-
 def _is_absent(verdict: Verdict) -> bool:
-    """Return whether a file is missing, without another that may be meant."""
+    """Return whether a verdict says only that a file is missing, and no other may be meant."""
     known = verdict.evidence
-    return bool(known.get("missing")) and not (known.get("similar") or known.get("likely"))
+    return bool(verdict.missing_file) and not (known.get("similar") or known.get("likely"))
 
 
 def reason(verdict: Verdict) -> str:

@@ -255,7 +255,7 @@ def test_a_missing_file_costs_one_line() -> None:
     assert first.reason == "velocity_publisher.py: not in the submission; found velocitypublisher.py instead"
     assert first.hint == "rename velocitypublisher.py to velocity_publisher.py"
     assert second.reason == third.reason == "not judged: needs velocity_publisher.py, which is missing"
-    assert [(v.blocked_by, v.missing_file) for v in report.verdicts] == [("", ""), ("a", FILE), ("a", FILE)]
+    assert [(v.blocked_by, v.missing_file) for v in report.verdicts] == [("", FILE), ("a", FILE), ("a", FILE)]
     assert report.score == 0
 
 

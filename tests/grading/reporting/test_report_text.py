@@ -213,9 +213,22 @@ def test_an_exercise_that_was_not_begun_is_never_the_first_to_fix() -> None:
     assert "Fix first: c.py: not in the submission" in render(report(absent, partner))
 
 
+@pytest.mark.parametrize("values", [[], [20.5], "20.5"])
+def test_what_a_check_calls_missing_is_no_missing_file(values: object) -> None:
+    """The evidence of checks has names of its own: values that no log shows are missing too."""
+    lost = criterion("f", "F", 5, Outcome.NOT_MET, reason="20.5 is not logged", evidence={"missing": values})
+    absent = exercise("g", "2", "G", *missing("b.py"))
+    text = render(report(absent, exercise("f", "1", "F", lost)))
+    assert "Fix first: 20.5 is not logged" in text
+    assert "Exercise 1: F (0 of 5 points)" in text
+    met = exercise("f", "1", "F", replace(lost, outcome=Outcome.MET, score=lost.max_score))
+    assert "Exercise 1: F (5 of 5 points)" in render(report(met))
+
+
 def missing(file: str, **evidence: str) -> tuple[Verdict, Verdict]:
     known = {"missing": file, "similar": [], **evidence}
-    first = criterion("f", "F", 5, Outcome.NOT_MET, reason=f"{file}: not in the submission", evidence=known)
+    said = f"{file}: not in the submission"
+    first = criterion("f", "F", 5, Outcome.NOT_MET, reason=said, evidence=known, missing_file=file)
     reason = f"not judged: needs {file}, which is missing"
     return first, criterion("g", "G", 4, Outcome.BLOCKED, reason=reason, blocked_by="f", missing_file=file)
 
