@@ -167,7 +167,13 @@ def _remark(node: Mapping[str, Any]) -> str:
     least = f"at least {node['minimum']}" if "minimum" in node else ""
     default = node.get("default")
     usual = f"`{str(default).lower()}` by default" if default not in (None, [], {}) else ""
-    return _cell("; ".join(filter(None, [node.get("description", ""), least, usual])))
+    return _cell("; ".join(filter(None, [_about(node), least, usual])))
+
+
+def _about(node: Mapping[str, Any]) -> str:
+    """Return what a key is for, which stands with its value where a variant may stand instead."""
+    options = [node, *(option for option in node.get("anyOf", []) if "$ref" not in option)]
+    return next((option["description"] for option in options if "description" in option), "")
 
 
 def _kind(node: Mapping[str, Any]) -> str:

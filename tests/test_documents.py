@@ -6,6 +6,8 @@ What the site adds, it takes from the code.
 import ast
 import re
 import shlex
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -69,6 +71,31 @@ def missing(text: str, folder: Path) -> list[str]:
     dead = [target for target in links(text) if not (folder / target).exists() and target not in made]
     named = [str(rubric_file(Path(path))) for path in paths(text) if not _SCHEMA.search(path)]
     return dead + [path for path in named if not any(ROOT.glob(path.rstrip("/")))]
+
+
+#: A script of this repository in a command, such as `.venv/bin/python docs/generated.py`.
+_SCRIPT = re.compile(r"\bpython3? ((?:benchmarks|docs|tests)/[\w/]+\.py)")
+#: Runs a script as far as its imports, which find what is in its folder.
+_LOAD = "import os, runpy, sys; p = sys.argv[1]; sys.path[0] = os.path.dirname(p); runpy.run_path(p, run_name='loaded')"
+
+
+@pytest.mark.slow
+def test_scripts_in_documents_find_what_they_import(tmp_path: Path) -> None:
+    """In a shell, which has no settings of pytest; each in a process of its own."""
+    found = {path for name in DOCUMENTS for path in _SCRIPT.findall((ROOT / name).read_text(encoding="utf-8"))}
+    assert "tests/recorded/record.py" in found
+    lost = tmp_path / "lost.py"
+    lost.write_text("import class_of_nowhere\n")
+    told = {path: _loading(path) for path in (*sorted(found), str(lost))}
+    assert "class_of_nowhere" in told.pop(str(lost))
+    assert {path: said for path, said in told.items() if said} == {}
+
+
+def _loading(path: str) -> str:
+    """Return what a script says that cannot be loaded."""
+    command = [sys.executable, "-c", _LOAD, path]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return done.stderr if done.returncode else ""
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)

@@ -19,10 +19,11 @@ def count_phrase(count: Count) -> str:
 
 
 def cases_phrase(items: tuple[object, ...], what: str) -> str:
-    """Describe how many cases there are, and whether their order is drawn."""
+    """Describe how many cases there are, and whether their order is drawn; `what` is their name in the plural."""
     low, high = cases(items)
     order = " in a drawn order" if is_drawn(items) else ""
-    return f"{low if low == high else f'{low} to {high}'} {what}{order}"
+    named = what.removesuffix("s") if low == high == 1 else what
+    return f"{low if low == high else f'{low} to {high}'} {named}{order}"
 
 
 def is_drawn(items: tuple[object, ...]) -> bool:
