@@ -9,6 +9,8 @@ import pytest
 from places import ROOT
 
 pytest.importorskip("rclpy", reason="needs rclpy")
+from std_srvs.srv import Trigger
+
 pytestmark = pytest.mark.ros
 
 HOST = str(ROOT / "grader/runtime/host")
@@ -97,3 +99,34 @@ def test_the_newest_of_several_messages_is_kept_however_late_it_comes(ledger: An
     ledger.expect({"topic /odom": 2})
     assert list(ledger.kept(heard)) == ["newest"]
     assert not ledger.lost
+
+
+class Service:
+    """As much of a service as the ledger asks for; the first request is there, and waits."""
+
+    srv_type = Trigger
+
+    def __init__(self, name: str) -> None:
+        self.qos_profile = type("Qos", (), {"depth": 10})()
+        self.handle = Handle(["first"])
+        self.handle.name = name  # type: ignore[attr-defined]
+
+
+@pytest.mark.rule(11)
+def test_the_newest_of_more_requests_than_a_queue_holds_may_arrive_first(
+    ledger: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or the one that a server takes next would depend on which of them had already been dropped."""
+    waits: list[float] = []
+    monkeypatch.setattr(importlib.import_module("_grader_host.originals"), "sleep", waits.append)
+    server = Service("/work")
+    ledger.add("service", server)
+    for _ in range(3):
+        ledger.expect({"request /work": 3})
+    assert waits == []
+    ledger.expect({"request /work": 3})
+    assert len(waits) == 1
+    assert ledger._expected[server] == 10  # what was dropped never comes
+    ledger.took(server)
+    ledger.expect({"request /work": 1})
+    assert len(waits) == 1
