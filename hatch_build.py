@@ -90,11 +90,16 @@ def write_man_pages(root: Path, folder: Path, version: str) -> list[Path]:
 
     from grader.cli.main import app  # noqa: PLC0415
 
+    def below(command: click.Command) -> dict[str, click.Command]:
+        context = click.Context(command)
+        words = command.list_commands(context) if isinstance(command, click.Group) else []
+        found = {word: command.get_command(context, word) for word in words}
+        return {word: each for word, each in found.items() if each is not None and not each.hidden}
+
     def write(command: click.Command, name: str) -> None:
         command.help = _LINES.sub(lambda match: match[1].replace("\n", "\n\n"), inspect.cleandoc(command.help or ""))
         command.short_help = command.help.partition("\n")[0].rstrip(".")
-        subcommands = command.commands if isinstance(command, click.Group) else {}
-        for word, subcommand in subcommands.items():
+        for word, subcommand in below(command).items():
             write(subcommand, f"{name} {word}")
         page = generate_man_page(click.Context(command, info_name=name), version)
         (folder / f"{name.replace(' ', '-')}.1").write_text(page, encoding="utf-8")
@@ -102,9 +107,8 @@ def write_man_pages(root: Path, folder: Path, version: str) -> list[Path]:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     default = app.default
-    visible = {name: command for name, command in app.commands.items() if not command.hidden}
     text = f"{inspect.cleandoc(default.help or '')}\n\n{default.epilog}"
-    write(click.Group("grade", visible, params=default.params, help=text, subcommand_metavar=""), "grade")
+    write(click.Group("grade", below(app), params=default.params, help=text, subcommand_metavar=""), "grade")
     return sorted(folder.iterdir())
 
 

@@ -64,8 +64,10 @@ def commands() -> str:
 
 
 def _subcommands(path: str, group: click.Group) -> Iterator[str]:
-    for name, command in sorted(group.commands.items()):
-        if command.hidden:
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        if command is None or command.hidden:
             continue
         if isinstance(command, click.Group):
             yield f"\n## `{path} {name}`\n\n{_described(command)}\n"

@@ -116,8 +116,11 @@ def test_each_command_has_a_man_page_that_can_be_shown(wheel: Path, tmp_path: Pa
     """It travels where installers put man pages, and the formatter has no complaint."""
 
     def pages(command: click.Command, name: str) -> set[str]:
-        below = command.commands if isinstance(command, click.Group) else {}
-        shown = {word: each for word, each in below.items() if not each.hidden}
+        found: dict[str, click.Command | None] = {}
+        if isinstance(command, click.Group):
+            context = click.Context(command)
+            found = {word: command.get_command(context, word) for word in command.list_commands(context)}
+        shown = {word: each for word, each in found.items() if each is not None and not each.hidden}
         return {f"{name}.1"}.union(*(pages(each, f"{name}-{word}") for word, each in shown.items()))
 
     archive = zipfile.ZipFile(wheel)

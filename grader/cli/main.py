@@ -11,30 +11,27 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 import grader
-from grader.cli import batch, completion, export, interfaces, rejudge, rubric, upload, verify
-from grader.cli.completion import complete_criterion, complete_file
+from grader.cli.completion import complete_file
 from grader.cli.options import (
     PATH,
-    RUBRIC,
     audience_options,
     complain,
     drawn_by,
     drawn_with,
-    inputs_options,
     parse_percent,
-    print_result,
     readers,
     shown_progress,
 )
 from grader.cli.outputs import outputs_option
 from grader.cli.run_options import run_options
-from grader.grading.model.grading_options import GRADE, OBSERVE, GradingOptions
+from grader.grading.model.grading_options import GRADE, GradingOptions
 from grader.grading.reporting.formats import EVIDENCE, known
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import (
@@ -65,23 +62,53 @@ _EPILOG = (
 )
 #: Garbage is collected after so many new objects: imports make many and no garbage.
 COLLECT_AFTER = 200_000
+# Names of the subcommands, and of their modules.
+_SUBCOMMANDS = (
+    "batch",
+    "completion",
+    "doctor",
+    "explain",
+    "export",
+    "interfaces",
+    "observe",
+    "rejudge",
+    "rubric",
+    "selftest",
+    "upload",
+    "verify",
+)
 # Internal name of the default command; it cannot clash, because a process argument cannot contain a NUL.
 _DEFAULT = "\0"
 
 
 class CommandLine(click.Group):
-    """Subcommands, and a default command that runs if the first argument is none of them."""
+    """Subcommands, and a default command that runs if the first argument is none of them.
 
-    def __init__(self, default: click.Command, **attributes: Any) -> None:
+    A subcommand that is only named is the `command` of its module in this folder, which is imported when it is used or
+    described: all of them take as long as the rest of `grade --version`.
+    """
+
+    def __init__(self, default: click.Command, names: Sequence[str] = (), **attributes: Any) -> None:
         super().__init__(**attributes)
         self.default = default
+        self.names = names
         self.add_command(default, _DEFAULT)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the subcommands."""
+        return sorted({*super().list_commands(ctx), *self.names} - {_DEFAULT})
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return the command of a name, or None."""
+        if cmd_name in self.names and cmd_name not in self.commands:
+            self.add_command(import_module(f"grader.cli.{cmd_name}").command, cmd_name)
+        return super().get_command(ctx, cmd_name)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Insert the default command unless the first argument is a subcommand."""
         if ctx.resilient_parsing and not args:
             return super().parse_args(ctx, args)  # a shell completes the first word
-        return super().parse_args(ctx, args if args and args[0] in self.commands else [_DEFAULT, *args])
+        return super().parse_args(ctx, args if args and args[0] in self.list_commands(ctx) else [_DEFAULT, *args])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[Any]]:
         """Complete the first word: what it may be for the default command, or a subcommand."""
@@ -155,7 +182,7 @@ def _check_submission(submission: str, others: Sequence[str]) -> None:
 
     if others:
         raise too_many(submission, others)
-    hint = meant_by(submission, [name for name in app.commands if name != _DEFAULT])
+    hint = meant_by(submission, _SUBCOMMANDS)
     if hint:
         raise not_there(submission, hint)
 
@@ -289,120 +316,9 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
     return EvidenceWriter(folders, request)
 
 
-@click.command(name="observe")
-@click.argument("files", metavar="PROGRAM...", nargs=-1, required=True, type=PATH)
-@click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
-@run_options(OBSERVE)
-@inputs_options
-@click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
-def _observe(  # noqa: PLR0913  one parameter an option
-    *,
-    files: tuple[Path, ...],
-    duration: float,
-    options: GradingOptions,
-    sent: tuple[str, ...],
-    simulations: tuple[str, ...],
-    as_json: bool,
-) -> int:
-    """Run nodes together, without a rubric, and say what they do.
-
-    A PROGRAM is a .py file, a launch file, a package or workspace with all its executables, or one of these as
-    FOLDER/NAME or FOLDER/PACKAGE/NAME.
-    Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
-    """
-    from grader.grading.app import observe
-    from grader.grading.app.inputs import read_sent, read_simulations
-    from grader.grading.reporting.observed import render_summary, summary_to_json
-
-    request = observe.ObserveRequest(
-        files,
-        round(duration * 1e9),
-        options.bags,
-        options.clock,
-        options.isolation,
-        options.interfaces,
-        read_simulations(simulations),
-        read_sent(sent),
-    )
-    with shown_progress(wanted=True) as progress:
-        summary = observe.observe(request, progress)
-    print_result(lambda: summary_to_json(summary), lambda _: render_summary(summary), as_json=as_json)
-    return ALL_MET
-
-
-@click.command(name="doctor")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
-def _doctor(*, as_json: bool) -> int:
-    """Say what this machine can do: ROS, an exchange of messages, sandboxes, limits, and how to fix what is missing.
-
-    Exit codes: 0 if strangers' programs can be graded safely here, 2 if not.
-    """
-    from grader.grading.app.doctor import examine
-    from grader.grading.reporting.doctor import checkup_to_json, render_checkup
-
-    with shown_progress(wanted=True) as progress:
-        checkup = examine(progress)
-    print_result(
-        lambda: checkup_to_json(checkup),
-        lambda layout: render_checkup(checkup, width=layout.width, colour=layout.colour),
-        as_json=as_json,
-    )
-    return ALL_MET if checkup.safe else UNUSABLE
-
-
-@click.command(name="explain")
-@click.argument("name", metavar="[NAME]", required=False, shell_complete=complete_criterion)
-@click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Look in this rubric; repeatable.")
-@click.option("--rules", is_flag=True, help="List the hint rules by priority: all, or those for the check NAME.")
-@click.option("--on", "evidence", metavar="EVIDENCE", type=PATH, help="Try the rules on this kept recording.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
-def _explain(*, name: str | None, rubrics: tuple[Path, ...], rules: bool, evidence: Path | None, as_json: bool) -> int:
-    """Explain the criterion or the check NAME; without a name, list all of them.
-
-    Says what is asked, in which situation and with which tolerance it is measured, and which part of the chapter asks
-    for it. With --rules, lists the rules that find hints; with --rules --on EVIDENCE, those that apply to a recording.
-    """
-    if evidence is not None and (not rules or name is not None):
-        raise click.BadParameter("--on needs --rules, and no NAME: all rules are tried on the recording")
-    if rules:
-        return _explain_rules(name or "", rubrics, evidence, as_json=as_json)
-    from grader.grading.app.explain import everything, explain
-    from grader.grading.reporting.explained import explanations_to_json, list_all, render_explanations
-
-    found = everything(rubrics) if name is None else explain(name, rubrics)
-    render = list_all if name is None else render_explanations
-    print_result(lambda: explanations_to_json(found), lambda page: render(found, width=page.width), as_json=as_json)
-    return ALL_MET
-
-
-def _explain_rules(name: str, rubrics: tuple[Path, ...], evidence: Path | None, *, as_json: bool) -> int:
-    from grader.grading.app.hint_rules import explain_rules, try_rules
-    from grader.grading.reporting.explained import render_rules, render_trials, rules_to_json
-
-    if evidence is None:
-        rules = explain_rules(rubrics, name)
-        print_result(lambda: rules_to_json(rules), lambda page: render_rules(rules, width=page.width), as_json=as_json)
-        return ALL_MET
-    trials = try_rules(evidence, rubrics)
-    print_result(lambda: rules_to_json(trials), lambda page: render_trials(trials, width=page.width), as_json=as_json)
-    return ALL_MET
-
-
-#: The command `grade`; further subcommands are added to it.
-app = CommandLine(_grade, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
+#: The command `grade`.
+app = CommandLine(_grade, _SUBCOMMANDS, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
 _grade.context_settings = {**app.context_settings, "allow_extra_args": True}
-app.add_command(_observe)
-app.add_command(rejudge.command)
-app.add_command(verify.command)
-app.add_command(batch.command)
-app.add_command(upload.command)
-app.add_command(_explain)
-app.add_command(_doctor)
-app.add_command(interfaces.command)
-app.add_command(completion.command)
-app.add_command(export.command)
-app.add_command(rubric.command)
-app.add_command(rubric.selftest_command)
 
 
 def main() -> None:
@@ -421,6 +337,9 @@ def _guarded(run: Callable[[], object]) -> int:
         code = run()
     except click.exceptions.Exit:
         raise
+    except click.exceptions.NoArgsIsHelpError as error:
+        error.show()
+        return UNUSABLE
     except click.ClickException as error:
         from grader.cli.near_misses import hint_for
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from grader.grading.model.rubric_files import rubric_file
+from grader.grading.model.rubric_files import rubric_file, rubric_files
 from grader.runtime.model.errors import GraderError
 
 if TYPE_CHECKING:
@@ -36,6 +36,12 @@ class RubricPath(click.Path):
 
 RUBRIC = RubricPath(path_type=Path)
 _Command = TypeVar("_Command", bound=Callable[..., object])
+
+
+def all_rubrics(ctx: click.Context, param: click.Parameter, named: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Return the files of the rubrics that are named, for the parameter of a command."""
+    del ctx, param
+    return rubric_files(named)
 
 
 def audience_options(command: _Command) -> _Command:

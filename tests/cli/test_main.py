@@ -557,6 +557,30 @@ def test_help_starts_light() -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def test_a_subcommand_is_imported_when_it_is_used() -> None:
+    """Grading does not wait for the modules of a class, and each subcommand is there all the same."""
+    code = (
+        "import sys\nfrom grader.cli import main\n"
+        "try: main.app(['--version'])\nexcept SystemExit: pass\n"
+        "early = [name for name in main.app.names if f'grader.cli.{name}' in sys.modules]\n"
+        "context = main.click.Context(main.app)\n"
+        "there = [main.app.get_command(context, name).name for name in main.app.list_commands(context)]\n"
+        "print(early, there == sorted(main.app.names), len(there))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    # The everyday command completes words as well
+    assert (done.stdout.splitlines()[-1], done.stderr) == ("['completion'] True 12", "")
+
+
+@pytest.mark.parametrize("name", ["rubric", "upload", "export", "interfaces"])
+def test_a_command_with_subcommands_alone_shows_its_help(name: str) -> None:
+    """As help is laid out, on standard error, and with the exit code of a command that cannot be used."""
+    result = grade(name)
+    assert (result.stdout, result.exit_code) == ("", 2)
+    assert result.stderr.startswith(f"Usage: grade {name} [OPTIONS] COMMAND")
+    assert "\n\nCommands:\n" in result.stderr
+
+
 def test_pictures_are_drawn_where_a_report_shows_them(run_session: Session, tmp_path: Path) -> None:
     """Drawing takes about as long as judging, and text shows none."""
     grade("ada")
