@@ -23,8 +23,11 @@ _STAND_INS = {
 def parsed(words: list[str]) -> None:
     """Parse a command without running it; raises click.ClickException if it has no such subcommand or option."""
     command: click.Command = app
-    while isinstance(command, click.Group) and words and words[0] in command.commands:
-        command, words = command.commands[words[0]], words[1:]
+    while isinstance(command, click.Group) and words:
+        found = command.get_command(click.Context(command), words[0])
+        if found is None:
+            break
+        command, words = found, words[1:]
     if command is app:
         command = app.default
     # In a sentence, `grade batch` and `grade rubric` name a command.

@@ -206,7 +206,9 @@ def test_an_old_part_is_noticed() -> None:
 def test_the_site_names_every_command_option_check_and_key() -> None:
     """The pages are made from the code; nothing of it is left out."""
     commands, checks, grammar, gallery, examples, interface, _ = (make() for make in generated.NAMES.values())
-    for name, command in app.commands.items():
+    for name in app.names:
+        command = app.get_command(click.Context(app), name)
+        assert command is not None, name
         described = [parameter for parameter in command.params if not getattr(parameter, "hidden", False)]
         options = [option for parameter in described for option in parameter.opts if option.startswith("--")]
         assert command.hidden or f"`grade {name}`" in commands
