@@ -301,7 +301,7 @@ def player(mine: str, theirs: str, *, serves: bool = False, last: int = 10_000, 
 
 def test_nodes_that_answer_each_other_without_end_end_the_run() -> None:
     """After some messages at one instant each takes time, and after many more the run ends, however busy a node is."""
-    slow = player("/a", "/b", serves=True, cost_ns=HOPELESS_NS // HOPS)
+    slow = player("/a", "/b", serves=True, cost_ns=HOPELESS_NS // (HOPS // 2 + 1))
     run = Run(slow, player("/b", "/a"), stop_when_unfit=True)
     later = [10 * MS + n * HOP_NS for n in range(1, MOST_HOPS - HOPS + 1)]
     assert [m.t_ns for m in run.trace.messages()] == [*[10 * MS] * (HOPS + 1), *later]
