@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from typing import Protocol
 
 from grader.runtime.host.originals import wait_until
 
@@ -23,15 +24,25 @@ def load_per_processor() -> float:
         return 1.0
 
 
+class Wait(Protocol):
+    """Waits until a condition holds, but no longer than some seconds; returns whether it did: see `wait_until`."""
+
+    def __call__(self, condition: Callable[[], bool], seconds: float, *, pause_s: float) -> bool:
+        """Wait, and look at the condition again after each pause."""
+        ...
+
+
 class Patience:
     """The time-out of one recording, which gets short after repeated losses.
 
     Args:
         full_s: Time-out of the first waits, on an idle machine.
+        wait: How to wait.
     """
 
-    def __init__(self, full_s: float = SETTLE_S) -> None:
+    def __init__(self, full_s: float = SETTLE_S, wait: Wait = wait_until) -> None:
         self._full_s = full_s * load_per_processor()
+        self._wait = wait
         self._losses = 0
 
     @property
@@ -51,7 +62,7 @@ class Patience:
 
     def wait(self, condition: Callable[[], bool], *, pause_s: float = 0.00015) -> bool:
         """Wait until a condition holds; return whether it did before the time-out."""
-        came = wait_until(condition, self.wait_s, pause_s=pause_s)
+        came = self._wait(condition, self.wait_s, pause_s=pause_s)
         if not came:
             self.lose()
         return came

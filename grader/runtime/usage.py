@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Collection, Iterable
+from typing import Protocol
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import Limits
@@ -18,6 +19,38 @@ FULL_BYTES, FULL_CODE = 300 * MIB, 77
 WORKER_CPU_S, WORKER_SHARE = 20, 0.25
 #: The writable folders of a sandbox that has its own file systems.
 FOLDERS = ("tmp", "dev/shm")
+
+
+class Kernel(Protocol):
+    """The functions of this module with which a recording is watched: whoever calls them is handed the module."""
+
+    def scratch_names(self, pids: Iterable[int]) -> int:
+        """See `scratch_names`."""
+        ...
+
+    def usage(self, pids: Iterable[int]) -> Usage:
+        """See `usage`."""
+        ...
+
+    def families(self, roots: Collection[int]) -> dict[int, set[int]]:
+        """See `families`."""
+        ...
+
+    def last_pid(self) -> str:
+        """See `last_pid`."""
+        ...
+
+    def innermost(self, root: int) -> int:
+        """See `innermost`."""
+        ...
+
+    def threads_starved_ns(self, pids: Iterable[int]) -> dict[str, int]:
+        """See `threads_starved_ns`."""
+        ...
+
+    def thread_starved_ns(self, pid: int, thread: int | str) -> int:
+        """See `thread_starved_ns`."""
+        ...
 
 
 def scratch_names(pids: Iterable[int]) -> int:

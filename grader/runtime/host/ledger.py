@@ -62,12 +62,45 @@ ENDS_OF_TOPICS = ("publisher", "subscription")
 TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
 #: The QoS of a lifecycle state machine's publisher, which is not an rclpy publisher.
 _ORDINARY = {"reliable": True, "latched": False, "deadline_ns": 0, "manual": False, "lease_ns": 0}
+REAL_WAIT_SET: Any = _rclpy.WaitSet
+
+
+def await_ready(receiver: Any, context: Any, within_s: float = ARRIVAL_S) -> bool:
+    """Wait, in real time, until one message can be taken from a receiver."""
+    if isinstance(receiver, Receiver):
+        return receiver.is_ready_within(within_s, REAL_WAIT_SET, context)
+    kind = (
+        "subscription"
+        if hasattr(receiver, "topic_name")
+        else "client"
+        if hasattr(receiver, "call_async")
+        else "service"
+    )
+    with context.handle, receiver.handle:
+        wait_set = REAL_WAIT_SET(kind == "subscription", 0, 0, kind == "client", kind == "service", 0, context.handle)
+
+        def is_ready() -> bool:
+            wait_set.clear_entities()
+            getattr(wait_set, f"add_{kind}")(receiver.handle)
+            wait_set.wait(ONE_WAIT_NS)
+            return receiver.handle.pointer in wait_set.get_ready_entities(kind)
+
+        return originals.wait_until(is_ready, within_s, pause_s=0)
 
 
 class Ledger:
-    """The endpoints of one process and the traffic on them."""
+    """The endpoints of one process and the traffic on them.
 
-    def __init__(self) -> None:
+    Args:
+        await_ready: Waits for a message; see `await_ready`.
+        pause: Lets some seconds of real time pass.
+    """
+
+    def __init__(
+        self, await_ready: Callable[..., bool] = await_ready, pause: Callable[[float], None] = originals.sleep
+    ) -> None:
+        self._await_ready = await_ready
+        self._pause = pause
         self.sent: Counter[str] = Counter()
         #: How many of them were sent before anybody could have discovered their publisher.
         self.early: Counter[str] = Counter()
@@ -312,7 +345,7 @@ class Ledger:
                     self._keep_all(receiver, more=before + count > depth)
         self.await_arrivals(list(self._expected))
         if overflows:
-            originals.sleep(QUIET_S)  # or which requests are dropped would depend on when the newest arrive
+            self._pause(QUIET_S)  # or which requests are dropped would depend on when the newest arrive
 
     def _keep_all(self, subscription: Any, *, more: bool) -> None:
         """Take all expected messages of a subscription that no wait set reads, and keep as many as its queue holds.
@@ -333,8 +366,8 @@ class Ledger:
         while self._expected.get(subscription, 0) > 0 and self.await_arrivals([subscription]):
             take()
             self._expected[subscription] -= 1
-        context = self._context()
-        while more and context is not None and _valid(subscription) and _await_ready(subscription, context, QUIET_S):
+        context = self._context() if more else None
+        while context is not None and _valid(subscription) and self._await_ready(subscription, context, QUIET_S):
             take()
 
     def kept(self, subscription: Any) -> deque[Any]:
@@ -353,7 +386,7 @@ class Ledger:
         for receiver in receivers:
             if self._expected.get(receiver, 0) <= 0 or not _valid(receiver) or context is None:
                 continue
-            if _await_ready(receiver, context):
+            if self._await_ready(receiver, context):
                 arrived = True
             else:
                 # a subscription that replaced another may have missed messages in between, as in any ROS system
@@ -642,29 +675,3 @@ def _asked(look: Callable[[], Any]) -> int | None:
         return int(look())
     except _rclpy.RCLError:
         return None
-
-
-def _await_ready(receiver: Any, context: Any, within_s: float = ARRIVAL_S) -> bool:
-    """Wait, in real time, until one message can be taken from a receiver."""
-    if isinstance(receiver, Receiver):
-        return receiver.is_ready_within(within_s, REAL_WAIT_SET, context)
-    kind = (
-        "subscription"
-        if hasattr(receiver, "topic_name")
-        else "client"
-        if hasattr(receiver, "call_async")
-        else "service"
-    )
-    with context.handle, receiver.handle:
-        wait_set = REAL_WAIT_SET(kind == "subscription", 0, 0, kind == "client", kind == "service", 0, context.handle)
-
-        def is_ready() -> bool:
-            wait_set.clear_entities()
-            getattr(wait_set, f"add_{kind}")(receiver.handle)
-            wait_set.wait(ONE_WAIT_NS)
-            return receiver.handle.pointer in wait_set.get_ready_entities(kind)
-
-        return originals.wait_until(is_ready, within_s, pause_s=0)
-
-
-REAL_WAIT_SET: Any = _rclpy.WaitSet

@@ -23,17 +23,24 @@ kill = os.kill
 ITERATION_S = 0.02
 
 
-def wait_until(condition: Callable[[], object], seconds: float, pause_s: float = 0.0005) -> bool:
+def wait_until(
+    condition: Callable[[], object],
+    seconds: float,
+    pause_s: float = 0.0005,
+    *,
+    now_s: Callable[[], float] = perf_counter,
+    pause: Callable[[float], None] = sleep,
+) -> bool:
     """Wait, in real time, until a condition holds; return whether it did before the time-out.
 
     An iteration that took longer than `ITERATION_S` counts for no more: meanwhile this process had no processor.
     """
-    left_s, before = seconds, perf_counter()
+    left_s, before = seconds, now_s()
     while not condition():
         if left_s < 0:
             return False
-        sleep(pause_s)
-        now = perf_counter()
+        pause(pause_s)
+        now = now_s()
         left_s -= min(now - before, ITERATION_S)
         before = now
     return True

@@ -69,10 +69,12 @@ class VirtualTime:
 
     Args:
         link: The connection to the grader.
+        real: The real clocks, signals and pauses: the module `originals`.
     """
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: Link, real: Any = originals) -> None:
         self._link = link
+        self._real = real
         self.clock = VirtualClock()
         self.scheduler = Scheduler(lambda: self.clock.now_ns, self._ask_for_time)
         self.clock.let_time_pass = lambda until_ns: self.scheduler.pause(until_ns, polls=True)
@@ -84,7 +86,7 @@ class VirtualTime:
         self._end_ns = 0
         self._free_until_ns = self._moved = self._domain = 0
         self.unreported = False
-        self.resumed_ns = originals.processor_ns()
+        self.resumed_ns = self._real.processor_ns()
         self._worked_ns = 0  # until then, without what the host does while it waits for the grader
         self.running = True
         self.has_blocked = False
@@ -124,7 +126,7 @@ class VirtualTime:
             self.leave,
             self.depart,
             lambda: self.give_up_outside("timed_event"),
-            lambda: self._worked_ns + originals.processor_ns() - self.resumed_ns,
+            lambda: self._worked_ns + self._real.processor_ns() - self.resumed_ns,
         )
         ros.install_events_executor(lambda: self.give_up_outside("events_executor"))
         ros.note_other_domains(lambda: self._domain, lambda note: self._link.send({"kind": "note", **note}))
@@ -166,10 +168,10 @@ class VirtualTime:
         if charged:
             self._work = Work(charged)
             self.clock.charge = self._charge
-        self.scheduler.current.native = originals.get_native_id()
+        self.scheduler.current.native = self._real.get_native_id()
         self._domain = int(os.environ.get("ROS_DOMAIN_ID", "0"))
         self._move_to(now_ns)
-        self.resumed_ns = originals.processor_ns()
+        self.resumed_ns = self._real.processor_ns()
 
     def summary(self) -> dict[str, Any]:
         """Return the common part of reports: the time, and what has happened since the last one, if anything has."""
@@ -282,24 +284,24 @@ class VirtualTime:
         report = {"kind": "idle", "wake_ns": wake_ns, **self.summary(), **({"leaving": True} if leaving else {})}
         before_ns, done_ns = self.clock.now_ns, 0 if self._work is None else self._work.done_ns()
         self.running = False
-        self._worked_ns += originals.processor_ns() - self.resumed_ns
+        self._worked_ns += self._real.processor_ns() - self.resumed_ns
         answer = self._answered(report)
-        self.resumed_ns = originals.processor_ns()
+        self.resumed_ns = self._real.processor_ns()
         self.running = True
         if leaving and self._ledger is not None:
             self._ledger.settled()
         if answer.get("stop"):
             self._stopping = True
             self._end_ns = self.clock.now_ns + STOPPING_NS
-            originals.kill(os.getpid(), signal.SIGINT)
+            self._real.kill(os.getpid(), signal.SIGINT)
             return
         self._move_to(answer["now_ns"])
         self._free_until_ns = answer["free_until_ns"]
         if self._ledger is not None and answer.get("arrivals"):
             self.clock.busy()  # a busy loop polls what has arrived before it lets time pass again
-            began_s = originals.perf_counter()
+            began_s = self._real.perf_counter()
             self._ledger.expect(answer["arrivals"])
-            if originals.perf_counter() - began_s > QUICK_S:  # until then, the grader counts it as the program's work
+            if self._real.perf_counter() - began_s > QUICK_S:  # until then, the grader counts it as the program's work
                 self._link.send({"kind": "arrived"})
         if self._work is not None:  # what was done at this instant is still to be counted
             self._work.restart(FREE_NS if self.clock.now_ns > before_ns else -done_ns)
@@ -329,8 +331,8 @@ class VirtualTime:
         another thread; waiting for it makes the result independent of which is faster.
         """
         try:
-            originals.kill(os.getpid(), signal.SIGINT)
-            originals.sleep(INTERRUPT_S)
+            self._real.kill(os.getpid(), signal.SIGINT)
+            self._real.sleep(INTERRUPT_S)
         finally:
             self._await_shutdown()
 
@@ -345,7 +347,7 @@ class VirtualTime:
         return (
             self.clock.now_ns < wake_ns < self._free_until_ns
             and self._moved < MOST_MOVES
-            and originals.processor_ns() - self.resumed_ns < MOST_WORK_NS
+            and self._real.processor_ns() - self.resumed_ns < MOST_WORK_NS
             and not self.unreported
             and self._ledger is not None
             and not self._ledger.changed
@@ -361,6 +363,6 @@ class VirtualTime:
 
     def _run_on(self, wake_ns: int | None) -> None:
         """Advance time after the stop signal, without the grader."""
-        originals.sleep(0.001)
+        self._real.sleep(0.001)
         if wake_ns is not None and wake_ns <= self._end_ns:
             self._move_to(wake_ns)

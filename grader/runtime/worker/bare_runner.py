@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from functools import partial
 
@@ -48,10 +47,14 @@ class BareRunner(WallRunner):
 
     def _begin(self) -> None:
         """Wait for the first node or message, and start the clock."""
-        begin_ns = time.monotonic_ns()
+        begin_ns = self._real_time.monotonic_ns()
         deadline_ns = begin_ns + (IMPORTS_NS if self._plan.first_node_ns > PROMPT_NS else FIRST_NODE_NS)
         next_ns = 0
-        while not self._recorder.graph.nodes and not self._finished() and (now_ns := time.monotonic_ns()) < deadline_ns:
+        while (
+            not self._recorder.graph.nodes
+            and not self._finished()
+            and (now_ns := self._real_time.monotonic_ns()) < deadline_ns
+        ):
             if now_ns >= next_ns:
                 self._look_at_graph(0)
                 next_ns = now_ns + FIRST_LOOK_NS
@@ -61,9 +64,9 @@ class BareRunner(WallRunner):
                 for message in taken:
                     self._record(0, message)
                 break
-            time.sleep(PAUSE_S)
+            self._real_time.sleep(PAUSE_S)
             self._observer.await_arrival(FIRST_LOOK_NS)
-        self._started = time.monotonic_ns()
+        self._started = self._real_time.monotonic_ns()
 
     def _look(self, now_ns: int) -> None:
         super()._look(now_ns)

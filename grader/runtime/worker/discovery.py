@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from typing import Any
 
 from grader.runtime.model.trace import GraphSnapshot
-from grader.runtime.patience import Patience
+from grader.runtime.patience import SETTLE_S, Patience, Wait
 from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.worker.claims import CHANNELS, answers, meets, serves
 from grader.runtime.worker.core import Core
@@ -39,19 +39,22 @@ class Discovery:
         recorder: Records graph snapshots and notes.
         services: The grader's servers and clients.
         mark_dead: Called with a process that no longer answers.
+        wait: How to wait for discovery.
 
     Attributes:
         matching: Works out who is to be matched with whom.
         patience: The timeout for anything that was announced.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - whom it asks, and how it waits
         self,
         core: Core[NodeProcess],
         observer: Observer,
         recorder: TraceRecorder,
         services: ServicePeers,
         mark_dead: Callable[[NodeProcess], None],
+        *,
+        wait: Wait,
     ) -> None:
         self._students = core.processes
         self.matching = Matching(core, services, observer.watching)
@@ -59,8 +62,8 @@ class Discovery:
         self._recorder = recorder
         self._services = services
         self._mark_dead = mark_dead
-        self.patience = Patience()
-        self._departures = Patience(DEPARTURE_S)
+        self.patience = Patience(SETTLE_S, wait)
+        self._departures = Patience(DEPARTURE_S, wait)
         self._known: set[Key] = set()
         self._strangers: Counter[Key] = Counter()
 

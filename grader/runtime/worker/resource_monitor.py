@@ -14,21 +14,12 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
+from grader.runtime import usage
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB, NS_PER_S, size
 from grader.runtime.model.trace import ClockKind, Trace
-from grader.runtime.usage import (
-    FULL_BYTES,
-    FULL_CODE,
-    Usage,
-    families,
-    last_pid,
-    processor_words,
-    scratch_names,
-    threads_starved_ns,
-    usage,
-)
+from grader.runtime.usage import FULL_BYTES, FULL_CODE, Kernel, Usage, processor_words
 from grader.runtime.worker.socket_memory import MANY_DESCRIPTORS, KernelMemory, SocketMemory, descriptors
 from grader.runtime.worker.student_process import NodeProcess
 
@@ -82,34 +73,39 @@ class ResourceMonitor:
         students: The processes to monitor.
         limits: Limits of each process.
         budget: Real time that is left for the submission, if it is limited.
-        shares_network: Whether other programs of the machine use the network of the processes.
+        sockets: Looks at the sockets of the processes; by default, they share their network with nobody.
         own_s: Seconds of processor time that this process may use itself; as much as a node by default.
+        kernel: Reads what processes use.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - whom it watches, what they may use, and how it looks
         self,
         students: Sequence[NodeProcess],
         limits: Limits,
         budget: Budget | None = None,
         *,
-        shares_network: bool = False,
+        sockets: SocketMemory | None = None,
         own_s: int | None = None,
+        kernel: Kernel = usage,
     ) -> None:
+        self._kernel = kernel
         self._own_s = limits.processor_s if own_s is None else own_s
         self._students = students
         self._limits = limits
         self._budget = budget
         self._families: dict[int, set[int]] = {}
-        self._sockets = SocketMemory(shared=shares_network)
+        self._sockets = sockets or SocketMemory(shared=False)
         self._held: dict[int, KernelMemory] = {}
         self._last_pid = ""
         self._started_ns = time.monotonic_ns()
         # What this process has filled and used before is not due to these nodes.
-        self._own_bytes = usage([os.getpid()]).memory_bytes
+        self._own_bytes = kernel.usage([os.getpid()]).memory_bytes
         self._own_ns = time.process_time_ns()
         self._over = threading.Event()
         self._starved = False
         self._ending = False
+        self._polls = self._search_at = 0  # counted in polling intervals
+        self._used_bytes = 0
         self._used_ns = self._waited_ns = self._most_starved_ns = 0
         self._thread = threading.Thread(target=self._watch, name="guard", daemon=True)
 
@@ -148,24 +144,35 @@ class ResourceMonitor:
         return 0 if their_own else min(self._waited_ns, self.real_ns)
 
     def _watch(self) -> None:
-        looks, intervals, search_at, used_bytes = 0, 1, 0, 0
+        intervals = 1
         while not self._over.wait(intervals * LOOK_S):
-            looks += intervals
-            search = looks >= search_at
-            if search:
-                search_at = looks + SEARCH_EVERY
-                self._look_for_children()
-                self._look_for_names()
-                self._look_for_waiting()
-            much = self._look_at_sockets(looks, search=search)
-            before, used_bytes = used_bytes, self._look()
-            # Rarely while nothing grows, so that the looks cost nodes no time; at once again when something does.
-            intervals = 1 if much or used_bytes > before + GROWTH_BYTES else min(2 * intervals, LONGEST)
+            intervals = self.poll(intervals)
 
-    def _look_at_sockets(self, looks: int, *, search: bool) -> bool:
+    def poll(self, intervals: int = 1) -> int:
+        """Stop what has reached a limit; called by the monitor's own thread.
+
+        Args:
+            intervals: How many polling intervals have passed since the last poll.
+
+        Returns:
+            After how many of them the next poll is due.
+        """
+        self._polls += intervals
+        search = self._polls >= self._search_at
+        if search:
+            self._search_at = self._polls + SEARCH_EVERY
+            self._look_for_children()
+            self._look_for_names()
+            self._look_for_waiting()
+        much = self._look_at_sockets(search=search)
+        before, self._used_bytes = self._used_bytes, self._look()
+        # Rarely while nothing grows, so that the looks cost nodes no time; at once again when something does.
+        return 1 if much or self._used_bytes > before + GROWTH_BYTES else min(2 * intervals, LONGEST)
+
+    def _look_at_sockets(self, *, search: bool) -> bool:
         """Find out what the processes hold in sockets and pipes, if it may be much; return whether it may be."""
         many, connections = self._sockets.may_be_much()
-        tcp = connections and looks % TCP_EVERY == 0
+        tcp = connections and self._polls % TCP_EVERY == 0
         pids = [pid for family in self._families.values() for pid in family]
         if many or tcp or (search and descriptors(pids) > MANY_DESCRIPTORS):
             found = self._sockets.look(self._families.values(), tcp=connections)
@@ -176,10 +183,10 @@ class ResourceMonitor:
 
     def _look_for_children(self) -> None:
         """Find the families of processes; they are as before if nothing has been started since."""
-        last = last_pid()  # before the search, which may miss what is started meanwhile
+        last = self._kernel.last_pid()  # before the search, which may miss what is started meanwhile
         if not last or last != self._last_pid:
             students = [*self._students]  # the runner's thread may add one meanwhile
-            found = families([root for s in students for root in s.roots])
+            found = self._kernel.families([root for s in students for root in s.roots])
             self._families = {s.process.pid: set().union(*(found[root] for root in s.roots)) for s in students}
             self._last_pid = last
 
@@ -188,7 +195,7 @@ class ResourceMonitor:
         used_bytes = 0
         for student in self._students:
             held = self._held.get(student.process.pid, KernelMemory())
-            used = usage(self._families.get(student.process.pid, ()))
+            used = self._kernel.usage(self._families.get(student.process.pid, ()))
             used = replace(used, memory_bytes=used.memory_bytes + held.memory_bytes)
             # Sockets before memory, in which they are counted too: the limit that is named is the one to do something
             # about.
@@ -204,7 +211,7 @@ class ResourceMonitor:
 
     def _look_at_itself(self) -> int:
         """Stop all processes at a limit of the worker itself, which only messages can cause; return its memory."""
-        own_bytes = usage([os.getpid()]).memory_bytes
+        own_bytes = self._kernel.usage([os.getpid()]).memory_bytes
         if own_bytes > FULL_BYTES:
             os._exit(FULL_CODE)  # the middleware may go on filling it when the nodes have ended
         filled_bytes = own_bytes - self._own_bytes
@@ -226,14 +233,14 @@ class ResourceMonitor:
 
     def _look_for_waiting(self) -> None:
         pids = [pid for family in self._families.values() for pid in family]
-        self._used_ns = max(self._used_ns, usage(pids).processor_ns)
-        waited_ns = threads_starved_ns(pids).values()
+        self._used_ns = max(self._used_ns, self._kernel.usage(pids).processor_ns)
+        waited_ns = self._kernel.threads_starved_ns(pids).values()
         self._waited_ns = max(self._waited_ns, sum(waited_ns))
         self._most_starved_ns = max(self._most_starved_ns, max(waited_ns, default=0))
 
     def _look_for_names(self) -> None:
         for student in self._students:
-            if scratch_names(self._families.get(student.process.pid, ())) > MOST_NAMES:
+            if self._kernel.scratch_names(self._families.get(student.process.pid, ())) > MOST_NAMES:
                 self._hold(student, f"stopped at {MOST_NAMES:,} files in one folder")
 
     def _reached(self, used: Usage) -> str:

@@ -96,6 +96,8 @@ class NodeProcess(Process):
         grader_failed: What failed in the grader's own code in the process, as it reports; empty if nothing did.
         written: Small files that its program wrote, as it reports.
         reached: Names of audit events that its program raised, as it reports.
+        silence_s: See `SILENCE_S`.
+        closed_s: See `CLOSED_S`.
     """
 
     root: str
@@ -125,6 +127,8 @@ class NodeProcess(Process):
     grader_failed: str = ""
     written: tuple[WrittenFile, ...] = ()
     reached: list[str] = field(default_factory=list)
+    silence_s: float = SILENCE_S
+    closed_s: float = CLOSED_S
     _closed: bool = False  # whether it has closed its end of the connection
     _pending: bytes = b""
     _streams: dict[str, bytearray] = field(default_factory=lambda: {"stdout": bytearray(), "stderr": bytearray()})
@@ -255,7 +259,7 @@ class NodeProcess(Process):
         if b"\n" in self._pending:
             self.drain()
             return self._parsed_report()
-        deadline = time.monotonic() + SILENCE_S
+        deadline = time.monotonic() + self.silence_s
         while b"\n" not in self._pending:
             for descriptor, _ in self._poll.poll(LOOK_MS):
                 stream = self._sources[descriptor]
@@ -400,7 +404,7 @@ class NodeProcess(Process):
 
     def death(self, t_ns: int) -> Fault:
         """End a process that died or stopped reporting, and return its fault."""
-        ended = self._ends(CLOSED_S if self._closed else GRACE_S)
+        ended = self._ends(self.closed_s if self._closed else GRACE_S)
         self.end_now()
         code = self.process.wait()
         self.exit_code = code if code >= 0 else 128 - code

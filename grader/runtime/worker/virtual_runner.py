@@ -7,8 +7,10 @@ from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
+from grader.runtime.host.originals import wait_until
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Mark, Observation, Offer
+from grader.runtime.patience import Wait
 from grader.runtime.plan import Plan
 from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.stimuli.server import AddServer, RemoveServer
@@ -34,15 +36,22 @@ UNSETTLED = {"threads": THREADS, "outside": OUTSIDE}
 
 
 class VirtualRunner(Runner):
-    """Runs one plan on the virtual clock; see `Runner`."""
+    """Runs one plan on the virtual clock; see `Runner`.
+
+    Args:
+        plan: What to run.
+        students: The started processes, each waiting for its first answer.
+        observer: The grader's node.
+        wait: How to wait, in real time, for discovery and for messages.
+    """
 
     clock = ClockKind.VIRTUAL
 
-    def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
+    def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer, *, wait: Wait = wait_until) -> None:
         super().__init__(plan, students, observer)
         self._core = self._make_core()
         self._has_lost = False
-        self._discovery = Discovery(self._core, observer, self._recorder, self._services, self._mark_dead)
+        self._discovery = Discovery(self._core, observer, self._recorder, self._services, self._mark_dead, wait=wait)
         self._topics = VirtualTopicPeers(students, observer, self._recorder, self._discovery)
 
     def _make_core(self) -> Core[NodeProcess]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 from grader.runtime.model.quantities import NS_PER_MS
 from grader.runtime.model.scenario import Event
@@ -42,8 +42,31 @@ LEAD_NS = 300 * NS_PER_MS
 GRAPH_EVERY_NS = 50 * NS_PER_MS
 
 
+class RealTime(Protocol):
+    """The functions of the module `time` that the runners of the real clock call."""
+
+    def monotonic_ns(self) -> int:
+        """Return the time of a clock that is never set."""
+        ...
+
+    def time_ns(self) -> int:
+        """Return the time of the system clock."""
+        ...
+
+    def sleep(self, seconds: float, /) -> None:
+        """Let time pass."""
+        ...
+
+
 class WallRunner(Runner):
-    """Runs one plan on the real clock; see `Runner`."""
+    """Runs one plan on the real clock; see `Runner`.
+
+    Args:
+        plan: What to run.
+        students: The started processes, each waiting for its first answer.
+        observer: The grader's node.
+        real_time: The real clock.
+    """
 
     clock = ClockKind.WALL
     clock_reason = "it was requested"
@@ -53,8 +76,11 @@ class WallRunner(Runner):
     #: How long after a look at the graph the next one is at the latest.
     rarest_graph_ns: ClassVar[int] = GRAPH_EVERY_NS
 
-    def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
+    def __init__(
+        self, plan: Plan, students: list[NodeProcess], observer: Observer, *, real_time: RealTime = time
+    ) -> None:
         super().__init__(plan, students, observer)
+        self._real_time = real_time
         self._agenda.due = sorted(_with_early_publishers(self._agenda.due), key=lambda e: e.t_ns)
         self._topics: WallTopicPeers = WallTopicPeers(observer, self._recorder)
         self._next_graph_ns = 0
@@ -69,14 +95,14 @@ class WallRunner(Runner):
         self.held_up_ns = 0
 
     def _time_ns(self) -> int:
-        return max(self._stop_ns, time.monotonic_ns() - self._started)
+        return max(self._stop_ns, self._real_time.monotonic_ns() - self._started)
 
     def _clock_ns(self, now_ns: int) -> int:
-        return time.time_ns() - self._time_ns() + now_ns
+        return self._real_time.time_ns() - self._time_ns() + now_ns
 
     def _begin(self) -> None:
         """Start the clock and every process that does not start late."""
-        self._started = time.monotonic_ns()
+        self._started = self._real_time.monotonic_ns()
         for student in self._students:
             if student.name not in self._agenda.starts_ns:
                 student.tell({"now_ns": 0, "free_until_ns": 0})
@@ -95,7 +121,7 @@ class WallRunner(Runner):
 
     def _pause(self) -> None:
         """Wait until something has arrived or is due, but not for long: many things are only noticed by looking."""
-        time.sleep(self.pause_s)
+        self._real_time.sleep(self.pause_s)
         moments = [*self._agenda.moments(), *self._agenda.starts_ns.values()]
         left_ns = min(self.longest_pause_ns, min(moments) - self._time_ns())
         if left_ns > 0:

@@ -50,6 +50,7 @@ from grader.runtime.worker.launching import MOST, EvaluatedLaunch, evaluated, ex
 from grader.runtime.worker.notes import Places
 from grader.runtime.worker.output_watch import OutputWatch
 from grader.runtime.worker.resource_monitor import Budget, ResourceMonitor
+from grader.runtime.worker.socket_memory import SocketMemory
 from grader.runtime.worker.student_process import LOG_FORMAT, NodeProcess
 
 if TYPE_CHECKING:
@@ -155,10 +156,8 @@ class Worker:
             limit_processor_time(STEPPED_CPU_S)
             observer = Observer(domain, plan.limits)
             began.callback(observer.close)
-            shares_network = self._isolation.shares_network
-            began.enter_context(
-                ResourceMonitor(students, plan.limits, shares_network=shares_network, own_s=STEPPED_CPU_S)
-            )
+            sockets = SocketMemory(shared=self._isolation.shares_network)
+            began.enter_context(ResourceMonitor(students, plan.limits, sockets=sockets, own_s=STEPPED_CPU_S))
             runner = STEPPED[plan.clock](plan, students, observer, start, other.ask)
             is_real = plan.clock == ClockKind.WALL.value
             if is_real:
@@ -244,9 +243,8 @@ class Worker:
         with ExitStack() as stack:
             stack.callback(stop, students)
             students.append(self._execute(plan, name, file, domain, told))
-            monitor = stack.enter_context(
-                ResourceMonitor(students, plan.limits, budget, shares_network=self._isolation.shares_network)
-            )
+            sockets = SocketMemory(shared=self._isolation.shares_network)
+            monitor = stack.enter_context(ResourceMonitor(students, plan.limits, budget, sockets=sockets))
             stack.callback(self._account, monitor)
             _await_ready(students[0])
             self.has_started = True
@@ -271,14 +269,9 @@ class Worker:
             for name, file in plan.processes:
                 start = self._start_bare if plan.bare else self._start
                 students.append(start(plan, name, file, domain))
+            sockets = SocketMemory(shared=self._isolation.shares_network)
             monitor = stack.enter_context(
-                ResourceMonitor(
-                    students,
-                    plan.limits,
-                    budget,
-                    shares_network=self._isolation.shares_network,
-                    own_s=own_processor_s(plan),
-                )
+                ResourceMonitor(students, plan.limits, budget, sockets=sockets, own_s=own_processor_s(plan))
             )
             stack.callback(self._account, monitor)
             runner = _import_runners()["bare" if plan.bare else plan.clock]

@@ -14,8 +14,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from grader.runtime import usage
 from grader.runtime.model.quantities import NS_PER_MS
-from grader.runtime.usage import innermost, thread_starved_ns, threads_starved_ns
+from grader.runtime.usage import Kernel
 from grader.runtime.worker.delay import ARRIVAL_NS, BESIDE_FREE_NS, Delay
 
 #: Only if a step takes this much longer than its processor time, its waiting time for a processor is read.
@@ -30,6 +31,7 @@ class Workload:
     Args:
         root: Pid of the started process; the program may run in a child of it.
         start_ns: Virtual time at which the program starts.
+        kernel: Reads how long threads waited for a processor.
 
     Attributes:
         delay: The resulting delay.
@@ -37,9 +39,10 @@ class Workload:
         waited_ns: Real time of the steps beyond that, not counting waits for a processor.
     """
 
-    def __init__(self, root: int, start_ns: int) -> None:
+    def __init__(self, root: int, start_ns: int, kernel: Kernel = usage) -> None:
+        self._kernel = kernel
         # A sandbox is a chain of processes, of which the last is the program.
-        self._pid = innermost(root)
+        self._pid = kernel.innermost(root)
         self._clock = _processor_clock(self._pid)
         self._began_ns = self._used_before_ns = self._at_ns = self._forgiven_ns = 0
         self._moved_on = self._may_arrive = False
@@ -122,8 +125,8 @@ class Workload:
         threads together could have waited for longer than the step took.
         """
         before, own_ns = self._threads_ns, self._own_ns
-        self._threads_ns = threads_starved_ns([self._pid])
-        self._own_ns = thread_starved_ns(os.getpid(), threading.get_native_id())
+        self._threads_ns = self._kernel.threads_starved_ns([self._pid])
+        self._own_ns = self._kernel.thread_starved_ns(os.getpid(), threading.get_native_id())
         names = self._threads_ns.keys() if threads else {str(self._pid)}
         longest_ns = max((self._threads_ns.get(name, 0) - before.get(name, 0) for name in names), default=0)
         return max(0, longest_ns) + max(0, self._own_ns - own_ns)

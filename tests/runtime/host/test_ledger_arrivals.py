@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import weakref
 from typing import Any
 
 import pytest
@@ -52,18 +53,36 @@ class Subscription:
         self.handle = Handle([*coming])
 
 
+class Context:
+    """As much of a context as the ledger asks for."""
+
+    def ok(self) -> bool:
+        return True
+
+
 @pytest.fixture
-def ledger(monkeypatch: pytest.MonkeyPatch) -> Any:
+def waits() -> list[float]:
+    """The waits for what may still come, in seconds; none of them takes any time."""
+    return []
+
+
+@pytest.fixture
+def context() -> Context:
+    """The context of all nodes."""
+    return Context()
+
+
+@pytest.fixture
+def ledger(monkeypatch: pytest.MonkeyPatch, waits: list[float], context: Context) -> Any:
     """A ledger of a process to which only that comes which a test says."""
     monkeypatch.syspath_prepend(HOST)
     import launcher  # type: ignore[import-not-found]
 
     launcher.load_package()
     module = importlib.import_module("_grader_host.ledger")
-    monkeypatch.setattr(module, "_valid", lambda _: True)
-    monkeypatch.setattr(module, "_await_ready", lambda receiver, context, *_: receiver.handle.look())
-    monkeypatch.setattr(module.Ledger, "_context", lambda _: object())
-    return module.Ledger()
+    made = module.Ledger(lambda receiver, context, *_: receiver.handle.look(), waits.append)
+    made.contexts.append(weakref.ref(context))
+    return made
 
 
 def announce(ledger: Any, subscription: Any, count: int = 1) -> None:
@@ -113,12 +132,8 @@ class Service:
 
 
 @pytest.mark.rule(11)
-def test_the_newest_of_more_requests_than_a_queue_holds_may_arrive_first(
-    ledger: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_newest_of_more_requests_than_a_queue_holds_may_arrive_first(ledger: Any, waits: list[float]) -> None:
     """Or the one that a server takes next would depend on which of them had already been dropped."""
-    waits: list[float] = []
-    monkeypatch.setattr(importlib.import_module("_grader_host.originals"), "sleep", waits.append)
     server = Service("/work")
     ledger.add("service", server)
     for _ in range(3):

@@ -361,12 +361,11 @@ def test_a_report_without_end_is_none(start: Callable[[str], NodeProcess]) -> No
     assert len(student._pending) < module.REPORT_BYTES + (1 << 20)
 
 
-def test_a_process_that_never_reports_is_given_up(
-    start: Callable[[str], NodeProcess], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_process_that_never_reports_is_given_up(start: Callable[[str], NodeProcess]) -> None:
     """Its host's own watchdog should have been faster."""
-    monkeypatch.setattr(module, "SILENCE_S", 0.0)
-    assert start("signal.pause()").report() is None
+    student = start("signal.pause()")
+    student.silence_s = 0.0
+    assert student.report() is None
 
 
 @pytest.mark.parametrize(
@@ -399,12 +398,10 @@ def test_an_end_has_its_reason_however_long_it_takes(start: Callable[[str], Node
     assert student.death(9).text == "ended by SIGABRT"
 
 
-def test_a_process_that_closes_its_connection_and_lives_on_is_ended(
-    start: Callable[[str], NodeProcess], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_process_that_closes_its_connection_and_lives_on_is_ended(start: Callable[[str], NodeProcess]) -> None:
     """It could never be asked again."""
-    monkeypatch.setattr(module, "CLOSED_S", 0.1)
     student = start("line.close(); signal.pause()")
+    student.closed_s = 0.1
     assert student.report() is None
     assert student.death(9).text == "stopped: it no longer answered the grader"
 

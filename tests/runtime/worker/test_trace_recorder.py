@@ -82,14 +82,15 @@ def test_a_graph_beyond_all_measure_ends_the_recording(size: dict[str, int]) -> 
     assert recorder.graph == GraphSnapshot(0, (), ())
 
 
-def test_a_graph_that_never_rests_ends_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_graph_that_never_rests_ends_the_recording() -> None:
     """Snapshots add up."""
-    monkeypatch.setattr(module, "GRAPH_PARTS", 20)
     recorder = TraceRecorder(Limits())
-    for n in range(30):
-        recorder.look(graph(n, nodes=1 + n % 2), participants=1)
+    large, small = (graph(0, nodes=module.ENDPOINTS - n, ends=module.ENDPOINTS) for n in range(2))
+    most = module.GRAPH_PARTS // (2 * module.ENDPOINTS)
+    for n in range(most + 2):
+        recorder.look(small if n % 2 else large, participants=1)
     assert "too often" in recorder.full
-    assert len([o for o in recorder.observations if isinstance(o, GraphSnapshot)]) < 10
+    assert len([o for o in recorder.observations if isinstance(o, GraphSnapshot)]) == most
 
 
 def test_a_graph_that_stays_the_same_is_taken_down_once() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any, cast
 
 import pytest
@@ -22,6 +21,7 @@ from scripted import (
     World,
     claim,
     idle,
+    looks,
     numbers,
     plan,
     wait,
@@ -43,33 +43,27 @@ from grader.runtime.model.trace import (
     OutputLine,
 )
 from grader.runtime.stimuli.recorded import PlannedRecording
-from grader.runtime.worker import core, discovery, trace_recorder
+from grader.runtime.worker import trace_recorder
 from grader.runtime.worker import virtual_runner as module
-from grader.runtime.worker.core import Taken
+from grader.runtime.worker.core import HOP_NS, HOPS, MOST_HOPS, Taken
 from grader.runtime.worker.delay import HOPELESS_NS
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.virtual_runner import VirtualRunner
 
 
-@pytest.fixture(autouse=True)
-def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing in these tests is on its way in real time."""
-    monkeypatch.setattr(discovery, "Patience", lambda *_: patience.Patience(0.0))
-    monkeypatch.setattr(patience, "BRIEF_S", 0.0)
-
-
 class Run:
-    """One run of some programs: its trace, and everybody who took part."""
+    """One run of some programs, before an observer of some kind: its trace, and everybody who took part."""
 
-    def __init__(self, *programs: Behaviour, **fields: Any) -> None:
+    def __init__(
+        self, *programs: Behaviour, observes: type[ScriptedObserver] = ScriptedObserver, **fields: Any
+    ) -> None:
         self.world = World()
         names = ("a.py", "b.py", "c.py")
         self.students = [ScriptedStudent(n, p, self.world) for n, p in zip(names, programs, strict=False)]
-        self.observer = ScriptedObserver(self.world)
-        self.trace = VirtualRunner(
-            plan(**fields), cast("list[NodeProcess]", self.students), cast("Observer", self.observer)
-        ).run()
+        self.observer = observes(self.world)
+        students, observer = cast("list[NodeProcess]", self.students), cast("Observer", self.observer)
+        self.trace = VirtualRunner(plan(**fields), students, observer, wait=looks).run()
 
     def seen(self, *kinds: type) -> list[str]:
         """Return observations in short, with their milliseconds, without the graph."""
@@ -217,14 +211,14 @@ def test_a_message_from_one_process_reaches_the_other_at_the_same_instant() -> N
 
 
 @pytest.mark.parametrize("backwards", [False, True])
-def test_messages_of_one_instant_come_in_one_order(monkeypatch: pytest.MonkeyPatch, *, backwards: bool) -> None:
+def test_messages_of_one_instant_come_in_one_order(*, backwards: bool) -> None:
     """The middleware decides which topic's arrive first; those of one topic keep their order."""
-    take = ScriptedObserver.take
 
-    def take_one(observer: ScriptedObserver, at_once: int = 1000) -> list[Taken]:
-        flying = sorted(take(observer), key=lambda taken: taken.topic, reverse=backwards)
-        observer._world.flying = flying[1:]
-        return flying[:1]
+    class TakesOne(ScriptedObserver):
+        def take(self, at_once: int = 1000) -> list[Taken]:
+            flying = sorted(super().take(), key=lambda taken: taken.topic, reverse=backwards)
+            self._world.flying = flying[1:]
+            return flying[:1]
 
     def program(me: ScriptedStudent, world: World) -> Program:
         claims = [claim("publisher", topic) for topic in ("/b", "/a")]
@@ -234,9 +228,8 @@ def test_messages_of_one_instant_come_in_one_order(monkeypatch: pytest.MonkeyPat
         yield from wait(100, sent={"topic /a": 2, "topic /b": 2})
         yield idle()
 
-    monkeypatch.setattr(discovery, "Patience", lambda *_: patience.Patience(5.0))
-    monkeypatch.setattr(ScriptedObserver, "take", take_one)
-    assert Run(program).seen() == ["50 from /a: 2", "50 from /a: 4", "50 from /b: 1", "50 from /b: 3"]
+    run = Run(program, observes=TakesOne)
+    assert run.seen() == ["50 from /a: 2", "50 from /a: 4", "50 from /b: 1", "50 from /b: 3"]
 
 
 def test_a_process_may_go_on_alone_until_somebody_else_wants_something() -> None:
@@ -292,18 +285,7 @@ def test_too_many_messages_end_the_run_with_a_mark() -> None:
     assert run.trace.stop_ns == 5 * MS
 
 
-def test_too_many_wake_ups_end_the_run_with_a_mark(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A process that never lets time pass is not stepped for ever."""
-    monkeypatch.setattr(core, "STEPS", 50)
-
-    def restless(me: ScriptedStudent, world: World) -> Program:
-        while True:
-            yield idle(0)
-
-    assert Run(restless).seen() == ["0 limit more than 50 wake-ups: the rest was ignored"]
-
-
-def player(mine: str, theirs: str, *, serves: bool = False, last: int = 1_000, cost_ns: int = 0) -> Behaviour:
+def player(mine: str, theirs: str, *, serves: bool = False, last: int = 10_000, cost_ns: int = 0) -> Behaviour:
     """A program that answers each message at once, up to a last number; one of two begins at 10 ms."""
 
     def program(me: ScriptedStudent, world: World) -> Program:
@@ -317,56 +299,45 @@ def player(mine: str, theirs: str, *, serves: bool = False, last: int = 1_000, c
     return program
 
 
-def test_nodes_that_answer_each_other_without_end_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nodes_that_answer_each_other_without_end_end_the_run() -> None:
     """After some messages at one instant each takes time, and after many more the run ends, however busy a node is."""
-    monkeypatch.setattr(core, "HOPS", 4)
-    monkeypatch.setattr(core, "MOST_HOPS", 8)
-    slow = player("/a", "/b", serves=True, cost_ns=HOPELESS_NS // 3)
+    slow = player("/a", "/b", serves=True, cost_ns=HOPELESS_NS // (HOPS // 2 + 1))
     run = Run(slow, player("/b", "/a"), stop_when_unfit=True)
-    assert [m.t_ns / MS for m in run.trace.messages()] == [10, 10, 10, 10, 10, 10.25, 10.5, 10.75, 11]
-    said = "the nodes answered each other 8 times without a pause: the rest was ignored"
-    assert run.seen(Message) == [f"11.25 limit {said}"]
+    later = [10 * MS + n * HOP_NS for n in range(1, MOST_HOPS - HOPS + 1)]
+    assert [m.t_ns for m in run.trace.messages()] == [*[10 * MS] * (HOPS + 1), *later]
+    said = f"the nodes answered each other {MOST_HOPS:,} times without a pause: the rest was ignored"
+    assert run.seen(Message) == [f"{(later[-1] + HOP_NS) / MS} limit {said}"]
     assert not run.trace.clock_reason
 
 
-def test_a_process_that_hears_itself_after_each_rest_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_hears_itself_after_each_rest_goes_on() -> None:
     """It is woken for its own message, and then lets time pass on its own until it sends the next: that is a rest."""
-    monkeypatch.setattr(core, "HOPS", 4)
-    monkeypatch.setattr(core, "MOST_HOPS", 8)
+    wakes_ns = range(10 * MS, 990 * MS, 980 * MS // (MOST_HOPS + HOPS))
 
     def program(me: ScriptedStudent, world: World) -> Program:
         claims = world.have(me.name, claim("publisher", "/x"), claim("subscription", "/x"))
-        yield from wait(10, endpoints=claims)
-        for at in range(20, 1000, 10):
+        yield from wait(5, endpoints=claims)
+        for at_ns in wakes_ns:
             world.publish("/x")
-            answer = yield idle(at, sent={"topic /x": 1}, now_ns=EPOCH_NS + at * MS)
+            answer = yield idle(at_ns / MS, sent={"topic /x": 1}, now_ns=EPOCH_NS + at_ns)
             assert answer["arrivals"] == {"topic /x": 1}
         yield idle(None)
 
     run = Run(program)
-    assert [m.t_ns / MS for m in run.trace.messages()] == list(range(20, 1000, 10))
+    assert [m.t_ns for m in run.trace.messages()] == list(wakes_ns)
     assert not run.trace.marks("limit")
 
 
-def test_wake_ups_are_counted_against_the_time_that_has_passed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A node that rests between them may wake up as often as the scenario is long."""
-    monkeypatch.setattr(core, "STEPS", 5)
-    monkeypatch.setattr(core, "STEPS_HZ", 1000)
-    assert not Run(saying(*(idle(ms) for ms in range(1, 900)), idle())).trace.marks("limit")
-    assert Run(saying(*(idle(ms / 4) for ms in range(1, 900)), idle())).trace.marks("limit")
-
-
-def test_nodes_may_answer_each_other_for_a_while_at_one_instant(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nodes_may_answer_each_other_for_a_while_at_one_instant() -> None:
     """A rest begins the count again."""
-    monkeypatch.setattr(core, "HOPS", 4)
-    run = Run(player("/a", "/b", serves=True, last=3), player("/b", "/a", last=2))
-    assert [m.t_ns / MS for m in run.trace.messages()] == [10] * 5
+    each = HOPS // 2
+    run = Run(player("/a", "/b", serves=True, last=each + 1), player("/b", "/a", last=each))
+    assert [m.t_ns / MS for m in run.trace.messages()] == [10] * (HOPS + 1)
     assert run.seen(Message) == []
 
 
-def test_a_process_that_talks_without_waiting_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_talks_without_waiting_is_ended() -> None:
     """Notes and faults of one breath are counted."""
-    monkeypatch.setattr(module, "MOST_REPORTS", 20)
 
     def talker(me: ScriptedStudent, world: World) -> Program:
         while True:
@@ -374,6 +345,7 @@ def test_a_process_that_talks_without_waiting_is_ended(monkeypatch: pytest.Monke
 
     run = Run(talker, sleeper(500))
     assert run.seen() == ["0 a.py killed: ended by SIGKILL", "500 b.py: awake for 500"]
+    assert len(run.students[0].notes) == module.MOST_REPORTS
     assert run.trace.notes == ("main_not_called",)
 
 
@@ -579,9 +551,8 @@ def test_what_a_latched_publisher_of_another_process_keeps_is_announced_once() -
 
 
 @pytest.mark.parametrize("whose", ["gone.py", "a.py"])
-def test_a_node_is_found_beside_a_namesake(monkeypatch: pytest.MonkeyPatch, whose: str) -> None:
+def test_a_node_is_found_beside_a_namesake(whose: str) -> None:
     """The middleware tells the services of one of them; a process that left may stay, and a node until it is freed."""
-    monkeypatch.setattr(discovery, "Patience", lambda *_: patience.Patience(0.05))
 
     def asker(me: ScriptedStudent, world: World) -> Program:
         others = [claim("node", "/asker")] if namesake else []
@@ -650,7 +621,7 @@ def test_a_program_that_does_not_settle_is_for_the_other_clock(why: str) -> None
 
 
 @pytest.mark.rule(14)
-def test_messages_that_never_come_are_noted_and_no_longer_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_that_never_come_are_noted_and_no_longer_waited_for() -> None:
     """The counts of the host settle an instant; they are nobody's evidence."""
 
     def liar(me: ScriptedStudent, world: World) -> Program:
@@ -713,8 +684,8 @@ def test_nothing_that_a_process_says_breaks_the_conductor(reports: list[Any], mi
         assert isinstance(o.kind, FaultKind)
 
 
-def flooding(count: int) -> Behaviour:
-    """Return a program that publishes so many messages every 10 ms."""
+def flooding(count: int, cost_ns: int) -> Behaviour:
+    """Return a program that publishes so many messages every 10 ms, and works for so long."""
 
     def program(me: ScriptedStudent, world: World) -> Program:
         claims = world.have(me.name, claim("publisher", "/x"))
@@ -722,20 +693,15 @@ def flooding(count: int) -> Behaviour:
         for at in range(20, 900, 10):
             for _ in range(count):
                 world.publish("/x")
-            yield from wait(at, sent={"topic /x": count})
+            yield from wait(at, sent={"topic /x": count}, cost_ns=cost_ns)
 
     return program
 
 
-@pytest.mark.parametrize(("count", "reason", "whole"), [(200, "", True), (1, "it is busy", False)])
-def test_a_flood_goes_on_to_its_limit_on_every_machine(
-    monkeypatch: pytest.MonkeyPatch, count: int, reason: str, whole: bool
-) -> None:
+@pytest.mark.parametrize(("count", "reason", "whole"), [(200, "", True), (1, module.BUSY, False)])
+def test_a_flood_goes_on_to_its_limit_on_every_machine(count: int, reason: str, whole: bool) -> None:
     """However late it makes its process: it is wrong on every clock. What is no flood is cut short, and repeated."""
-    steps = itertools.count()
-    monkeypatch.setattr(module, "hopeless", lambda students: next(steps) > 5)
-    monkeypatch.setattr(module, "unfit", lambda students, seen, *, full: "" if full else "it is busy")
-    run = Run(flooding(count), stop_when_unfit=True, limits=Limits(messages=2000))
+    run = Run(flooding(count, cost_ns=HOPELESS_NS // 5), stop_when_unfit=True, limits=Limits(messages=2000))
     assert run.trace.clock_reason == reason
     assert (len(run.trace.messages("/x")) == 2000) is whole
     assert run.trace.stop_ns < 1000 * MS

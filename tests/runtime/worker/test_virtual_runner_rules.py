@@ -14,12 +14,10 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from scripted import MS, Behaviour, Program, ScriptedObserver, ScriptedStudent, World, claim, idle, plan, wait
+from scripted import MS, Behaviour, Program, ScriptedObserver, ScriptedStudent, World, claim, idle, looks, plan, wait
 
-from grader.runtime import patience
 from grader.runtime.host.ledger import Ledger
 from grader.runtime.model.trace import GraphSnapshot, Message, OutputLine, Trace
-from grader.runtime.worker import discovery
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.virtual_runner import VirtualRunner
@@ -82,20 +80,12 @@ class Run:
         self.observer = kind(world)
         if isinstance(self.observer, SlowObserver):
             self.observer.log = self.log
-        runner = VirtualRunner(
-            plan(**fields), cast("list[NodeProcess]", self.students), cast("Observer", self.observer)
-        )
-        self.trace: Trace = runner.run()
+        students, observer = cast("list[NodeProcess]", self.students), cast("Observer", self.observer)
+        self.trace: Trace = VirtualRunner(plan(**fields), students, observer, wait=looks).run()
 
     def told(self, name: str, key: str) -> list[int]:
         """Return at which places in the log a process was told something."""
         return [place for place, (told, answer) in enumerate(self.log) if told == name and key in answer]
-
-
-@pytest.fixture
-def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give waits far more time than a few looks at the graph take."""
-    monkeypatch.setattr(discovery, "Patience", lambda *_: patience.Patience(6.0))
 
 
 @pytest.mark.rule(11)
@@ -112,7 +102,6 @@ def test_a_message_that_did_not_arrive_is_noted_and_the_recording_is_made_again(
 
 
 @pytest.mark.rule(12)
-@pytest.mark.usefixtures("patient")
 def test_a_message_is_recorded_before_whoever_hears_it_runs() -> None:
     """The runner waits until its own node has all of them, at the time at which they were sent."""
 
@@ -161,7 +150,6 @@ def test_a_new_endpoint_is_reported_before_anything_is_sent() -> None:
 
 
 @pytest.mark.rule(13)
-@pytest.mark.usefixtures("patient")
 def test_a_process_goes_on_when_the_graph_shows_what_it_has_created() -> None:
     """Its counterparts wait for the match as well, before any of them runs again."""
 
@@ -245,7 +233,6 @@ def test_what_has_sent_is_kept_alive_until_its_messages_have_arrived() -> None:
 
 
 @pytest.mark.rule(18)
-@pytest.mark.usefixtures("patient")
 def test_a_process_goes_on_when_what_it_has_destroyed_has_left_the_graph() -> None:
     """Otherwise the old endpoint could be taken for a new one."""
     run = Run(SlowObserver, remakes)
@@ -264,7 +251,6 @@ def remakes(me: ScriptedStudent, world: World) -> Program:
 
 @pytest.mark.rule(19)
 @pytest.mark.parametrize("left", [True, False])
-@pytest.mark.usefixtures("patient")
 def test_the_others_see_that_a_process_has_left_before_time_goes_on(left: bool) -> None:
     """What a process that dies has had stays in the graph, and nobody waits for it to go."""
 

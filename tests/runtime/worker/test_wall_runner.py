@@ -11,12 +11,12 @@ pytest.importorskip("rclpy")
 
 from scripted import FLOAT, INT, MS, Behaviour, Program, ScriptedObserver, ScriptedStudent, World, claim, numbers, plan
 
+from grader.runtime.host.clock import EPOCH_NS
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.trace import ClockKind, FaultKind
 from grader.runtime.plan import PlannedConnection
 from grader.runtime.stimuli.messages import PlannedMessages
 from grader.runtime.stimuli.recorded import PlannedRecording
-from grader.runtime.worker import wall_runner as module
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.wall_runner import WallRunner
@@ -25,37 +25,36 @@ SILENT = {"kind": "silent"}
 
 
 class Clock:
-    """Stands for the module `time`: each pause takes a millisecond, and holds up where a test says so."""
+    """Stands for the module `time`: each pause takes a millisecond, and holds up where a test says so.
 
-    def __init__(self) -> None:
+    Args:
+        held_up: How many milliseconds the pause takes that begins at a millisecond.
+    """
+
+    def __init__(self, held_up: dict[int, int] | None = None) -> None:
         self.now_ns = 10**12
-        self.held_up: dict[int, int] = {}
+        self.held_up = held_up or {}
 
     def monotonic_ns(self) -> int:
         return self.now_ns
+
+    def time_ns(self) -> int:
+        return EPOCH_NS + self.now_ns
 
     def sleep(self, seconds: float) -> None:
         elapsed_ms = (self.now_ns - 10**12) // MS
         self.now_ns += self.held_up.pop(elapsed_ms, 1) * MS
 
 
-@pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    made = Clock()
-    monkeypatch.setattr(module, "time", made)
-    return made
-
-
 class Run:
     """One run of some programs: its trace, and everybody who took part."""
 
-    def __init__(self, *programs: Behaviour, **fields: Any) -> None:
+    def __init__(self, *programs: Behaviour, held_up: dict[int, int] | None = None, **fields: Any) -> None:
         self.world = World()
         self.students = [ScriptedStudent(n, p, self.world) for n, p in zip(("a.py", "b.py"), programs, strict=False)]
         self.observer = ScriptedObserver(self.world)
-        self.trace = WallRunner(
-            plan(clock="wall", **fields), cast("list[NodeProcess]", self.students), cast("Observer", self.observer)
-        ).run()
+        students, observer = cast("list[NodeProcess]", self.students), cast("Observer", self.observer)
+        self.trace = WallRunner(plan(clock="wall", **fields), students, observer, real_time=Clock(held_up)).run()
 
 
 def publisher(topic: str, *, every_ms: int, first_ms: int = 0, interface: str = FLOAT) -> Behaviour:
@@ -79,14 +78,14 @@ def quiet(me: ScriptedStudent, world: World) -> Program:
         yield SILENT
 
 
-def test_messages_get_the_time_at_which_they_came(clock: Clock) -> None:
+def test_messages_get_the_time_at_which_they_came() -> None:
     """To the millisecond in which the conductor looks."""
     run = Run(publisher("/cmd_vel", every_ms=50))
     assert [m.t_ns // MS for m in run.trace.messages("/cmd_vel")] == list(range(0, 1000, 50))
     assert (run.trace.clock, run.trace.stop_ns, run.trace.harness_problem) == (ClockKind.WALL, 1000 * MS, "")
 
 
-def test_the_span_begins_with_the_first_message(clock: Clock) -> None:
+def test_the_span_begins_with_the_first_message() -> None:
     """A node that starts late is observed as long as one that starts at once."""
     run = Run(publisher("/cmd_vel", every_ms=50, first_ms=700), first_message_on="/cmd_vel")
     messages = run.trace.messages("/cmd_vel")
@@ -94,7 +93,7 @@ def test_the_span_begins_with_the_first_message(clock: Clock) -> None:
     assert len(messages) == 20
 
 
-def test_a_first_message_is_waited_for_as_long_as_virtually(clock: Clock) -> None:
+def test_a_first_message_is_waited_for_as_long_as_virtually() -> None:
     """A timer of a long period shows its publisher's rate on either clock."""
     run = Run(
         publisher("/cmd_vel", every_ms=50, first_ms=5000), first_message_on="/cmd_vel", wait_at_most_ns=60_000 * MS
@@ -103,18 +102,16 @@ def test_a_first_message_is_waited_for_as_long_as_virtually(clock: Clock) -> Non
     assert Run(quiet, first_message_on="/cmd_vel", wait_at_most_ns=60_000 * MS).trace.stop_ns == 60_000 * MS
 
 
-def test_every_process_is_told_to_start(clock: Clock) -> None:
+def test_every_process_is_told_to_start() -> None:
     """Once, and nothing more until the stop signal."""
     run = Run(quiet, quiet)
     assert [len(student.heard) for student in run.students] == [1, 1]
 
 
-def test_a_machine_that_did_not_keep_up_is_no_judge(clock: Clock) -> None:
+def test_a_machine_that_did_not_keep_up_is_no_judge() -> None:
     """The reference is the loop itself: held up for long, it says nothing about the nodes."""
-    clock.held_up = {300: 151}
-    assert Run(quiet).trace.harness_problem.startswith("the machine was too busy")
-    clock.now_ns, clock.held_up = 10**12, {300: 150}
-    assert Run(quiet).trace.harness_problem == ""
+    assert Run(quiet, held_up={300: 151}).trace.harness_problem.startswith("the machine was too busy")
+    assert Run(quiet, held_up={300: 150}).trace.harness_problem == ""
 
 
 class RarelyLooking(WallRunner):
@@ -122,8 +119,8 @@ class RarelyLooking(WallRunner):
 
     rarest_graph_ns = 200 * MS
 
-    def __init__(self, *given: Any) -> None:
-        super().__init__(*given)
+    def __init__(self, *given: Any, **options: Any) -> None:
+        super().__init__(*given, **options)
         self.looks: list[int] = []
 
     def _look_at_graph(self, now_ns: int) -> bool:
@@ -131,7 +128,7 @@ class RarelyLooking(WallRunner):
         return super()._look_at_graph(now_ns)
 
 
-def test_a_graph_that_does_not_change_is_looked_at_less_often(clock: Clock) -> None:
+def test_a_graph_that_does_not_change_is_looked_at_less_often() -> None:
     """Up to the longest interval; a change is followed by a look as soon as in any other run."""
     world = World()
 
@@ -142,8 +139,8 @@ def test_a_graph_that_does_not_change_is_looked_at_less_often(clock: Clock) -> N
         while True:
             yield SILENT
 
-    student, observer = ScriptedStudent("a.py", late, world), ScriptedObserver(world)
-    runner = RarelyLooking(plan(clock="wall"), [cast("NodeProcess", student)], cast("Observer", observer))
+    student, observer = cast("NodeProcess", ScriptedStudent("a.py", late, world)), ScriptedObserver(world)
+    runner = RarelyLooking(plan(clock="wall"), [student], cast("Observer", observer), real_time=Clock())
     trace = runner.run()
     gaps = [after - before for before, after in pairwise(runner.looks[:-1])]
     assert max(gaps) <= 201
@@ -153,7 +150,7 @@ def test_a_graph_that_does_not_change_is_looked_at_less_often(clock: Clock) -> N
     assert runner.looks[runner.looks.index(seen_ms) + 1] - seen_ms <= 51
 
 
-def test_numbers_are_published_when_they_are_due(clock: Clock) -> None:
+def test_numbers_are_published_when_they_are_due() -> None:
     """In the type that the student's subscription asks for, as soon as it is seen."""
 
     def program(me: ScriptedStudent, world: World) -> Program:
@@ -167,7 +164,7 @@ def test_numbers_are_published_when_they_are_due(clock: Clock) -> None:
     assert [message.data for _, message in run.observer.published] == [26, 20]
 
 
-def test_a_recording_appears_plays_and_disappears(clock: Clock) -> None:
+def test_a_recording_appears_plays_and_disappears() -> None:
     """The publisher is there exactly while it plays."""
     messages = tuple((t * MS, b"cdr", {"data": t}) for t in (200, 233, 266))
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, messages)
@@ -179,7 +176,7 @@ def test_a_recording_appears_plays_and_disappears(clock: Clock) -> None:
     ]
 
 
-def test_too_many_messages_end_the_run_with_a_mark(clock: Clock) -> None:
+def test_too_many_messages_end_the_run_with_a_mark() -> None:
     """A flood is evidence enough."""
     trace = Run(publisher("/cmd_vel", every_ms=1), limits=Limits(messages=5)).trace
     assert len(trace.messages()) == 5
@@ -188,7 +185,7 @@ def test_too_many_messages_end_the_run_with_a_mark(clock: Clock) -> None:
     assert trace.stop_ns == mark.t_ns
 
 
-def test_ends_are_faults_and_the_run_ends_with_the_last(clock: Clock) -> None:
+def test_ends_are_faults_and_the_run_ends_with_the_last() -> None:
     """An exit with a fault, a death without a word, and what was written before."""
 
     def leaves(me: ScriptedStudent, world: World) -> Program:
@@ -212,14 +209,14 @@ def test_ends_are_faults_and_the_run_ends_with_the_last(clock: Clock) -> None:
     assert trace.stop_ns == 1000 * MS
 
 
-def test_the_graph_is_written_down_when_it_changed(clock: Clock) -> None:
+def test_the_graph_is_written_down_when_it_changed() -> None:
     """Looked at now and then, since looking costs much."""
     run = Run(publisher("/cmd_vel", every_ms=50))
     assert len(run.trace.graphs()) == 1
     assert [e.topic for e in run.trace.graphs()[0].endpoints] == ["/cmd_vel"]
 
 
-def test_a_recording_s_publisher_stays_until_its_last_message_has_arrived(clock: Clock) -> None:
+def test_a_recording_s_publisher_stays_until_its_last_message_has_arrived() -> None:
     """A publisher that goes at once takes with it what is still on its way."""
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, ((200 * MS, b"cdr", {}),))
     gone = ("/odom", "", False)
@@ -227,14 +224,13 @@ def test_a_recording_s_publisher_stays_until_its_last_message_has_arrived(clock:
     assert Run(quiet, stimuli=(recording,), duration_ns=700 * MS).observer.advertised[-1] == gone
 
 
-def test_a_node_that_floods_is_no_excuse(clock: Clock) -> None:
+def test_a_node_that_floods_is_no_excuse() -> None:
     """What holds the machine up is then the node itself: it is judged, not let off."""
-    clock.held_up = {300: 400}
-    trace = Run(publisher("/cmd_vel", every_ms=1), limits=Limits(messages=500)).trace
+    trace = Run(publisher("/cmd_vel", every_ms=1), limits=Limits(messages=500), held_up={300: 400}).trace
     assert (trace.harness_problem, len(trace.messages("/cmd_vel"))) == ("", 500)
 
 
-def test_two_recordings_on_one_topic_do_not_end_each_other(clock: Clock) -> None:
+def test_two_recordings_on_one_topic_do_not_end_each_other() -> None:
     """The first one's publisher, which stays for its last message, goes before the second one's comes."""
     first = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 300 * MS, ((200 * MS, b"cdr", {}),))
     second = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 400 * MS, 900 * MS, ((800 * MS, b"cdr", {}),))
@@ -249,9 +245,7 @@ def test_two_recordings_on_one_topic_do_not_end_each_other(clock: Clock) -> None
 
 @pytest.mark.parametrize("latched", [False, True])
 @pytest.mark.parametrize("delay_ms", [0, 80])
-def test_a_stream_that_follows_soon_takes_the_publisher_over_or_comes_after_it(
-    clock: Clock, latched: bool, delay_ms: int
-) -> None:
+def test_a_stream_that_follows_soon_takes_the_publisher_over_or_comes_after_it(latched: bool, delay_ms: int) -> None:
     """One with the same QoS goes on with the publisher; otherwise the first one goes before the second one comes."""
     usual: dict[str, Any] = {"type": FLOAT, "period_ns": 100 * MS, "repeats": 1, "best_effort": False}
     first = PlannedMessages("/a", start_ns=400 * MS, stop_ns=500 * MS, latched=False, values=({},), **usual)

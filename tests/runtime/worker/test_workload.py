@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from quiet_kernel import QuietKernel
 
-from grader.runtime.worker import workload as module
 from grader.runtime.worker.delay import ARRIVAL_NS, LATE_AT_LEAST, LATE_SHARE, OUTRUN, Delay
 from grader.runtime.worker.workload import Workload
 
@@ -178,18 +178,16 @@ def test_a_process_that_has_ended_uses_nothing() -> None:
     assert workload.used_ns == 0
 
 
-class Clocks:
+class Clocks(QuietKernel):
     """Stands in for the kernel's counts: real and processor time, and how long each thread has waited."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        super().__init__()
         self.real_ns, self.used_ns = 1_000 * MS, 0
-        self.starved_ns: dict[str, int] = {"1": 0}
+        self.starved_ns = {"1": 0}
         monkeypatch.setattr(time, "monotonic_ns", lambda: self.real_ns)
         monkeypatch.setattr(time, "clock_gettime_ns", lambda _: self.used_ns)
-        monkeypatch.setattr(module, "innermost", lambda root: root)
-        monkeypatch.setattr(module, "threads_starved_ns", lambda _: dict(self.starved_ns))
-        monkeypatch.setattr(module, "thread_starved_ns", lambda *_: 0)
-        self.workload = Workload(1, 0)
+        self.workload = Workload(1, 0, self)
 
     def step(self, t_ms: float, real_ms: float, *, used_ms: float = 0, arrivals: int = 0, **report: Any) -> None:
         """Make one step at a virtual time, in which messages are said to arrive so often; half of it comes before."""
