@@ -18,8 +18,8 @@ from importlib.machinery import ModuleSpec
 from types import FrameType, ModuleType
 from typing import Any
 
-#: The deepest nesting of included launch files, and the most nodes and things left out that are described.
-DEEPEST, MOST_NODES, MOST_LEFT_OUT = 20, 16, 50
+#: The deepest nesting of included launch files.
+DEEPEST = 20
 #: The longest name or text of something that is left out.
 MOST_CHARACTERS = 200
 #: Names this similar to a package of the submission are taken for a misspelling of it.
@@ -44,7 +44,10 @@ class LeftOutError(Exception):
 class Context:
     """What a launch file is evaluated with: its arguments, namespaces, and what it sets for all nodes."""
 
-    def __init__(self, packages: Mapping[str, str], arguments: Mapping[str, str]) -> None:
+    def __init__(
+        self, packages: Mapping[str, str], arguments: Mapping[str, str], most_nodes: int, most_left_out: int
+    ) -> None:
+        self.most_nodes, self.most_left_out = most_nodes, most_left_out
         self.launch_configurations = dict(arguments)
         self.environment = dict(os.environ)
         self.packages = packages
@@ -72,7 +75,7 @@ class Context:
 
     def leave_out(self, file: str, line: int, error: LeftOutError) -> None:
         """Note something that is not evaluated."""
-        if len(self.left_out) < MOST_LEFT_OUT:
+        if len(self.left_out) < self.most_left_out:
             self.left_out.append({"file": file, "line": line, **error.told})
 
     def share_of(self, package: str) -> str:
@@ -606,7 +609,7 @@ class Node(Action):
 
     def visit(self, context: Context) -> Iterable[Any]:
         """Describe the node."""
-        if len(context.nodes) >= MOST_NODES:
+        if len(context.nodes) >= context.most_nodes:
             raise LeftOutError("nodes")
         for name in _NOT_SUPPORTED:
             if self.more.get(name):
@@ -1039,8 +1042,14 @@ def _missing(module: str) -> Callable[[str], Any]:
     return find
 
 
-def describe(
-    folders: tuple[str, ...], path: str, packages: Mapping[str, str], arguments: Mapping[str, str]
+def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
+    folders: tuple[str, ...],
+    path: str,
+    packages: Mapping[str, str],
+    arguments: Mapping[str, str],
+    *,
+    most_nodes: int,
+    most_left_out: int,
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Evaluate a launch file; raises whatever it raises.
 
@@ -1049,6 +1058,8 @@ def describe(
         path: The launch file, in one of them.
         packages: Name and folder of each ROS package of the submission.
         arguments: The launch arguments.
+        most_nodes: So many nodes are described; whatever follows the last one is left out.
+        most_left_out: So many things are said to be left out.
 
     Returns:
         The nodes, and what was left out with `code`, `name` and `text`, each with `file` and `line`.
@@ -1056,7 +1067,7 @@ def describe(
     global _folders  # noqa: PLW0603  every action needs them, also those that a launch file makes at import
     _folders = tuple(os.path.join(folder, "") for folder in folders)
     global _evaluation  # noqa: PLW0603  what a substitution finds without being performed
-    context = _evaluation = Context(packages, arguments)
+    context = _evaluation = Context(packages, arguments, most_nodes, most_left_out)
     install(context)
     # Once a package is built, a launch file imports the modules of its package.
     sys.path += [folder for folder in packages.values() if folder not in sys.path]

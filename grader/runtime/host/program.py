@@ -167,8 +167,8 @@ def evaluate(request: dict[str, Any]) -> None:
     """Evaluate the launch file that a request names, and report what it describes; never returns.
 
     Args:
-        request: As for `run`, with `launch`: its `arguments`, the `provided` files of the rubric, and name and
-            folder of the submission's `packages`, outermost first.
+        request: As for `run`, with `launch`: its `arguments`, the `provided` files of the rubric, name and folder of
+            the submission's `packages`, outermost first, and how much is described at `most`; see `describe`.
     """
     machine.install()
     link, describer = Link(), Describer()
@@ -190,7 +190,8 @@ def evaluate(request: dict[str, Any]) -> None:
         # Reversed, so that of two packages with one name the outermost counts.
         packages = {name: os.path.join(root, folder).rstrip("/") for name, folder in reversed(told["packages"])}
         sys.path += [os.path.join(root, folder) for folder in request["imported"]]
-        nodes, left_out = launch_files.describe((root, own), path, packages, dict(told["arguments"]))
+        arguments = dict(told["arguments"])
+        nodes, left_out = launch_files.describe((root, own), path, packages, arguments, **told["most"])
         found = {"nodes": nodes, "left_out": left_out}
     except BaseException as error:  # whatever the launch file raises becomes a fault
         found = {"fault": describer.exception(error)}

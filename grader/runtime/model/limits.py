@@ -34,6 +34,8 @@ MAX_PATH_BYTES = 2_000
 MAX_NAME_BYTES = 255
 #: The most nodes that a launch file may start: each is a process with a sandbox and a DDS participant.
 MOST_LAUNCHED = 16
+#: The most parts of a launch file that are reported as left out: each becomes a sentence.
+MOST_LEFT_OUT = 50
 
 #: The most bytes of an archive, which is read into memory.
 MAX_ARCHIVE_BYTES = 64 << 20

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.limits import MOST_LAUNCHED
+from grader.runtime.model.limits import MOST_LAUNCHED, MOST_LEFT_OUT
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import (
     ClockKind,
@@ -44,8 +44,10 @@ from grader.runtime.worker.student_process import NodeProcess
 
 #: The most real time that a launch file may take, and how often it is looked at, in seconds.
 LONGEST_S, LOOK_S = 60.0, 0.02
-#: The most things left out, arguments of a node and characters of a text that are taken from a description.
-LEFT_OUT, ARGUMENTS, CHARACTERS, FILE_CHARACTERS = 50, 200, 1_000, 1 << 20
+#: The most arguments of a node and characters of a text that are taken from a description.
+ARGUMENTS, CHARACTERS, FILE_CHARACTERS = 200, 1_000, 1 << 20
+#: How much a process describes, as the arguments of `describe` in its host.
+MOST = {"most_nodes": MOST_LAUNCHED, "most_left_out": MOST_LEFT_OUT}
 #: What packages and programs are called; anything else that a launch file names is quoted.
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,100}")
 #: Commands that neither send nor change anything in the ROS graph, whatever their arguments; and those of `ros2`, by
@@ -165,7 +167,7 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
     left_out: list[str] = []
     unstarted: list[tuple[str, str]] = []
     notes: list[str] = []
-    for one in _dicts(report.get("left_out"), LEFT_OUT):
+    for one in _dicts(report.get("left_out"), MOST_LEFT_OUT):
         words, text = _command(one), _left_out(name, one, places)
         if only := _only_name(words):
             unstarted.append((text, only))

@@ -46,7 +46,7 @@ from grader.runtime.worker.bare_start import BareProcess, bare_arguments
 from grader.runtime.worker.beside import files_beside, is_loose, whole_submission
 from grader.runtime.worker.conversation import Conversation
 from grader.runtime.worker.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
-from grader.runtime.worker.launching import EvaluatedLaunch, evaluated, expanded, renamed, unstarted
+from grader.runtime.worker.launching import MOST, EvaluatedLaunch, evaluated, expanded, renamed, unstarted
 from grader.runtime.worker.notes import Places
 from grader.runtime.worker.output_watch import OutputWatch
 from grader.runtime.worker.resource_monitor import Budget, ResourceMonitor
@@ -238,9 +238,8 @@ class Worker:
         """Return what a launch file describes, which a process in a sandbox of its own evaluates."""
         start = plan.start_of(name)
         packages = [(project.name, project.folder) for project in plan.projects]
-        told = {
-            "launch": {"arguments": start.launch_arguments, "provided": start.provided, "packages": packages},
-        }
+        launch = {"arguments": start.launch_arguments, "provided": start.provided, "packages": packages, "most": MOST}
+        told = {"launch": launch}
         students: list[NodeProcess] = []
         with ExitStack() as stack:
             stack.callback(stop, students)

@@ -48,7 +48,8 @@ def described(tmp_path: Path) -> Callable[..., Described]:
         for name, text in others.items():
             (robot / "launch" / f"{name}.launch.py").write_text(f"{IMPORTS}\n{text}")
         with patch.dict(sys.modules):
-            return describe((str(tmp_path),), str(file), {"robot": str(robot)}, arguments or {})
+            given = ((str(tmp_path),), str(file), {"robot": str(robot)}, arguments or {})
+            return describe(*given, most_nodes=16, most_left_out=50)
 
     return evaluate
 
