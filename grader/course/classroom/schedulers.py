@@ -45,7 +45,7 @@ def opened(
     """
     if scheduler is None:
         return nullcontext(local.LocalScheduler)
-    name, place = _named(scheduler)
+    name, place = named(scheduler)
     found = entry_points.load(SCHEDULERS, name, object, "a function")
     if found is None and name == DASK:
         lost = f"rclpy-grader: expected its entry point {DASK!r} of {SCHEDULERS}, found none"
@@ -59,7 +59,7 @@ def opened(
     return _connected(connect, where, place, jobs, warn)
 
 
-def _named(text: str) -> tuple[str, str]:
+def named(text: str) -> tuple[str, str]:
     """Return name and place of `NAME=PLACE` or `NAME`; an address and a file are those of Dask."""
     name, equals, place = text.partition("=")
     is_name = entry_points.NAME.fullmatch(name) is not None and not Path(text).exists()
