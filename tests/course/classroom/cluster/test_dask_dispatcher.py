@@ -19,7 +19,6 @@ from grader.course.classroom.messages import JobResult
 from grader.course.classroom.store import ResultStatus, State
 from grader.runtime.model.errors import HarnessError
 
-
 NAMES = ("ada", "bob", "cleo", "dan")
 
 
