@@ -13,6 +13,7 @@ from grader.course.classroom.sending import doubt, has_report
 from grader.course.classroom.store import REPORT, ResultStatus
 from grader.grading.model import entry_points
 from grader.grading.model.entry_points import SCHEDULERS
+from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, EnvironmentFault, GraderError, HarnessError
 
 #: The scheduler that a bare address or a scheduler file is for.
@@ -36,15 +37,22 @@ class Connect(Protocol):
         """
 
 
+@dataclass(frozen=True, slots=True)
+class ThisMachine:
+    """What grades a class without `--scheduler`."""
+
+    make: MakeScheduler = local.LocalScheduler
+
+
 def opened(
-    scheduler: str | None, jobs: int | None, warn: Callable[[str], None]
+    scheduler: str | None, jobs: int | None, warn: Callable[[str], None], here: ThisMachine
 ) -> AbstractContextManager[MakeScheduler]:
     """Return the context of what grades a class, from the value of `--scheduler`; None is this machine.
 
     Raises ClassError for an unknown name, EnvironmentFault if the package that registers it cannot be used.
     """
     if scheduler is None:
-        return nullcontext(local.LocalScheduler)
+        return nullcontext(here.make)
     name, place = named(scheduler)
     found = entry_points.load(SCHEDULERS, name, object, "a function")
     if found is None and name == DASK:
