@@ -23,7 +23,7 @@ from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.limits import Limits
 from grader.runtime.recording.codec import from_json, to_json
 from grader.runtime.ros_installation import PythonRuntime, RosInstallation, find_ros
-from grader.runtime.sandbox.choose import choose_isolation
+from grader.runtime.sandbox.choose import Machine, choose_isolation
 from grader.runtime.sandbox.environment import quick_discovery, runtime_environment
 from grader.runtime.sandbox.protocol import StudentProcess
 from grader.runtime.sandbox.tiers import HOST, ISOLATING, isolation_from_name
@@ -102,7 +102,7 @@ def holding(ros: RosInstallation) -> list[str]:
     names = []
     for name in (*ISOLATING, "none"):
         with contextlib.suppress(EnvironmentFault):
-            choose_isolation(name, ros)
+            choose_isolation(name, Machine(ros))
             names.append(name)
     return names
 

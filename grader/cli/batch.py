@@ -102,7 +102,7 @@ def command(  # noqa: PLR0913  one parameter an option
         require("--similarity", "copydetect", "similarity")
     from grader.course.classroom.class_run import ClassRequest, grade_class
     from grader.course.classroom.outputs import platforms, render_summary, summary_json
-    from grader.course.classroom.schedulers import opened
+    from grader.course.classroom.schedulers import ThisMachine, opened
     from grader.course.classroom.watching import shown_watcher
     from grader.course.similarity.finding import read_given
     from grader.grading.app.request import request_for
@@ -131,8 +131,9 @@ def command(  # noqa: PLR0913  one parameter an option
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
         given=read_given(templates or (shipped("student_template"),)) if similarity else None,
     )
+    here = ctx.find_object(ThisMachine) or ThisMachine()
     try:
-        with opened(scheduler, jobs, complain) as make, shown_watcher(wanted=not no_progress) as watcher:
+        with opened(scheduler, jobs, complain, here) as make, shown_watcher(wanted=not no_progress) as watcher:
             graded = grade_class(course, watcher, complain, make)
     except KeyboardInterrupt:
         click.echo("interrupted: what was graded is kept; run the same command again to continue", err=True)

@@ -7,7 +7,7 @@ import gc
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -45,7 +45,9 @@ from grader.runtime.model.errors import (
 )
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
     from fractions import Fraction
+    from typing import Protocol
 
     from click.shell_completion import CompletionItem
 
@@ -55,6 +57,20 @@ if TYPE_CHECKING:
     from grader.grading.reporting.audience import Readers
     from grader.grading.reporting.delivery import Output
     from grader.runtime.session import RecordingSession
+
+    Progress = Callable[[str], None]
+
+    class _Start(Protocol):
+        """What opens sessions and grades in them: the module `grader.grading.app.start`, or what stands in for it."""
+
+        def opened_early(
+            self, submission: str, rubrics: Sequence[Path], isolation: str, progress: Progress, /
+        ) -> AbstractContextManager[RecordingSession | None]: ...
+
+        def opened(self, request: GradeRequest, progress: Progress, /) -> AbstractContextManager[RecordingSession]: ...
+
+        def grade(self, *given: Any, **options: Any) -> Report: ...
+
 
 _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
@@ -79,6 +95,27 @@ _SUBCOMMANDS = (
 )
 # Internal name of the default command; it cannot clash, because a process argument cannot contain a NUL.
 _DEFAULT = "\0"
+
+
+def _start() -> _Start:
+    from grader.grading.app import start
+
+    return start
+
+
+def _saves(submission: Path) -> Iterator[bool]:
+    from grader.cli.interactive import saves
+
+    return saves(submission)
+
+
+@dataclass(frozen=True, slots=True)
+class Invocation:
+    """What the command `grade` is given besides its arguments, as the object of its context."""
+
+    started: float  # since when the user waits, as `time.monotonic` counts
+    start: Callable[[], _Start] = _start  # imports what opens sessions and grades
+    saves: Callable[[Path], Iterator[bool]] = _saves  # see `interactive.saves`
 
 
 class CommandLine(click.Group):
@@ -160,11 +197,10 @@ def _grade(*, submission: str | None, options: GradingOptions, watch: bool, no_p
     as ./NAME.
     """
     context = click.get_current_context()
-    started = context.find_object(float) or time.monotonic()
+    invocation = context.find_object(Invocation) or Invocation(time.monotonic())
     if submission is not None and (context.args or not os.path.exists(submission)):  # noqa: PTH110 - any name is valid
         _check_submission(submission, context.args)
-    from grader.grading.app import start
-
+    start = invocation.start()
     with ExitStack() as stack:
         session = None
         if submission is not None and not watch:  # before the rest is imported, which takes as long as a worker's start
@@ -172,7 +208,7 @@ def _grade(*, submission: str | None, options: GradingOptions, watch: bool, no_p
                 early = start.opened_early(submission, options.rubrics, options.isolation, progress)
                 session = stack.enter_context(early)
         given = {"options": options, "watch": watch, "no_progress": no_progress, **as_given}
-        return _graded(started, session, submission=submission, **given)
+        return _graded(invocation, session, submission=submission, **given)
 
 
 def _check_submission(submission: str, others: Sequence[str]) -> None:
@@ -188,7 +224,7 @@ def _check_submission(submission: str, others: Sequence[str]) -> None:
 
 
 def _graded(  # noqa: PLR0913  one parameter an option
-    started: float,
+    invocation: Invocation,
     session: RecordingSession | None,
     *,
     submission: str | None,
@@ -230,16 +266,18 @@ def _graded(  # noqa: PLR0913  one parameter an option
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
     wanted = tuple(replace(output, evidence=next(iter(folders), None)) for output in wanted)
     writer = _evidence_writer(folders, request) if folders else None
-    grading = _Grading(request, wanted, for_whom, writer, min_score, not no_progress, pages[0] if opens else None)
+    page = pages[0] if opens else None
+    grading = _Grading(invocation, request, wanted, for_whom, writer, min_score, not no_progress, page)
     # A folder that does not exist cannot be watched; grading it says so.
     watched = watch and Path(request.submission).exists()
-    return grading.each_save(started) if watched else grading.once(started, session)
+    return grading.each_save() if watched else grading.once(invocation.started, session)
 
 
 @dataclass(slots=True)
 class _Grading:
     """Grades a submission, once or repeatedly, and delivers its reports."""
 
+    invocation: Invocation
     request: GradeRequest
     outputs: Sequence[Output]
     readers: Readers
@@ -250,7 +288,6 @@ class _Grading:
 
     def once(self, started: float, session: RecordingSession | None = None) -> int:
         """Grade, in a session if one is given, and return the exit code; the user waits since `started`."""
-        from grader.grading.app import start
         from grader.grading.model.report import exit_code
         from grader.grading.reporting.audience import told
         from grader.grading.reporting.delivery import deliver, early_delivery
@@ -260,6 +297,7 @@ class _Grading:
         pictures = any(known(output.format).illustrated for output in self.outputs)
         with shown_progress(wanted=self.shows_progress) as progress:
             progress("starting")
+            start = self.invocation.start()
             report = start.grade(self.request, progress, remember, early, pictures=pictures, session=session)
         report = replace(report, duration_s=time.monotonic() - started)
         self._warn(report)
@@ -277,12 +315,10 @@ class _Grading:
 
         return exit_code(seen, self.min_score)
 
-    def each_save(self, started: float) -> int:
+    def each_save(self) -> int:
         """Grade now and after each save, in one session; return the exit code of the last time at Ctrl-C."""
-        from grader.cli.interactive import saves
-        from grader.grading.app import start
-
-        saved, code = saves(Path(self.request.submission)), ALL_MET
+        started, start = self.invocation.started, self.invocation.start()
+        saved, code = self.invocation.saves(Path(self.request.submission)), ALL_MET
         next(saved)
         with ExitStack() as stack:
             with shown_progress(wanted=self.shows_progress) as progress:
@@ -328,7 +364,7 @@ def main() -> None:
     atexit.register(gc.freeze)
     from grader.cli.interactive import process_start
 
-    app(prog_name="grade", obj=process_start())
+    app(prog_name="grade", obj=Invocation(process_start()))
 
 
 def _guarded(run: Callable[[], object]) -> int:

@@ -79,7 +79,6 @@ def command(  # noqa: PLR0913  one parameter an option
     from grader.grading.app.request import request_for
     from grader.grading.app.seeds import PRACTICE
     from grader.grading.app.verify import VerifyRequest, verify
-    from grader.grading.model.verification import ConditionState
     from grader.grading.reporting.verified import render_verification, verification_to_json
 
     how = request_for("", options, seed_key=key or PRACTICE, draw=draw)
@@ -93,6 +92,13 @@ def command(  # noqa: PLR0913  one parameter an option
         lambda page: render_verification(found, width=page.width, colour=page.colour),
         as_json=as_json,
     )
+    return exit_code(found)
+
+
+def exit_code(found: Verification) -> int:
+    """Return the exit code of the command for its result."""
+    from grader.grading.model.verification import ConditionState
+
     return {ConditionState.SAME: ALL_MET, ConditionState.DIFFERENT: NOT_ALL_MET}.get(found.state, UNDECIDED)
 
 

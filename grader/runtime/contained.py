@@ -23,7 +23,9 @@ from grader.runtime.shipped import PACKAGE
 REAL_S = 300
 
 
-def run_contained(module: str, limits: Mapping[str, object], given: BinaryIO, out: BinaryIO) -> int:
+def run_contained(
+    module: str, limits: Mapping[str, object], given: BinaryIO, out: BinaryIO, real_s: float = REAL_S
+) -> int:
     """Run a module that confines itself, and return its exit code.
 
     Args:
@@ -31,10 +33,11 @@ def run_contained(module: str, limits: Mapping[str, object], given: BinaryIO, ou
         limits: See `confine`.
         given: Its standard input, a file.
         out: Its standard output, a file.
+        real_s: Real time, in seconds, after which it is killed.
 
     Raises:
         OSError: The process cannot be started.
-        subprocess.TimeoutExpired: It took longer than `REAL_S`.
+        subprocess.TimeoutExpired: It took longer.
     """
     own = filter(os.path.isabs, os.environ.get("PYTHONPATH", "").split(os.pathsep))
     path = os.pathsep.join([str(PACKAGE.parent), *own])
@@ -47,7 +50,7 @@ def run_contained(module: str, limits: Mapping[str, object], given: BinaryIO, ou
         stderr=subprocess.DEVNULL,
         env=environment,
         cwd="/",
-        timeout=REAL_S,
+        timeout=real_s,
         check=False,
     ).returncode
 

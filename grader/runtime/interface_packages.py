@@ -10,7 +10,7 @@ import sys
 import sysconfig
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -251,6 +251,7 @@ def provide(  # noqa: PLR0913 - who brings packages, and who needs them
     rubric: Sequence[Path] = (),
     text: bytes = b"",
     budget_s: float = FOREVER_S,
+    build_own: Callable[..., Build] = build_confined,
 ) -> Provided:
     """Build what a run needs: the packages of rubrics and class, those of the grader that it names, and a submission's.
 
@@ -261,6 +262,7 @@ def provide(  # noqa: PLR0913 - who brings packages, and who needs them
         rubric: The folders of rubrics.
         text: Names types that the run uses besides those that the programs name.
         budget_s: Real time that may be spent on the packages of the submission.
+        build_own: Builds them; see `build_confined`.
     """
     ros, root = session.ros, submission.root
     given = offers(rubric, course, ros)
@@ -278,12 +280,12 @@ def provide(  # noqa: PLR0913 - who brings packages, and who needs them
     builds = [_copied(built(used, ros).prefix, session.folder)] if used else []
     others = [*used, *(package for package in ready if package not in used)]
     given_builds = len(builds)
-    own = _of_submission(session, submission, others, budget_s)
+    own = _of_submission(session, submission, others, budget_s, build_own)
     try:
         builds += [_copied(folder, root.parent) for folder in own.builds]
     except OSError:  # another run has made room in the meantime
         shutil.rmtree(root.parent / "interfaces", ignore_errors=True)
-        again = _of_submission(session, submission, others, budget_s - own.spent_s)
+        again = _of_submission(session, submission, others, budget_s - own.spent_s, build_own)
         own = replace(again, spent_s=own.spent_s + again.spent_s)
         builds += [_copied(folder, root.parent) for folder in own.builds]
     packages = tuple(sorted([*brought, *own.packages], key=lambda package: package.name))
@@ -305,7 +307,11 @@ class _Own:
 
 
 def _of_submission(
-    session: RecordingSession, submission: Submission, others: Sequence[InterfacePackage], budget_s: float
+    session: RecordingSession,
+    submission: Submission,
+    others: Sequence[InterfacePackage],
+    budget_s: float,
+    build_own: Callable[..., Build],
 ) -> _Own:
     """Build the packages in a submission, which may use others, but not replace them, in the sandbox of a session."""
     root = submission.root
@@ -327,7 +333,7 @@ def _of_submission(
     with tempfile.TemporaryDirectory(prefix="build-", dir=place.parent, ignore_cleanup_errors=True) as fresh:
         into = Path(fresh, "whole")
         into.mkdir()
-        told = build_confined(session.isolation, session.ros, root, into, others=others, taken=taken, left_s=budget_s)
+        told = build_own(session.isolation, session.ros, root, into, others=others, taken=taken, left_s=budget_s)
         spent_s = time.monotonic() - started
         if not told.packages:  # what was begun is of no use
             shutil.rmtree(into)

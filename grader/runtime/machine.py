@@ -21,9 +21,9 @@ from grader.runtime.model.quantities import GIB, MIB
 from grader.runtime.model.releases import release_of
 from grader.runtime.ros_installation import RosInstallation, find_ros
 from grader.runtime.sandbox.bubblewrap import ENTERABLE
-from grader.runtime.sandbox.choose import inspect_tier, inspect_tiers, sandbox_memory
+from grader.runtime.sandbox.choose import Machine, inspect_tier, inspect_tiers, sandbox_memory
 from grader.runtime.sandbox.exposure import some_user
-from grader.runtime.sandbox.properties import confined, install_command, setting_command
+from grader.runtime.sandbox.properties import SETTINGS_FOLDER, confined, install_command, setting_command
 from grader.runtime.sandbox.tiers import is_for_others, isolation_from_name
 from grader.runtime.supervisor.byte_code import byte_code
 from grader.runtime.supervisor.memory_groups import group_fact
@@ -38,8 +38,6 @@ MIN_MEMORY_BYTES = GIB
 SAID_S = 60.0
 _VERSION = re.compile(r"<version>\s*([0-9.]+)\s*</version>")
 _CREATE_RULESET, _ASK_VERSION = 444, 1  # linux/landlock.h; the number is the same on every architecture
-#: Where the kernel exposes its settings.
-SETTINGS_FOLDER = Path("/proc/sys")
 _PERSISTENT = "/etc/sysctl.d/60-rclpy-grader.conf"
 
 
@@ -57,12 +55,12 @@ def ros_here(find: Callable[[], RosInstallation] = find_ros) -> Found:
 
 def prepared(ros: RosInstallation) -> tuple[Fact, ...]:
     """Report what makes recording fast, or its limits sure: byte code, groups of memory, tests of sandboxes."""
-    return byte_code(ros.runtime), group_fact(), sandbox_memory(ros)
+    return byte_code(ros.runtime), group_fact(), sandbox_memory(Machine(ros))
 
 
 def sandboxes(ros: RosInstallation) -> tuple[TierReport, ...]:
     """Test every sandbox and return the reports, strongest first; `none` comes last."""
-    return inspect_tiers(ros)
+    return inspect_tiers(Machine(ros))
 
 
 def sandbox(name: str) -> TierReport:
@@ -71,7 +69,7 @@ def sandbox(name: str) -> TierReport:
     Raises:
         EnvironmentFault: This machine lacks ROS.
     """
-    return inspect_tier(name, find_ros())
+    return inspect_tier(name, Machine(find_ros()))
 
 
 def can_fork(name: str) -> bool:

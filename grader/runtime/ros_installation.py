@@ -89,7 +89,7 @@ def find_ros(environment: Mapping[str, str] | None = None, *, workspaces: bool =
     environment = os.environ if environment is None else environment
     found = _find_sourced(environment, workspaces=workspaces) or _find_wheels()
     if found is None:
-        raise EnvironmentFault("ROS 2: expected rclpy, found none in this environment", _install_hint())
+        raise EnvironmentFault("ROS 2: expected rclpy, found none in this environment", install_hint(INSTALLED_HERE))
     _require_parts(found)
     return found
 
@@ -193,15 +193,16 @@ def _require_parts(ros: RosInstallation) -> None:
         raise EnvironmentFault(f"{ros.prefix}: expected the message package {missing[0]}, found none", hint)
 
 
-def _install_hint() -> str:
-    setups = sorted(INSTALLED_HERE.glob("*/setup.bash"))
+def install_hint(installed: Path) -> str:
+    """Return the command after which there is a ROS, given the folder of the system's own installations."""
+    setups = sorted(installed.glob("*/setup.bash"))
     if setups:
-        preferred = INSTALLED_HERE / DEFAULT_DISTRO / "setup.bash"
+        preferred = installed / DEFAULT_DISTRO / "setup.bash"
         return f"source {preferred if preferred in setups else setups[-1]}"
     if sys.platform == "linux" and platform.machine() == "x86_64":
         wheels = f'"ros-{DEFAULT_DISTRO}-rclpy[fastrtps]" ros-{DEFAULT_DISTRO}-common-interfaces'
         return f"{sys.executable} -m pip install {wheels}"
-    return f"install ROS 2 {DEFAULT_DISTRO} and run: source {INSTALLED_HERE / DEFAULT_DISTRO / 'setup.bash'}"
+    return f"install ROS 2 {DEFAULT_DISTRO} and run: source {installed / DEFAULT_DISTRO / 'setup.bash'}"
 
 
 def _interpreter_paths() -> tuple[Path, ...]:

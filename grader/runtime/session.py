@@ -20,7 +20,7 @@ from grader.runtime.model.projects import Project
 from grader.runtime.model.trace import Trace
 from grader.runtime.programs.shares import install_shares
 from grader.runtime.ros_installation import RosInstallation, find_ros
-from grader.runtime.sandbox.choose import OWN_PROGRAMS, TierChoice, choose_isolation
+from grader.runtime.sandbox.choose import OWN_PROGRAMS, Machine, TierChoice, choose_isolation
 from grader.runtime.sandbox.protocol import Isolation
 from grader.runtime.supervisor.byte_code import compile_own
 from grader.runtime.supervisor.pace import keeps_pace
@@ -243,7 +243,7 @@ def sandbox_here(wanted: str) -> TierChoice:
     Raises:
         EnvironmentFault: This machine lacks ROS or the requested tier.
     """
-    return choose_isolation(wanted, find_ros())
+    return choose_isolation(wanted, Machine(find_ros()))
 
 
 def attempt_s(budget_s: float) -> float:
@@ -306,7 +306,7 @@ def open_session(  # noqa: PLR0913  what to open, and where progress goes
         EnvironmentFault: This machine lacks ROS or the requested tier.
     """
     ros = find_ros(workspaces=isolation == OWN_PROGRAMS)
-    choice = choose_isolation(isolation, ros, progress)
+    choice = choose_isolation(isolation, Machine(ros), progress)
     tier = choice.isolation
     domains = shared_domains() if tier.shares_network else private_domains()
     workers = workers or workers_for(len(os.sched_getaffinity(0)))

@@ -7,7 +7,7 @@ from pathlib import Path
 PACKAGE = Path(__file__).resolve().parent.parent
 
 
-def shipped(name: str) -> Path:
+def shipped(name: str, package: Path = PACKAGE) -> Path:
     """Return a shipped folder: `rubrics`, `student_template` or `integrations`."""
-    inside = PACKAGE / "shipped" / name
-    return inside if inside.is_dir() else PACKAGE.parent / name
+    inside = package / "shipped" / name
+    return inside if inside.is_dir() else package.parent / name

@@ -60,17 +60,18 @@ def kept_interfaces() -> Path | None:
     return place if place.is_dir() else None
 
 
-def make_room(place: Path, *, keep: Path) -> list[str]:
-    """Remove the oldest builds of submissions' interface packages beyond `KEPT_BYTES`, and return their names.
+def make_room(place: Path, *, keep: Path, most: int = KEPT_BYTES) -> list[str]:
+    """Remove the oldest builds of submissions' interface packages beyond a limit, and return their names.
 
     Only folders that `BUILDS` matches are removed; what a run uses, it has copied.
 
     Args:
         place: The folder that keeps what was built.
         keep: The build that was just made.
+        most: The most bytes of all builds together.
     """
     found = [(path.lstat().st_mtime, size_on_disk(path), path) for path in place.glob(BUILDS) if path != keep]
-    left = KEPT_BYTES - (size_on_disk(keep) if keep.is_dir() else 0)
+    left = most - (size_on_disk(keep) if keep.is_dir() else 0)
     removed = []
     for _, used, path in sorted(found, reverse=True):
         left -= used
@@ -92,10 +93,11 @@ def size_on_disk(folder: Path) -> int:
 
 
 @contextmanager
-def scratch_folder() -> Iterator[Path]:
+def scratch_folder(shared: Path = SHARED_MEMORY) -> Iterator[Path]:
     """Create a temporary folder for the block, and remove those that killed runs of this user left behind.
 
-    The folder is locked while this process lives, so that a later run can tell whether it is still in use.
+    The folder is locked while this process lives, so that a later run can tell whether it is still in use. What a
+    tracer leaves in the shared memory during the block is removed as well.
     """
     place = Path(tempfile.gettempdir())
     sweep(place)
@@ -103,7 +105,7 @@ def scratch_folder() -> Iterator[Path]:
         lock = os.open(name, os.O_RDONLY | os.O_DIRECTORY)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            with _without_tracer_files():
+            with _without_tracer_files(shared):
                 yield Path(name)
         finally:
             os.close(lock)
@@ -151,20 +153,20 @@ def _remove(folder: Path) -> None:
 
 
 @contextmanager
-def _without_tracer_files() -> Iterator[None]:
+def _without_tracer_files(shared: Path) -> Iterator[None]:
     """Remove the tracer's files that appear during the block, unless another program uses them."""
-    before = _tracer_files()
+    before = _tracer_files(shared)
     try:
         yield
     finally:
-        for path in _tracer_files() - before:
+        for path in _tracer_files(shared) - before:
             with contextlib.suppress(OSError):
                 if path.lstat().st_uid == os.geteuid() and not _in_use(path):
                     path.unlink()
 
 
-def _tracer_files() -> set[Path]:
-    return {path for path in SHARED_MEMORY.glob(TRACER_FILES) if _is_plain(path)}
+def _tracer_files(shared: Path) -> set[Path]:
+    return {path for path in shared.glob(TRACER_FILES) if _is_plain(path)}
 
 
 def _is_plain(path: Path) -> bool:

@@ -147,7 +147,7 @@ WEAKNESSES = (
 )
 
 #: Where Debian and its relatives tell which weaknesses a package has been repaired for.
-CHANGELOGS = {BUBBLEWRAP: Path("/usr/share/doc/bubblewrap/changelog.Debian.gz")}
+CHANGELOGS = (Path("/usr/share/doc/bubblewrap/changelog.Debian.gz"),)
 _NUMBERS = re.compile(r"\d+(?:\.\d+)+")
 _DEBIAN = re.compile(r"Debian (\d+\.\d+\.\d+)")
 
@@ -190,10 +190,10 @@ def known(versions: Mapping[str, Version], *, setuid: bool, repaired: Iterable[s
         yield Fact("known weakness", f"{here}: {weakness.name}: {weakness.what}", remedy=fix)
 
 
-def repaired_here() -> frozenset[str]:
+def repaired_here(changelogs: Iterable[Path] = CHANGELOGS) -> frozenset[str]:
     """Return the identifiers that the changelogs of the packages here name."""
     found: set[str] = set()
-    for path in CHANGELOGS.values():
+    for path in changelogs:
         try:
             text = gzip.decompress(path.read_bytes()).decode("utf-8", "replace")
         except (OSError, EOFError, ValueError):

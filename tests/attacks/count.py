@@ -22,7 +22,7 @@ from attack_runs import Attack, read_attacks, run_unit, units
 
 from grader.runtime.model.checkup import NO_SANDBOX, TIERS
 from grader.runtime.ros_installation import find_ros
-from grader.runtime.sandbox.choose import inspect_tiers
+from grader.runtime.sandbox.choose import Machine, inspect_tiers
 
 
 def main() -> int:
@@ -45,7 +45,7 @@ def main() -> int:
 
 def usable_tiers() -> list[str]:
     """Return the tiers whose self-test passes here; as root, those of an ordinary user are counted in."""
-    usable = [tier.name for tier in inspect_tiers(find_ros()) if tier.usable]
+    usable = [tier.name for tier in inspect_tiers(Machine(find_ros())) if tier.usable]
     as_user = list(UNPRIVILEGED) if os.geteuid() == 0 else []
     return [name for name in TIERS if name in (*usable, *as_user) and name != NO_SANDBOX]
 

@@ -19,7 +19,7 @@ from attack_verdicts import EARNS, objections
 from grader.grading.reporting.formats import FORMATS
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import find_ros
-from grader.runtime.sandbox.choose import inspect_tiers
+from grader.runtime.sandbox.choose import Machine, inspect_tiers
 
 TIERS = ("bubblewrap-root", "bubblewrap")
 #: The tier that grading would take here; the other one is left to the nightly run.
@@ -36,7 +36,7 @@ NOTHING = Ran(0, {}, "", "", {})
 @pytest.fixture(scope="module")
 def usable() -> dict[str, str]:
     try:
-        return {tier.name: tier.why for tier in inspect_tiers(find_ros())}
+        return {tier.name: tier.why for tier in inspect_tiers(Machine(find_ros()))}
     except EnvironmentFault as fault:
         pytest.skip(fault.message)
 

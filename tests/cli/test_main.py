@@ -20,7 +20,6 @@ from click.testing import CliRunner, Result
 
 import grader
 from grader.cli import interactive, main
-from grader.grading.app import start as session
 from grader.grading.app.request import GradeRequest
 from grader.grading.model.exercise import Outcome
 from grader.grading.model.report import Report
@@ -35,16 +34,18 @@ class Session:
         self.requests: list[GradeRequest] = []
         self.result: Report | BaseException = a_report()
         self.pictures = True
+        self.opened_for: list[GradeRequest] = []
+        self.saves: Callable[[Path], Iterator[bool]] = lambda path: iter(())
+
+    def opened_early(self, *_: object) -> AbstractContextManager[None]:
+        return nullcontext()
+
+    def opened(self, request: GradeRequest, progress: object) -> AbstractContextManager[Any]:
+        self.opened_for.append(request)
+        return nullcontext()
 
     def grade(
-        self,
-        request: GradeRequest,
-        progress: Callable[[str], None],
-        on_recorded: object = None,
-        on_partial_report: object = None,
-        *,
-        pictures: bool = True,
-        session: object = None,
+        self, request: GradeRequest, progress: Callable[[str], None], *_: object, pictures: bool, session: object
     ) -> Report:
         self.requests.append(request)
         self.pictures = pictures
@@ -53,13 +54,15 @@ class Session:
             raise self.result
         return self.result
 
+    def call(self, *arguments: str, app: main.CommandLine = main.app, started: float | None = None) -> Result:
+        """Call the command line with this session."""
+        given = main.Invocation(time.monotonic() if started is None else started, lambda: self, self.saves)
+        return CliRunner().invoke(app, list(arguments), prog_name="grade", obj=given)
+
 
 @pytest.fixture
-def run_session(monkeypatch: pytest.MonkeyPatch) -> Session:
-    stand_in = Session()
-    monkeypatch.setattr(session, "grade", stand_in.grade)
-    monkeypatch.setattr(session, "opened_early", lambda *_: nullcontext())
-    return stand_in
+def run_session() -> Session:
+    return Session()
 
 
 def grade(*arguments: str, **kwargs: Any) -> Result:
@@ -68,7 +71,7 @@ def grade(*arguments: str, **kwargs: Any) -> Result:
 
 def test_the_everyday_form_prints_the_text_report(run_session: Session) -> None:
     """A path and nothing else is enough."""
-    result = grade("ada")
+    result = run_session.call("ada")
     assert result.exit_code == 0
     assert result.stdout.startswith("ada: 10 of 10 points\n")
     assert result.stderr == ""
@@ -80,7 +83,7 @@ def test_every_option_reaches_the_session(run_session: Session) -> None:
     options = ["--exercise", "b", "--exercise", "a", "--exercise", "b", "--seed", "5", "--odom-bag", "bag"]
     options += ["--rubric", "r1.yaml", "--rubric", "r2.yaml", "--clock", "wall", "--isolation", "none", "--no-progress"]
     options += ["--time-budget", "20"]
-    result = grade(*options, "ada")
+    result = run_session.call(*options, "ada")
     assert result.exit_code == 0, result.output
     assert run_session.requests == [
         GradeRequest(
@@ -98,7 +101,7 @@ def test_every_option_reaches_the_session(run_session: Session) -> None:
 
 def test_options_may_follow_the_submission(run_session: Session) -> None:
     """Order does not matter."""
-    assert grade("ada", "--seed", "5").exit_code == 0
+    assert run_session.call("ada", "--seed", "5").exit_code == 0
     assert run_session.requests[0].seed == 5
 
 
@@ -124,21 +127,21 @@ def test_the_exit_code_says_how_it_went(
 ) -> None:
     """0 all met or the share reached, 1 not, 3 undecided whatever the share."""
     run_session.result = a_report(*outcomes)
-    result = grade("ada", *options)
+    result = run_session.call("ada", *options)
     assert result.exit_code == code
     assert "points" in result.stdout
 
 
 def test_json_prints_the_report_and_nothing_else(run_session: Session) -> None:
     """Standard output can be piped into a parser."""
-    result = grade("ada", "--json")
+    result = run_session.call("ada", "--json")
     assert json.loads(result.stdout)["schema"] == "grader/report/v1"
     assert result.stderr == ""
 
 
 def test_reports_go_to_files_as_well(run_session: Session, tmp_path: Path) -> None:
     """The text is still printed; files are plain and in UTF-8."""
-    result = grade("ada", "-o", f"json={tmp_path / 'r.json'}", "--output", f"text={tmp_path / 'r.txt'}")
+    result = run_session.call("ada", "-o", f"json={tmp_path / 'r.json'}", "--output", f"text={tmp_path / 'r.txt'}")
     assert result.exit_code == 0
     assert json.loads((tmp_path / "r.json").read_bytes())["score"] == 10
     assert "Criterion 0 ±" in (tmp_path / "r.txt").read_text(encoding="utf-8")
@@ -148,7 +151,7 @@ def test_reports_go_to_files_as_well(run_session: Session, tmp_path: Path) -> No
 
 def test_a_dash_prints_that_format_instead(run_session: Session, tmp_path: Path) -> None:
     """One report on standard output, the chosen one."""
-    result = grade("ada", "-o", "json=-", "-o", f"text={tmp_path / 'r.txt'}")
+    result = run_session.call("ada", "-o", "json=-", "-o", f"text={tmp_path / 'r.txt'}")
     assert json.loads(result.stdout)["score"] == 10
 
 
@@ -178,7 +181,7 @@ def test_a_wrong_command_is_one_line_and_nothing_is_graded(
     run_session: Session, arguments: tuple[str, ...], message: str, hint: str
 ) -> None:
     """Exit code 2, what is wrong, what to do; before any work is done."""
-    result = grade(*arguments)
+    result = run_session.call(*arguments)
     assert result.exit_code == 2
     assert result.stdout == ""
     lines = result.stderr.splitlines()
@@ -202,7 +205,7 @@ def test_a_wrong_command_is_one_line_and_nothing_is_graded(
 def test_a_grader_error_is_a_line_and_a_hint(run_session: Session, error: errors.GraderError, code: int) -> None:
     """Whoever must act reads what is wrong and one thing to do."""
     run_session.result = error
-    result = grade("ada", "--json")
+    result = run_session.call("ada", "--json")
     assert result.exit_code == code
     assert result.stdout == ""
     assert result.stderr == f"error: {error.message}\nhint: {error.hint}\n"
@@ -211,33 +214,33 @@ def test_a_grader_error_is_a_line_and_a_hint(run_session: Session, error: errors
 def test_several_mistakes_are_several_lines(run_session: Session) -> None:
     """A rubric's author sees all of them at once; without a hint there is no empty one."""
     run_session.result = errors.RubricError("r.yaml:1:1: one\nr.yaml:2:1: two")
-    assert grade("ada").stderr == "error: r.yaml:1:1: one\nerror: r.yaml:2:1: two\n"
+    assert run_session.call("ada").stderr == "error: r.yaml:1:1: one\nerror: r.yaml:2:1: two\n"
 
 
 def test_an_error_cannot_steer_the_terminal(run_session: Session) -> None:
     """File names of a student end up in messages."""
     run_session.result = errors.SubmissionError("a\x1b[2J\udcff: no", "b\x07")
-    assert grade("ada").stderr == "error: a\\x1b[2J\\udcff: no\nhint: b\\x07\n"
+    assert run_session.call("ada").stderr == "error: a\\x1b[2J\\udcff: no\nhint: b\\x07\n"
     run_session.result = errors.SubmissionError("a\nerror: forged")
-    assert grade("ada").stderr == "error: a\\nerror: forged\n"
+    assert run_session.call("ada").stderr == "error: a\\nerror: forged\n"
 
 
 def test_a_mistake_of_ours_is_no_low_score(run_session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     """Exit code 3 and one line; the traceback only for those who ask."""
     run_session.result = KeyError("secret")
     monkeypatch.delenv("GRADER_DEBUG", raising=False)
-    result = grade("ada")
+    result = run_session.call("ada")
     assert result.exit_code == 3
     assert result.stderr == "error: the grader failed: KeyError: 'secret'\nhint: GRADER_DEBUG=1 shows where\n"
     monkeypatch.setenv("GRADER_DEBUG", "1")
-    assert "Traceback (most recent call last)" in grade("ada").stderr
+    assert "Traceback (most recent call last)" in run_session.call("ada").stderr
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), click.Abort()])
 def test_an_interrupt_is_one_line(run_session: Session, error: BaseException) -> None:
     """Ctrl-C ends in 130, without a traceback and without a report."""
     run_session.result = error
-    result = grade("ada", "--json")
+    result = run_session.call("ada", "--json")
     assert (result.exit_code, result.stdout) == (130, "")
     assert result.stderr == "interrupted: no report was made\n"
 
@@ -245,7 +248,7 @@ def test_an_interrupt_is_one_line(run_session: Session, error: BaseException) ->
 def test_an_end_of_input_of_ours_is_no_interrupt(run_session: Session) -> None:
     """Only Ctrl-C is called one."""
     run_session.result = EOFError("worker")
-    assert grade("ada").exit_code == 3
+    assert run_session.call("ada").exit_code == 3
 
 
 def test_a_report_that_cannot_be_written_does_not_keep_the_others_back(
@@ -258,7 +261,7 @@ def test_a_report_that_cannot_be_written_does_not_keep_the_others_back(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    result = grade("ada", "-o", f"json={path}")
+    result = run_session.call("ada", "-o", f"json={path}")
     assert result.exit_code == 2
     assert "ada: 10 of 10" in result.stdout
     assert result.stderr == f"error: {path}: the json report cannot be written: No space left on device\n"
@@ -267,12 +270,12 @@ def test_a_report_that_cannot_be_written_does_not_keep_the_others_back(
 
 def test_nothing_is_said_while_grading_unless_stderr_is_a_terminal(run_session: Session) -> None:
     """Logs of a build server stay clean."""
-    assert grade("ada").stderr == ""
+    assert run_session.call("ada").stderr == ""
 
 
 def test_help_names_every_option_and_the_exit_codes(run_session: Session) -> None:
     """Both spellings, before and after the submission, show the same."""
-    text = grade("--help").stdout
+    text = run_session.call("--help").stdout
     for word in ("--exercise ID", "--seed N", "--odom-bag", "--json", "FORMAT=PATH", "--rubric", "--min-score P"):
         assert word in text
     for word in (
@@ -283,12 +286,12 @@ def test_help_names_every_option_and_the_exit_codes(run_session: Session) -> Non
         "130",
     ):
         assert word in text
-    assert grade("-h").stdout == grade("ada", "--help").stdout == text
+    assert run_session.call("-h").stdout == run_session.call("ada", "--help").stdout == text
 
 
 def test_the_version_is_the_package_s(run_session: Session) -> None:
     """One number, in one place."""
-    assert grade("--version").stdout == f"grade {grader.__version__}\n"
+    assert run_session.call("--version").stdout == f"grade {grader.__version__}\n"
 
 
 @pytest.fixture
@@ -320,7 +323,7 @@ def test_a_folder_named_like_a_subcommand_is_graded(
     run_session: Session, with_batch: main.CommandLine, arguments: list[str]
 ) -> None:
     """Only the bare first word is a command."""
-    assert CliRunner().invoke(with_batch, arguments).exit_code == 0
+    assert run_session.call(*arguments, app=with_batch).exit_code == 0
     assert Path(run_session.requests[0].submission) == Path("batch")
 
 
@@ -341,7 +344,7 @@ def test_the_current_folder_is_graded_if_it_holds_an_exercise(
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     monkeypatch.chdir(tmp_path)
-    assert grade().exit_code == 0
+    assert run_session.call().exit_code == 0
     assert [request.submission for request in run_session.requests] == ["."]
 
 
@@ -353,7 +356,7 @@ def test_elsewhere_the_command_alone_shows_examples(
     (tmp_path / "homework" / "odom_subscriber.py").touch()
     (tmp_path / "notes.py").write_text("print(1)")
     monkeypatch.chdir(tmp_path)
-    result = grade()
+    result = run_session.call()
     assert (result.exit_code, result.stdout, run_session.requests) == (2, "", [])
     assert result.stderr.startswith("error: expected a submission: this folder holds no exercise file, such as ")
     assert "grade homework --exercise 1" in result.stderr
@@ -376,7 +379,7 @@ def test_open_shows_the_page_in_a_browser(
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("DISPLAY", display)
     monkeypatch.chdir(tmp_path)
-    result = grade("ada", "--open", *(["-o", "html=page.html"] if named else []))
+    result = run_session.call("ada", "--open", *(["-o", "html=page.html"] if named else []))
     page = tmp_path / ("page.html" if named else "grade-report.html")
     assert result.exit_code == 0
     assert list(tmp_path.iterdir()) == [page]
@@ -386,9 +389,7 @@ def test_open_shows_the_page_in_a_browser(
     assert result.stderr.splitlines() == [f"page: {page}", *note]
 
 
-def test_watch_grades_after_each_save_until_it_is_interrupted(
-    run_session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_watch_grades_after_each_save_until_it_is_interrupted(run_session: Session, tmp_path: Path) -> None:
     """One session for all; an error is said and waited out; the exit code is that of the last report."""
 
     def three(path: Path) -> Iterator[bool]:
@@ -399,16 +400,9 @@ def test_watch_grades_after_each_save_until_it_is_interrupted(
         yield True
         raise KeyboardInterrupt
 
-    sessions: list[GradeRequest] = []
-
-    def opened(request: GradeRequest, progress: object) -> AbstractContextManager[None]:
-        sessions.append(request)
-        return nullcontext()
-
-    monkeypatch.setattr(session, "opened", opened)
-    monkeypatch.setattr(interactive, "saves", three)
-    result = grade(str(tmp_path), "--watch")
-    assert (result.exit_code, len(sessions), len(run_session.requests)) == (1, 1, 3)
+    run_session.saves = three
+    result = run_session.call(str(tmp_path), "--watch")
+    assert (result.exit_code, len(run_session.opened_for), len(run_session.requests)) == (1, 1, 3)
     assert result.stdout.count("points\n") == 2
     assert result.stderr.splitlines().count("error: no file") == 1
     assert result.stderr.count("watching for the next save") == 3
@@ -416,7 +410,7 @@ def test_watch_grades_after_each_save_until_it_is_interrupted(
 
 def test_the_time_shown_is_the_time_since_the_start_of_the_process(run_session: Session) -> None:
     """Imports and the end of the session count, because the user waited for them."""
-    result = grade("ada", obj=time.monotonic() - 3600)
+    result = run_session.call("ada", started=time.monotonic() - 3600)
     assert re.search(r"graded \./ada in 36\d\d\.\d s", result.stdout)
 
 
@@ -470,16 +464,18 @@ def test_only_programs_are_a_reason_to_grade_again(name: str, only: str | None, 
 CHILD = """
 import sys
 sys.path.insert(0, {folder!r})
+from contextlib import nullcontext
 from cli_samples import a_report
-from grader.grading.app import start as session
 from grader.cli import main
-def grade(request, progress, *_, **__):
-    progress("exercise 1: \\x1b[31malone")
-    sys.stdin.readline()
-    return a_report()
-session.grade = grade
-sys.argv[0] = "grade"
-main.main()
+from grader.cli.interactive import process_start
+class Stub:
+    def opened_early(self, *_):
+        return nullcontext()
+    def grade(self, request, progress, *_, **__):
+        progress("exercise 1: \\x1b[31malone")
+        sys.stdin.readline()
+        return a_report()
+main.app(prog_name="grade", obj=main.Invocation(process_start(), Stub))
 """
 
 
@@ -583,9 +579,9 @@ def test_a_command_with_subcommands_alone_shows_its_help(name: str) -> None:
 
 def test_pictures_are_drawn_where_a_report_shows_them(run_session: Session, tmp_path: Path) -> None:
     """Drawing takes about as long as judging, and text shows none."""
-    grade("ada")
+    run_session.call("ada")
     assert run_session.pictures is False
-    grade("ada", "-o", f"html={tmp_path / 'r.html'}")
+    run_session.call("ada", "-o", f"html={tmp_path / 'r.html'}")
     assert run_session.pictures is True
 
 

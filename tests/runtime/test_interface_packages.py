@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,6 @@ from grader.grading.model.report import Report
 from grader.grading.reporting.json_report import report_to_json
 from grader.grading.rubrics.interfaces import Interfaces
 from grader.grading.submissions.projects import read_projects
-from grader.runtime import interface_packages
 from grader.runtime.interface_packages import (
     GRADER,
     RUBRIC,
@@ -45,8 +45,7 @@ from grader.runtime.interface_packages import (
 from grader.runtime.model.submission import Submission
 from grader.runtime.ros_installation import find_ros
 from grader.runtime.session import RecordingSession, open_session
-from grader.runtime.supervisor import confined_build
-from grader.runtime.supervisor.real_time_budget import FOREVER_S
+from grader.runtime.supervisor.confined_build import build_confined, told_of
 
 REAL = TESTS / "real_checks"
 RUBRIC_FILE = REAL / "brought.yaml"
@@ -141,16 +140,14 @@ def session() -> Iterator[RecordingSession]:
         yield opened
 
 
-def provided(
-    session: RecordingSession, folder: Path, files: Mapping[str, str], *, budget_s: float = FOREVER_S
-) -> Provided:
+def provided(session: RecordingSession, folder: Path, files: Mapping[str, str], **options: Any) -> Provided:
     """Return what a submission of these files gets."""
     for name, text in files.items():
         path = folder / "own" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
     submission = Submission("own", str(folder), folder / "own", "", projects=read_projects(folder / "own")[0])
-    return provide(session, submission, budget_s=budget_s)
+    return provide(session, submission, **options)
 
 
 @pytest.mark.sandbox
@@ -221,16 +218,14 @@ def test_a_build_that_ends_at_a_limit_is_a_note_that_is_remembered(
 ) -> None:
     """The submission is graded without its packages, and the next time at no cost."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(confined_build, "PROCESSOR_S", 1)
     fields = "".join(f"float64 x{n}\n" for n in range(499))
     files = {f"big_msgs/msg/M{n}.msg": fields for n in range(250)}
-    first = provided(session, tmp_path, files)
+    first = provided(session, tmp_path, files, build_own=partial(build_confined, processor_s=1))
     assert first.packages == ()
     assert len(first.problems) == 1
     assert "processor time" in first.problems[0]
     assert first.spent_s > 0
-    monkeypatch.setattr(interface_packages, "build_confined", None)
-    again = provided(session, tmp_path, files)
+    again = provided(session, tmp_path, files, build_own=None)
     assert (again.problems, again.spent_s) == (first.problems, 0)
     (kept,) = (tmp_path / "cache" / "rclpy-grader" / "interfaces").glob("submitted-*")
     assert [path.name for path in kept.iterdir()] == ["told.json"]
@@ -264,7 +259,7 @@ def test_a_build_takes_no_longer_than_the_time_budget(
 )
 def test_what_a_build_tells_is_checked(answer: object) -> None:
     """Its process has read what students made, and names folders."""
-    assert confined_build.told_of(answer) is None
+    assert told_of(answer) is None
 
 
 @pytest.mark.sandbox

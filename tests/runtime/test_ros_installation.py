@@ -1,17 +1,18 @@
 """Which ROS is found, and what children get of it."""
 
 import importlib.machinery
+import importlib.util
 import platform
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
-from grader.runtime import ros_installation
 from grader.runtime.model.errors import EnvironmentFault
-from grader.runtime.ros_installation import RosInstallation, find_ros
+from grader.runtime.ros_installation import INSTALLED_HERE, RosInstallation, find_ros, install_hint
 from grader.runtime.sandbox.environment import runtime_environment
 
 HERE = f"python{sys.version_info.major}.{sys.version_info.minor}"
@@ -198,22 +199,21 @@ def test_read_paths_are_absolute_and_exist(wheels: RosInstallation) -> None:
 
 def test_without_any_ros_the_command_that_installs_it_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The wheels where they exist, an installation to source where one lies ready."""
-    monkeypatch.setattr(ros_installation, "_site_packages", lambda: (tmp_path,))
-    monkeypatch.setattr(ros_installation, "INSTALLED_HERE", tmp_path)
+    with monkeypatch.context() as interpreter:
+        interpreter.setattr(importlib.util, "find_spec", lambda name: None)
+        interpreter.setattr(sysconfig, "get_path", lambda name: str(tmp_path))
+        with pytest.raises(EnvironmentFault, match="expected rclpy, found none") as caught:
+            find_ros({})
+    assert caught.value.hint == install_hint(INSTALLED_HERE)
     monkeypatch.setattr(platform, "machine", lambda: "x86_64")
-    with pytest.raises(EnvironmentFault, match="expected rclpy, found none") as caught:
-        find_ros({})
-    assert caught.value.hint.endswith('-m pip install "ros-jazzy-rclpy[fastrtps]" ros-jazzy-common-interfaces')
+    wheels = '-m pip install "ros-jazzy-rclpy[fastrtps]" ros-jazzy-common-interfaces'
+    assert install_hint(tmp_path).endswith(wheels)
     monkeypatch.setattr(platform, "machine", lambda: "riscv64")
-    with pytest.raises(EnvironmentFault) as caught:
-        find_ros({})
-    assert caught.value.hint.startswith("install ROS 2 jazzy")
+    assert install_hint(tmp_path).startswith("install ROS 2 jazzy")
     for distro in ("humble", "rolling"):
         (tmp_path / distro).mkdir()
         (tmp_path / distro / "setup.bash").touch()
-    with pytest.raises(EnvironmentFault) as caught:
-        find_ros({})
-    assert caught.value.hint == f"source {tmp_path / 'rolling' / 'setup.bash'}"
+    assert install_hint(tmp_path) == f"source {tmp_path / 'rolling' / 'setup.bash'}"
 
 
 def test_finding_ros_imports_none_of_it() -> None:

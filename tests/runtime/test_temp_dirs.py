@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.runtime import temp_dirs
 from grader.runtime.temp_dirs import FRESH_S, PREFIX, make_room, scratch_folder, sweep
 
 
@@ -138,15 +137,12 @@ def test_the_lock_is_not_inherited(place: Path) -> None:
     assert str(folder) not in held
 
 
-def test_files_of_the_tracer_go_unless_they_were_there_or_are_in_use(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_of_the_tracer_go_unless_they_were_there_or_are_in_use(tmp_path: Path) -> None:
     """A library that ROS loads leaves them in the shared memory of every program of a user."""
     shared = tmp_path / "shm"
     shared.mkdir()
-    monkeypatch.setattr(temp_dirs, "SHARED_MEMORY", shared)
     (shared / "lttng-ust-wait-5").write_bytes(bytes(4096))
-    with scratch_folder():
+    with scratch_folder(shared):
         for name in ("lttng-ust-wait-6", "lttng-ust-wait-7", "other"):
             (shared / name).write_bytes(bytes(4096))
         with (shared / "lttng-ust-wait-7").open("rb") as file:
@@ -172,9 +168,8 @@ def test_a_folder_that_is_locked_stays(place: Path) -> None:
     assert sweep(place) == [folder.name]
 
 
-def test_the_oldest_builds_make_room(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_oldest_builds_make_room(place: Path) -> None:
     """What was used last stays, and so do other folders and the new build, though it is larger than the limit."""
-    monkeypatch.setattr(temp_dirs, "KEPT_BYTES", 300_000)
     builds = {}
     for number, name in enumerate(("oldest", "old", "new", "newest")):
         builds[name] = place / f"submitted-{name}"
@@ -183,9 +178,9 @@ def test_the_oldest_builds_make_room(place: Path, monkeypatch: pytest.MonkeyPatc
         os.utime(builds[name], (number, number))
     (place / "0123456789abcdef").mkdir()
     (place / "submitted-link").symlink_to(place / "0123456789abcdef")
-    assert make_room(place, keep=builds["newest"]) == ["submitted-oldest"]
+    assert make_room(place, keep=builds["newest"], most=300_000) == ["submitted-oldest"]
     (builds["newest"] / "python" / "b.py").write_bytes(b"x" * 400_000)
-    make_room(place, keep=builds["newest"])
+    make_room(place, keep=builds["newest"], most=300_000)
     assert builds["newest"].is_dir()
     assert not builds["new"].exists()
     assert (place / "0123456789abcdef").is_dir()

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.runtime import weaknesses as module
 from grader.runtime.weaknesses import (
     BUBBLEWRAP,
     FAST_DDS,
@@ -79,18 +78,15 @@ def test_each_is_told_with_its_version_and_its_fix() -> None:
     assert fact.fits, "grading stays safe: what the sandbox promises is tested, not guessed from versions"
 
 
-def test_a_package_that_its_distribution_has_repaired_is_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_package_that_its_distribution_has_repaired_is_left_out(tmp_path: Path) -> None:
     """Debian and Ubuntu keep the version and name the weakness in the changelog."""
     changelog = tmp_path / "changelog.Debian.gz"
-    monkeypatch.setattr(module, "CHANGELOGS", {BUBBLEWRAP: changelog})
-    assert repaired_here() == frozenset()
+    assert repaired_here([changelog]) == frozenset()
     changelog.write_bytes(b"not compressed")
-    assert repaired_here() == frozenset()
+    assert repaired_here([changelog]) == frozenset()
     changelog.write_bytes(gzip.compress(b"bubblewrap (0.9.0-1ubuntu0.2) noble-security\n  * CVE-2026-87766\n"))
-    assert repaired_here() == {"CVE-2026-87766"}
-    assert names(BUBBLEWRAP, "0.9.0", repaired=tuple(repaired_here())) == []
+    assert repaired_here([changelog]) == {"CVE-2026-87766"}
+    assert names(BUBBLEWRAP, "0.9.0", repaired=tuple(repaired_here([changelog]))) == []
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from grader.course.classroom import store as kept
 from grader.course.classroom.store import Conditions, ResultStatus, State
 from grader.runtime.model.checkup import NO_SANDBOX, missing
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.session import WALL, sandbox_here
+from grader.runtime.session import WALL, TierChoice, sandbox_here
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,11 +93,19 @@ class LocalScheduler:
     there are more of them, the processes that this needs are kept, because each takes a second to start.
     """
 
-    def __init__(self, jobs: int, command: Sequence[str] = WORKER, *, folder: Path | None = None) -> None:
+    def __init__(
+        self,
+        jobs: int,
+        command: Sequence[str] = WORKER,
+        *,
+        folder: Path | None = None,
+        sandbox: Callable[[str], TierChoice] = sandbox_here,
+    ) -> None:
         self._jobs = jobs
         self._on_wall_clock = WAITING_PER_JOB * jobs
         self._command = command
         self._folder = folder
+        self._sandbox = sandbox
         self._lock = threading.Lock()
         self._running: set[subprocess.Popen[bytes]] = set()
         self._idle: list[subprocess.Popen[bytes]] = []
@@ -106,7 +114,7 @@ class LocalScheduler:
 
     def prepare(self, isolation: str) -> Sequence[str]:
         """Find ROS and test the sandbox; see `ClassScheduler`."""
-        choice = sandbox_here(isolation)
+        choice = self._sandbox(isolation)
         name = choice.isolation.name
         warnings = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
         if choice.isolation.shares_network and name != NO_SANDBOX:

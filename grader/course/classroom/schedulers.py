@@ -13,6 +13,7 @@ from grader.course.classroom.sending import doubt, has_report
 from grader.course.classroom.store import REPORT, ResultStatus
 from grader.grading.model import entry_points
 from grader.grading.model.entry_points import SCHEDULERS
+from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, EnvironmentFault, GraderError, HarnessError
 
 #: The scheduler that a bare address or a scheduler file is for.
@@ -36,16 +37,23 @@ class Connect(Protocol):
         """
 
 
+@dataclass(frozen=True, slots=True)
+class ThisMachine:
+    """What grades a class without `--scheduler`."""
+
+    make: MakeScheduler = local.LocalScheduler
+
+
 def opened(
-    scheduler: str | None, jobs: int | None, warn: Callable[[str], None]
+    scheduler: str | None, jobs: int | None, warn: Callable[[str], None], here: ThisMachine
 ) -> AbstractContextManager[MakeScheduler]:
     """Return the context of what grades a class, from the value of `--scheduler`; None is this machine.
 
     Raises ClassError for an unknown name, EnvironmentFault if the package that registers it cannot be used.
     """
     if scheduler is None:
-        return nullcontext(local.LocalScheduler)
-    name, place = _named(scheduler)
+        return nullcontext(here.make)
+    name, place = named(scheduler)
     found = entry_points.load(SCHEDULERS, name, object, "a function")
     if found is None and name == DASK:
         lost = f"rclpy-grader: expected its entry point {DASK!r} of {SCHEDULERS}, found none"
@@ -59,7 +67,7 @@ def opened(
     return _connected(connect, where, place, jobs, warn)
 
 
-def _named(text: str) -> tuple[str, str]:
+def named(text: str) -> tuple[str, str]:
     """Return name and place of `NAME=PLACE` or `NAME`; an address and a file are those of Dask."""
     name, equals, place = text.partition("=")
     is_name = entry_points.NAME.fullmatch(name) is not None and not Path(text).exists()

@@ -13,6 +13,7 @@ from itertools import combinations
 from pathlib import Path
 
 from grader.course.similarity.library import (
+    FILE_LIMIT_S,
     PIECE,
     ComparedProgram,
     Handed,
@@ -108,11 +109,11 @@ class _File:
     print: Print
 
 
-def find_similar(handed: Sequence[Handed], given: Sequence[ComparedProgram]) -> Similar:
-    """Find the similar submissions of a class."""
+def find_similar(handed: Sequence[Handed], given: Sequence[ComparedProgram], limit_s: float = FILE_LIMIT_S) -> Similar:
+    """Find the similar submissions of a class; a file that takes more processor time than the limit is left out."""
     as_given = {program.digest for program in given}
     kept = [replace(h, programs=tuple(p for p in h.programs if p.digest not in as_given)) for h in handed]
-    files, kept = _prints(kept)
+    files, kept = _prints(kept, limit_s)
     common_from = min(COMMON_MOST, max(COMMON_LEAST, int(COMMON_SHARE * len(handed))))
     _remove_common_pieces(files, given, common_from)
     return Similar(
@@ -127,13 +128,13 @@ def find_similar(handed: Sequence[Handed], given: Sequence[ComparedProgram]) -> 
     )
 
 
-def _prints(handed: Sequence[Handed]) -> tuple[list[_File], list[Handed]]:
+def _prints(handed: Sequence[Handed], limit_s: float) -> tuple[list[_File], list[Handed]]:
     """Return the files to compare, and the submissions with a sentence on each file that cannot be compared."""
     files, noted = [], []
     for owner, one in enumerate(handed):
         slow = []
         for program in one.programs:
-            made = _print(program)
+            made = _print(program, limit_s)
             if made is None:
                 slow.append(f"{program.name}: reading its tokens takes too long")
             else:
@@ -142,9 +143,9 @@ def _prints(handed: Sequence[Handed]) -> tuple[list[_File], list[Handed]]:
     return files, noted
 
 
-def _print(program: ComparedProgram) -> Print | None:
+def _print(program: ComparedProgram, limit_s: float) -> Print | None:
     try:
-        return make_print(program.text)
+        return make_print(program.text, limit_s)
     except (TooSlow, MemoryError, RecursionError):
         return None
 

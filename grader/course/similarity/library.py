@@ -144,13 +144,13 @@ class Overlap:
     lines: tuple[Lines, Lines]
 
 
-def make_print(text: str) -> Print:
+def make_print(text: str, limit_s: float = FILE_LIMIT_S) -> Print:
     """Make the fingerprint of a program from its tokens, without running it; raises TooSlow if that takes too long."""
     import numpy as np  # noqa: PLC0415  comes with the library
     from copydetect import CodeFingerprint  # noqa: PLC0415  a heavy, optional library
 
     written = text.lstrip("\n")
-    with _limited(FILE_LIMIT_S):
+    with _limited(limit_s):
         # All pieces are kept instead of a sample, because a sample would depend on the process.
         made = CodeFingerprint("program.py", PIECE, 1, language="python", fp=io.StringIO(written))
     pieces = [0] * max(0, len(made.filtered_code) - PIECE + 1)

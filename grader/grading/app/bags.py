@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from grader.grading.model.exercise import Exercise, recordings_in
 from grader.grading.rubrics.builtin import builtin_recording
-from grader.runtime.compiled import compiled, state_of
+from grader.runtime.compiled import COMPILED, compiled, state_of
 from grader.runtime.model.errors import RecordingError
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import ODOMETRY
@@ -107,16 +107,17 @@ def _own(stream: RecordedStream, define: Define) -> Recording:
     """Return the recording of a rubric, which is kept in a compiled form if it ships with the grader."""
     path = Path(stream.bag) if stream.bag else builtin_recording()
     if path.is_relative_to(shipped("rubrics")):
-        return _shipped(path, stream.topic, stream.type)
+        return shipped_recording(path, stream.topic, stream.type)
     return read_bag(path, stream.topic, stream.type, define=define)
 
 
 @cache
-def _shipped(path: Path, topic: str, type_: str) -> Recording:
+def shipped_recording(path: Path, topic: str, type_: str, forms: Path = COMPILED) -> Recording:
+    """Return a recording that ships with the grader, of which a folder keeps a compiled form."""
     code = (PACKAGE / name for name in ("runtime/recording/bag.py", "runtime/stimuli/recorded.py"))
     name = hashlib.sha256(f"{path.name} {topic} {type_}".encode()).hexdigest()[:8]
     files = path.iterdir() if path.is_dir() else [path]
-    return compiled(f"recording-{name}", state_of([*files, *code]), lambda: read_bag(path, topic, type_))
+    return compiled(f"recording-{name}", state_of([*files, *code]), lambda: read_bag(path, topic, type_), forms)
 
 
 def _define(folders: tuple[Path, ...]) -> Define:

@@ -51,6 +51,7 @@ class VerifyRequest:
     how: GradeRequest  # how to grade each; its submission, workers and recordings are not read
     conditions: tuple[str, ...] = ()  # names of conditions; empty for all usual ones
     evidence: Path | None = None  # kept evidence of the one submission, to compare with as well
+    program: Sequence[str] = PROGRAM  # the command that records; see `grader.grading.app.recorded_again`
 
 
 @dataclass(slots=True)
@@ -104,14 +105,14 @@ def verify(request: VerifyRequest, progress: Progress) -> Verification:
         subjects = [_subject(request, path, folder / str(n), evidence) for n, path in enumerate(request.submissions)]
         isolation = request.how.isolation if evidence is None else str(evidence.manifest.environment.isolation)
         progress(f"recording {FIRST.words}")
-        isolation = _record_first(folder, subjects, isolation)
+        isolation = _record_first(folder, subjects, isolation, request.program)
         first = [(Place(one.name, *key), each) for one in subjects for key, each in one.first.items()]
         tried = [] if evidence is None else [_compared_with_evidence(subjects)]
         progress("looking for conditions to record under")
         wanted = conditions(request.conditions, isolation, surroundings())
         for number, condition in enumerate(wanted, 1):
             progress(f"recording {condition.words} ({number} of {len(wanted)})")
-            tried.append(_tried(folder, subjects, condition, isolation))
+            tried.append(_tried(folder, subjects, condition, isolation, request.program))
         return Verification(
             submissions=tuple(one.name for one in subjects),
             seeds=tuple(one.wanted.seed for one in subjects),
@@ -158,10 +159,10 @@ def _subject(request: VerifyRequest, path: str, into: Path, evidence: Evidence |
     return _Subject(path, wanted, kept)
 
 
-def _record_first(folder: Path, subjects: Sequence[_Subject], isolation: str) -> str:
+def _record_first(folder: Path, subjects: Sequence[_Subject], isolation: str, program: Sequence[str]) -> str:
     """Make the first recording of each submission, and return the sandbox; raises GraderError if none was made."""
     used = isolation
-    for line in _recorded(folder, subjects, FIRST, isolation):
+    for line in _recorded(folder, subjects, FIRST, isolation, program):
         if "number" not in line:
             if "problem" in line:
                 raise HarnessError(str(line["problem"]), str(line["hint"]))
@@ -197,7 +198,9 @@ def _compared_with_evidence(subjects: Sequence[_Subject]) -> Tried:
     return counted.tried()
 
 
-def _tried(folder: Path, subjects: Sequence[_Subject], condition: VerifyCondition, isolation: str) -> Tried:
+def _tried(
+    folder: Path, subjects: Sequence[_Subject], condition: VerifyCondition, isolation: str, program: Sequence[str]
+) -> Tried:
     """Record under a condition and compare with the first recordings."""
     counted = _Counted(condition.name, condition.words)
     comparable = [one for one in subjects if one.comparable]
@@ -205,7 +208,7 @@ def _tried(folder: Path, subjects: Sequence[_Subject], condition: VerifyConditio
         why = condition.not_tried or "there is nothing to compare"
         return Tried(condition.name, condition.words, ConditionState.NOT_TRIED, why)
     again = [replace(one, wanted=replace(one.wanted, scenarios=one.comparable)) for one in comparable]
-    for line in _recorded(folder, again, condition, condition.isolation or isolation):
+    for line in _recorded(folder, again, condition, condition.isolation or isolation, program):
         if "problem" in line:
             counted.problem = counted.problem or str(line["problem"])
         elif "trace" in line:
@@ -258,11 +261,11 @@ def _recorded(
     subjects: Sequence[_Subject],
     condition: VerifyCondition,
     isolation: str,
-    command: Sequence[str] | None = None,
+    command: Sequence[str],
 ) -> Iterator[Mapping[str, Any]]:
-    """Record submissions under a condition, and yield the lines of `grader.grading.app.recorded_again`.
+    """Record submissions under a condition with a command, and yield its lines; see `VerifyRequest.program`.
 
-    If that program, or another command in its place, ends without a word, there is a line with the problem.
+    If it ends without a word, there is a line with the problem.
     """
     recordings = Recordings(
         wanted=tuple(one.wanted for one in subjects),
@@ -283,7 +286,7 @@ def _recorded(
             variables |= own_home(condition.user, own)
         stack.enter_context(_busy(condition.loops))
         said = stack.enter_context(tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace"))
-        program = stack.enter_context(_started(command or PROGRAM, condition, variables, said))
+        program = stack.enter_context(_started(command, condition, variables, said))
         assert program.stdin is not None
         assert program.stdout is not None
         with suppress(BrokenPipeError), program.stdin as told:  # if it has ended, its exit code says so

@@ -94,7 +94,7 @@ def judge_exercise(
     already reported is blocked, and loses no points of its own. If a check raises, or a recording failed, the criterion
     is undecided.
     """
-    verdicts, facts = _verdicts(exercise, traces, submission, sources)
+    verdicts, facts = undiagnosed(exercise, traces, submission, sources)
     recorded = [(s.id, traces[s.id]) for s in exercise.scenarios if s.id in traces]
     reasons = [t.clock_reason for _, t in recorded if t.clock is ClockKind.WALL]
     mistakes: list[AuthorMistake] = []
@@ -114,7 +114,7 @@ def judge_exercise(
     )
 
 
-def _verdicts(
+def undiagnosed(
     exercise: Exercise, traces: Mapping[str, Trace], submission: Submission, sources: Mapping[str, str] | None
 ) -> tuple[tuple[Verdict, ...], Mapping[str, object]]:
     """Return the verdicts without causes, in rubric order, and what each criterion's check hands to hint rules."""
@@ -129,7 +129,7 @@ def tried_rules(exercise: Exercise, run: Run, mistakes: list[AuthorMistake]) -> 
     Mistakes in the exercise's own rules are appended to `mistakes`.
     """
     traces = {scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id}
-    verdicts, facts = _verdicts(exercise, traces, run.submission, run.sources)
+    verdicts, facts = undiagnosed(exercise, traces, run.submission, run.sources)
     cases = cases_of(verdicts, exercise, traces, run.submission, run.sources, facts)
     rules = rules_of(exercise) if any(cases) else ()
     return tuple(

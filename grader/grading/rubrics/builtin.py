@@ -11,7 +11,7 @@ from typing import Any
 
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.rubric_files import rubrics_in
-from grader.runtime.compiled import compiled, state_in, state_of_package
+from grader.runtime.compiled import COMPILED, compiled, state_in, state_of_package
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.wording import shown
@@ -37,14 +37,19 @@ class Header:
 @cache
 def builtin_exercises() -> tuple[Exercise, ...]:
     """Return the built-in exercises, ordered by number; raises RubricError without any."""
-    return compiled("rubrics", state_in(shipped("rubrics")) + state_of_package(), _read_exercises)
+    return exercises_in(shipped("rubrics"), COMPILED)
 
 
-def _read_exercises() -> tuple[Exercise, ...]:
+def exercises_in(rubrics: Path, forms: Path) -> tuple[Exercise, ...]:
+    """Return the exercises of a folder of rubrics, ordered by number, of which another folder keeps a compiled form."""
+    return compiled("rubrics", state_in(rubrics) + state_of_package(), lambda: _read_exercises(rubrics), forms)
+
+
+def _read_exercises(rubrics: Path) -> tuple[Exercise, ...]:
     # Slow to import; the cached form does not need it.
     from grader.grading.rubrics.loader import read_rubric  # noqa: PLC0415
 
-    return tuple(read_rubric(header.path) for header in builtin_headers())
+    return tuple(read_rubric(header.path) for header in headers_in(rubrics))
 
 
 def builtin_rubrics() -> Mapping[str, Path]:
@@ -54,10 +59,14 @@ def builtin_rubrics() -> Mapping[str, Path]:
 
 def builtin_headers() -> tuple[Header, ...]:
     """Return the headers of the built-in rubrics, ordered by exercise number; raises RubricError without any."""
-    folder = shipped("rubrics")
-    paths = rubrics_in(folder)
+    return headers_in(shipped("rubrics"))
+
+
+def headers_in(rubrics: Path) -> tuple[Header, ...]:
+    """Return the headers of the rubrics in a folder, ordered by exercise number; raises RubricError without any."""
+    paths = rubrics_in(rubrics)
     if not paths:
-        raise RubricError(f"{shown(str(folder), 500)}: expected the built-in rubrics, found none", "install again")
+        raise RubricError(f"{shown(str(rubrics), 500)}: expected the built-in rubrics, found none", "install again")
     return tuple(sorted(map(_header, paths), key=lambda header: _number_order(header.number)))
 
 

@@ -16,27 +16,23 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
 from grader.grading.submissions.collected import (
+    USUAL,
     Collected,
     LeftOut,
+    SubmissionLimits,
     collision,
     folders_of,
     generated_folders,
     is_skipped,
     name_problem,
 )
-from grader.grading.submissions.foreign_archives import KINDS, foreign_members, is_installed
+from grader.grading.submissions.foreign_archives import KINDS, UnpackerLimits, foreign_members, is_installed
 from grader.grading.submissions.members import FEWER, FILE, FOLDER, LINK, REPACK, Member, UnusableArchiveError
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.limits import (
-    MAX_ARCHIVE_BYTES,
-    MAX_DEPTH,
-    MAX_ENTRIES,
     MAX_EXTENDED_BYTES,
-    MAX_FILE_BYTES,
-    MAX_FILES,
     MAX_RATIO,
     MAX_STREAMS,
-    MAX_TOTAL_BYTES,
     MAX_UNPACKED_BYTES,
     MAX_XZ_BYTES,
     RATIO_FREE_BYTES,
@@ -302,25 +298,25 @@ def archive_kind(head: bytes) -> str | None:
     return "tar" if is_tar(head) else None
 
 
-def collect_archive(data: bytes, *, where: str) -> Collected:
+def collect_archive(data: bytes, *, where: str, limits: SubmissionLimits = USUAL) -> Collected:
     """Return the files of an archive; the same files are skipped as in a folder, so packing changes no result.
 
     Raises:
         SubmissionError: It cannot be read, exceeds a limit, or holds a link, a device, or a name that some system could
             not store or would store elsewhere.
     """
-    if len(data) > MAX_ARCHIVE_BYTES:
-        raise SubmissionError(f"{where}: expected at most {MAX_ARCHIVE_BYTES >> 20} MiB, found more", FEWER)
+    if len(data) > limits.archive_bytes:
+        raise SubmissionError(f"{where}: expected at most {limits.archive_bytes >> 20} MiB, found more", FEWER)
     try:
         left = LeftOut()
-        members = _without_generated(_wanted(_members(data)), left)
-        files = tuple(_contents(members, len(data), left))
+        members = _without_generated(_wanted(_members(data, limits)), left, limits)
+        files = tuple(_contents(members, len(data), left, limits))
     except UnusableArchiveError as error:
         raise SubmissionError(f"{where}: {error.problem}", error.hint) from None
     return Collected(files, left.notes())
 
 
-def _members(data: bytes) -> list[Member]:
+def _members(data: bytes, limits: SubmissionLimits) -> list[Member]:
     kind = archive_kind(data[:HEAD_BYTES])
     if kind is None:
         raise UnusableArchiveError("expected a zip or tar archive, found another kind of file", HAND_IN_ZIP)
@@ -328,7 +324,7 @@ def _members(data: bytes) -> list[Member]:
     limit = _RATIO if allowed < MAX_UNPACKED_BYTES else f"{MAX_UNPACKED_BYTES >> 20} MiB unpacked"
     total = min(MAX_UNPACKED_BYTES, allowed)
     if kind in KINDS and is_installed():
-        return foreign_members(data, kind, most=MAX_ENTRIES, file=MAX_FILE_BYTES, total=total, limit=limit)
+        return foreign_members(data, kind, UnpackerLimits(limits.entries, limits.file_bytes, total, limit))
     if kind not in _READABLE:
         hint = (
             f"{HAND_IN_ZIP}; the grader can read {kind} with the extra rclpy-grader[archives] and libarchive"
@@ -337,13 +333,13 @@ def _members(data: bytes) -> list[Member]:
         )
         raise UnusableArchiveError(f"expected a zip or tar archive, found {kind}, which cannot be read", hint)
     if kind == "zip":
-        return zip_members(data, most=MAX_ENTRIES)
+        return zip_members(data, most=limits.entries)
     if kind != "tar":
         data = unpacked(data, kind, most=total, limit=limit)
         if not is_tar(data[:HEAD_BYTES]):
             found = f"expected a tar archive inside the {kind}, found another kind of file"
             raise UnusableArchiveError(found, HAND_IN_ZIP)
-    return tar_members(data, most=MAX_ENTRIES)
+    return tar_members(data, most=limits.entries)
 
 
 def _allowed(packed: int) -> int:
@@ -375,7 +371,9 @@ def _relative(member: Member) -> str:
     return "" if name == "." and member.kind == FOLDER else name
 
 
-def _without_generated(named: Iterator[tuple[str, Member]], left: LeftOut) -> list[tuple[str, Member]]:
+def _without_generated(
+    named: Iterator[tuple[str, Member]], left: LeftOut, limits: SubmissionLimits
+) -> list[tuple[str, Member]]:
     """Drop generated files, then apply the limits that need no unpacking."""
     every = list(named)
     generated = generated_folders(name for name, _ in every)
@@ -386,10 +384,10 @@ def _without_generated(named: Iterator[tuple[str, Member]], left: LeftOut) -> li
             kept.append((name, member))
         else:
             left.add(f"it holds {generated[folder]}, so a tool made it", folder)
-    if len(kept) > MAX_FILES:
-        raise _too_many(MAX_FILES, "files")
-    if any(name.count("/") > MAX_DEPTH for name, _ in kept):
-        raise _too_many(MAX_DEPTH, "folders inside each other")
+    if len(kept) > limits.files:
+        raise _too_many(limits.files, "files")
+    if any(name.count("/") > limits.depth for name, _ in kept):
+        raise _too_many(limits.depth, "folders inside each other")
     twins = collision([name for name, _ in kept])
     if twins is not None:
         found = f"found {shown(twins[0])} and {shown(twins[1])}" if twins[0] != twins[1] else f"found {shown(twins[0])}"
@@ -397,19 +395,21 @@ def _without_generated(named: Iterator[tuple[str, Member]], left: LeftOut) -> li
     return kept
 
 
-def _contents(members: Sequence[tuple[str, Member]], packed: int, left: LeftOut) -> Iterator[tuple[str, bytes]]:
+def _contents(
+    members: Sequence[tuple[str, Member]], packed: int, left: LeftOut, limits: SubmissionLimits
+) -> Iterator[tuple[str, bytes]]:
     """Unpack the members, counting actual sizes, not declared ones."""
-    total = 0
+    total, most = 0, limits.file_bytes
     for name, member in members:
-        content = member.read(MAX_FILE_BYTES + 1) if member.size <= MAX_FILE_BYTES else None
-        if content is None or len(content) > MAX_FILE_BYTES:
-            left.add(f"larger than {MAX_FILE_BYTES >> 20} MiB", name)
+        content = member.read(most + 1) if member.size <= most else None
+        if content is None or len(content) > most:
+            left.add(f"larger than {most >> 20} MiB", name)
             continue
         if len(content) != member.size:  # another program would unpack a different file
             raise UnusableArchiveError("expected a whole archive, found a damaged or incomplete one")
         total += len(content)
-        if total > MAX_TOTAL_BYTES:
-            raise UnusableArchiveError(f"expected at most {MAX_TOTAL_BYTES >> 20} MiB in all, found more", FEWER)
+        if total > limits.total_bytes:
+            raise UnusableArchiveError(f"expected at most {limits.total_bytes >> 20} MiB in all, found more", FEWER)
         if total > _allowed(packed):
             raise UnusableArchiveError(f"expected at most {_RATIO}, found more", FEWER)
         yield name, content

@@ -9,7 +9,16 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import field
 
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.limits import MAX_NAME_BYTES, MAX_PATH_BYTES
+from grader.runtime.model.limits import (
+    MAX_ARCHIVE_BYTES,
+    MAX_DEPTH,
+    MAX_ENTRIES,
+    MAX_FILE_BYTES,
+    MAX_FILES,
+    MAX_NAME_BYTES,
+    MAX_PATH_BYTES,
+    MAX_TOTAL_BYTES,
+)
 from grader.runtime.model.wording import first_of
 
 #: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`.
@@ -38,6 +47,22 @@ _OBJECTIONS: dict[str, Callable[[str], object]] = {
     "a name that Windows keeps for a device": lambda path: any(map(_RESERVED.fullmatch, path.split("/"))),
     "a name that is too long": lambda path: _bytes(path) > MAX_PATH_BYTES or _longest_part(path) > MAX_NAME_BYTES,
 }
+
+
+@dataclass(frozen=True, slots=True)
+class SubmissionLimits:
+    """The most that a submission may hold, as a folder or an archive; `grader.runtime.model.limits` has the reasons."""
+
+    files: int = MAX_FILES
+    entries: int = MAX_ENTRIES
+    depth: int = MAX_DEPTH
+    file_bytes: int = MAX_FILE_BYTES  # a larger file is left out with a note
+    total_bytes: int = MAX_TOTAL_BYTES
+    archive_bytes: int = MAX_ARCHIVE_BYTES
+
+
+#: The limits of every submission.
+USUAL = SubmissionLimits()
 
 
 def is_skipped_folder(name: str) -> bool:

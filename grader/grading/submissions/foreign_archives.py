@@ -13,8 +13,9 @@ from functools import partial
 from typing import BinaryIO
 
 from grader.grading.submissions.members import FEWER, FILE, FOLDER, LINK, Member, UnusableArchiveError
-from grader.runtime.contained import run_contained
+from grader.runtime.contained import REAL_S, run_contained
 from grader.runtime.model import extras
+from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 
 #: Kind of archive -> names of the format in libarchive, and the first bytes that tell them apart.
@@ -32,6 +33,19 @@ _KINDS = {"file": FILE, "folder": FOLDER, "link": LINK, "other": "a device, pipe
 _ENCRYPTED, _TOO_MANY, _TOO_MUCH, _NO_LIBRARY = 11, 12, 13, 14
 
 
+@dataclass(frozen=True, slots=True)
+class UnpackerLimits:
+    """What the process that unpacks may produce and use."""
+
+    entries: int  # the largest number of members
+    file_bytes: int  # members of more bytes than this are not read; they are returned with their size
+    total_bytes: int  # the most bytes to unpack, of all members together
+    words: str  # the same in words
+    memory_bytes: int = MEMORY_BYTES
+    processor_s: int = PROCESSOR_S
+    real_s: float = REAL_S
+
+
 def install_command() -> str:
     """Return the commands that install libarchive here."""
     return f"{extras.install_command('libarchive-c')} && sudo apt-get install -y libarchive13"
@@ -42,18 +56,13 @@ def is_installed() -> bool:
     return importlib.util.find_spec("libarchive") is not None and ctypes.util.find_library("archive") is not None
 
 
-def foreign_members(  # noqa: PLR0913  four limits
-    data: bytes, kind: str, *, most: int, file: int, total: int, limit: str
-) -> list[Member]:
+def foreign_members(data: bytes, kind: str, limits: UnpackerLimits) -> list[Member]:
     """Return the members of a .rar or .7z archive in order.
 
     Args:
         data: The archive.
         kind: One of `KINDS`.
-        most: Largest number of members.
-        file: Members of more bytes than this are not read; they are returned with their size.
-        total: Most bytes to unpack, of all members together.
-        limit: The same in words.
+        limits: What the process that unpacks may produce and use.
 
     Raises:
         UnusableArchiveError: It is damaged, encrypted, has features that libarchive cannot read, or exceeds a limit.
@@ -66,25 +75,25 @@ def foreign_members(  # noqa: PLR0913  four limits
     if kind == "rar" and not _has_end(data, is_old=format_ != _FORMATS["rar"][0]):
         raise _unreadable(kind)
     # Beside the content, each member has a head, whose name is at most as long as the archive.
-    output = total + 2 * len(data) + most * 1024
-    limits = {
+    output = limits.total_bytes + 2 * len(data) + limits.entries * 1024
+    told = {
         "format": format_,
-        "entries": most,
-        "file": file,
-        "total": total,
-        "memory": MEMORY_BYTES,
-        "processor": PROCESSOR_S,
+        "entries": limits.entries,
+        "file": limits.file_bytes,
+        "total": limits.total_bytes,
+        "memory": limits.memory_bytes,
+        "processor": limits.processor_s,
         "output": output,
     }
     with tempfile.TemporaryFile() as archive, tempfile.TemporaryFile() as out:
         archive.write(data)
         archive.seek(0)
-        code = _run(limits, archive, out)
-        _check(code, kind, most, limit)
+        code = _run(told, archive, out, limits.real_s)
+        _check(code, kind, limits)
         out.seek(0)
         found = out.read(output)
     try:
-        return list(_members(found, file))
+        return list(_members(found, limits.file_bytes))
     except (ValueError, KeyError, TypeError, struct.error, RecursionError):
         raise _unreadable(kind) from None
 
@@ -166,22 +175,22 @@ def _vint(data: bytes, at: int) -> tuple[int, int]:
     raise IndexError
 
 
-def _run(limits: dict[str, object], archive: BinaryIO, out: BinaryIO) -> int:
+def _run(told: dict[str, object], archive: BinaryIO, out: BinaryIO, real_s: float) -> int:
     try:
-        return run_contained("grader.grading.submissions.unpacker", limits, archive, out)
+        return run_contained("grader.grading.submissions.unpacker", told, archive, out, real_s)
     except subprocess.TimeoutExpired:
         return -1
     except OSError as error:
         raise HarnessError(f"the archive cannot be unpacked: {error.strerror}", "free some memory") from None
 
 
-def _check(code: int, kind: str, most: int, limit: str) -> None:
+def _check(code: int, kind: str, limits: UnpackerLimits) -> None:
     if code == _ENCRYPTED:
         raise UnusableArchiveError("expected an archive without a password, found an encrypted one")
     if code == _TOO_MANY:
-        raise UnusableArchiveError(f"expected at most {most} entries, found more", FEWER)
+        raise UnusableArchiveError(f"expected at most {limits.entries} entries, found more", FEWER)
     if code == _TOO_MUCH:
-        raise UnusableArchiveError(f"expected at most {limit}, found more", FEWER)
+        raise UnusableArchiveError(f"expected at most {limits.words}, found more", FEWER)
     if code == _NO_LIBRARY:
         raise HarnessError(f"a {kind} archive cannot be unpacked: libarchive cannot be loaded", install_command())
     if code:  # damaged, or killed at a limit of memory or time

@@ -9,7 +9,7 @@ import re
 import stat
 import subprocess
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -52,7 +52,29 @@ _PROBLEMS = {
 }
 
 
-def read_projects(root: Path) -> tuple[tuple[Project, ...], tuple[str, ...]]:
+def told_by_process(asked: bytes, output_bytes: int = OUTPUT_BYTES) -> bytes:
+    """Return what the process that reads says of some packages, in lines of JSON; `project_reader` has the formats.
+
+    Raises:
+        HarnessError: The process cannot be started, or the machine is too busy for it.
+    """
+    limits = {"memory": MEMORY_BYTES, "output": output_bytes, "processor": PROCESSOR_S}
+    with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as out:
+        given.write(asked)
+        given.seek(0)
+        try:
+            run_contained(MODULE, limits, given, out)
+        except subprocess.TimeoutExpired:
+            raise HarnessError("project files: the machine was too busy to read them", "try again later") from None
+        except OSError as error:
+            raise HarnessError(f"project files: they cannot be read: {error.strerror}", "free some memory") from None
+        out.seek(0)
+        return out.read(output_bytes)
+
+
+def read_projects(
+    root: Path, tell: Callable[[bytes], bytes] = told_by_process
+) -> tuple[tuple[Project, ...], tuple[str, ...]]:
     """Return the packages of a submission, outermost first, and notes on what could not be read.
 
     A submission without packages costs nothing. Whatever a file holds, it costs at most what the limits say, and
@@ -60,9 +82,10 @@ def read_projects(root: Path) -> tuple[tuple[Project, ...], tuple[str, ...]]:
 
     Args:
         root: The staged submission.
+        tell: Reads the files of the packages; whatever it says is checked.
 
     Raises:
-        HarnessError: The process cannot be started, or the machine is too busy for it.
+        HarnessError: The files cannot be read, or the machine is too busy for it.
     """
     folders = project_folders(root)
     if not folders:
@@ -86,7 +109,7 @@ def read_projects(root: Path) -> tuple[tuple[Project, ...], tuple[str, ...]]:
             files |= {name: content.decode("latin-1") for name, content in contents.items() if content}
         asked.append({"files": files, "names": names})
     found = []
-    answers = _answers(asked)
+    answers = _answers(tell(json.dumps(asked).encode()))
     for number, folder in enumerate(folders[:MOST_PACKAGES]):
         place = _relative(folder, root)
         first = next((name for name in _COSTLIEST_FIRST if name in asked[number]["files"]), "package.xml")
@@ -127,22 +150,10 @@ def _without_waiting(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC)
 
 
-def _answers(asked: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return what the process tells of each package, as far as it came."""
-    limits = {"memory": MEMORY_BYTES, "output": OUTPUT_BYTES, "processor": PROCESSOR_S}
-    with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as out:
-        given.write(json.dumps(asked).encode())
-        given.seek(0)
-        try:
-            run_contained(MODULE, limits, given, out)
-        except subprocess.TimeoutExpired:
-            raise HarnessError("project files: the machine was too busy to read them", "try again later") from None
-        except OSError as error:
-            raise HarnessError(f"project files: they cannot be read: {error.strerror}", "free some memory") from None
-        out.seek(0)
-        lines = out.read(OUTPUT_BYTES).split(b"\n")[:-1]
+def _answers(told: bytes) -> list[dict[str, Any]]:
+    """Return what the process said of each package, as far as it came."""
     found = []
-    for line in lines:
+    for line in told.split(b"\n")[:-1]:
         try:
             answer = json.loads(line)
         except (ValueError, RecursionError):

@@ -12,33 +12,28 @@ from pathlib import Path
 
 from grader.grading.submissions.collected import (
     GENERATED_MARKERS,
+    USUAL,
     Collected,
     LeftOut,
+    SubmissionLimits,
     is_skipped_file,
     is_skipped_folder,
 )
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError, SubmissionError
-from grader.runtime.model.limits import (
-    MAX_DEPTH,
-    MAX_ENTRIES,
-    MAX_FILE_BYTES,
-    MAX_FILES,
-    MAX_PATH_BYTES,
-    MAX_TOTAL_BYTES,
-)
+from grader.runtime.model.limits import MAX_PATH_BYTES
 
 _OPEN_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 
 
-def collect_folder(folder: Path, *, into: Path, where: str) -> Collected:
+def collect_folder(folder: Path, *, into: Path, where: str, limits: SubmissionLimits = USUAL) -> Collected:
     """Read the files of a student's folder, in the order of their names' bytes.
 
     Links, devices, sockets, pipes and unreadable files are left out with a note. `into`, the destination of the copy,
     is not part of the submission. Raises SubmissionError if the folder cannot be listed, or a limit is exceeded.
     """
     left = LeftOut()
-    walk = _Walk(where=where, left=left, own=into.stat())
+    walk = _Walk(where=where, left=left, own=into.stat(), limits=limits)
     try:
         top = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:
@@ -47,11 +42,11 @@ def collect_folder(folder: Path, *, into: Path, where: str) -> Collected:
         files = []
         total = 0
         for relative in sorted(walk.files(top), key=os.fsencode):
-            content = _content(top, relative, left)
+            content = _content(top, relative, left, limits.file_bytes)
             if content is not None:
                 total += len(content)
-                if total > MAX_TOTAL_BYTES:
-                    raise _too_much(where, f"{MAX_TOTAL_BYTES >> 20} MiB in all")
+                if total > limits.total_bytes:
+                    raise _too_much(where, f"{limits.total_bytes >> 20} MiB in all")
                 files.append((relative, content))
     finally:
         os.close(top)
@@ -91,6 +86,7 @@ class _Walk:
     where: str
     left: LeftOut
     own: os.stat_result
+    limits: SubmissionLimits
     entries: int = 0
     found: int = 0
 
@@ -112,10 +108,10 @@ class _Walk:
 
     def _names(self, descriptor: int) -> list[str]:
         with os.scandir(descriptor) as entries:
-            names = [entry.name for entry in islice(entries, MAX_ENTRIES + 1 - self.entries)]
+            names = [entry.name for entry in islice(entries, self.limits.entries + 1 - self.entries)]
         self.entries += len(names)
-        if self.entries > MAX_ENTRIES:
-            raise _too_much(self.where, f"{MAX_ENTRIES} entries")
+        if self.entries > self.limits.entries:
+            raise _too_much(self.where, f"{self.limits.entries} entries")
         return names
 
     def _file(self, relative: str, name: str) -> Iterator[str]:
@@ -125,15 +121,15 @@ class _Walk:
             self.left.add("the path is too long", relative)
             return
         self.found += 1
-        if self.found > MAX_FILES:
-            raise _too_much(self.where, f"{MAX_FILES} files")
+        if self.found > self.limits.files:
+            raise _too_much(self.where, f"{self.limits.files} files")
         yield relative
 
     def _folder(self, parent: int, name: str, relative: str, depth: int, info: os.stat_result) -> Iterator[str]:
         if is_skipped_folder(name) or os.path.samestat(info, self.own):
             return
-        if depth > MAX_DEPTH:
-            raise _too_much(self.where, f"{MAX_DEPTH} folders inside each other")
+        if depth > self.limits.depth:
+            raise _too_much(self.where, f"{self.limits.depth} folders inside each other")
         try:
             descriptor = os.open(name, _OPEN_FLAGS | os.O_DIRECTORY, dir_fd=parent)
         except OSError as error:
@@ -163,7 +159,7 @@ def _kind(mode: int) -> str:
     return "a link, which is not followed" if stat.S_ISLNK(mode) else "a device, pipe or socket, not a plain file"
 
 
-def _content(top: int, relative: str, left: LeftOut) -> bytes | None:
+def _content(top: int, relative: str, left: LeftOut, most: int) -> bytes | None:
     """Return the content of a file, or None and a note if it cannot or must not be read."""
     try:
         with os.fdopen(_opened(top, relative), "rb") as file:
@@ -171,13 +167,13 @@ def _content(top: int, relative: str, left: LeftOut) -> bytes | None:
             if not stat.S_ISREG(info.st_mode):
                 left.add(_kind(info.st_mode), relative)
                 return None
-            content = file.read(MAX_FILE_BYTES + 1) if info.st_size <= MAX_FILE_BYTES else None
+            content = file.read(most + 1) if info.st_size <= most else None
     except OSError as error:
         reason = _kind(stat.S_IFLNK) if error.errno == errno.ELOOP else f"it cannot be read: {error.strerror}"
         left.add(reason, relative)
         return None
-    if content is None or len(content) > MAX_FILE_BYTES:
-        left.add(f"larger than {MAX_FILE_BYTES >> 20} MiB", relative)
+    if content is None or len(content) > most:
+        left.add(f"larger than {most >> 20} MiB", relative)
         return None
     return content
 

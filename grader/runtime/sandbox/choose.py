@@ -15,7 +15,7 @@ from grader.runtime.sandbox.bubblewrap import is_installed
 from grader.runtime.sandbox.memory import Memory
 from grader.runtime.sandbox.properties import NO_EXCHANGE, NOTHING, remedy_for
 from grader.runtime.sandbox.protocol import Isolation
-from grader.runtime.sandbox.tiers import ISOLATING, isolation_from_name
+from grader.runtime.sandbox.tiers import ISOLATING, is_for_others, isolation_from_name
 
 AUTO = "auto"
 #: For programs of one's own: no sandbox, but a network of their own if bubblewrap can make one.
@@ -24,6 +24,23 @@ OWN_PROGRAMS = "own-programs"
 TRIED_S = 20.0
 #: How much of the reason against each tier is shown if all tiers are refused.
 MOST_CHARACTERS = 100
+
+
+def _self_test(isolation: Isolation, ros: RosInstallation) -> TierReport:
+    from grader.runtime.sandbox import selftest  # noqa: PLC0415 - most runs use the result of an earlier one
+
+    return selftest.inspect(isolation, ros)
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """The machine and the user that a tier is chosen for."""
+
+    ros: RosInstallation
+    # Finds a tier by its name; raises EnvironmentFault if the machine lacks a part of it or it is for another user
+    isolation: Callable[[str], Isolation] = isolation_from_name
+    self_test: Callable[[Isolation, RosInstallation], TierReport] = _self_test
+    is_for_others: Callable[[str], bool] = is_for_others
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +56,7 @@ def _silent(step: str) -> None:
     """Ignore a progress message."""
 
 
-def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str], None] = _silent) -> TierChoice:
+def choose_isolation(wanted: str, machine: Machine, progress: Callable[[str], None] = _silent) -> TierChoice:
     """Choose the tier to record in; raises EnvironmentFault, with a fix as its hint, if it does not work here.
 
     Wanted is `auto` for the strongest tier that has all required properties, `none` for no sandbox, `own-programs` for
@@ -47,25 +64,25 @@ def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str]
     promises. When a sandbox is tested, `progress` gets the reason.
     """
     if wanted == NO_SANDBOX:
-        return TierChoice(isolation_from_name(wanted))
+        return TierChoice(machine.isolation(wanted))
     if wanted == OWN_PROGRAMS:
-        return for_own_programs()
+        return for_own_programs(machine)
     if wanted != AUTO:
-        return _named(wanted, ros, progress)
+        return _named(wanted, machine, progress)
     tried: list[TierReport] = []
     for name in ISOLATING:
-        tried.append(inspect_tier(name, ros, progress))
+        tried.append(inspect_tier(name, machine, progress))
         if tried[-1].usable:
-            return TierChoice(isolation_from_name(name), tried[-1].properties)
-    raise _refusal(tried)
+            return TierChoice(machine.isolation(name), tried[-1].properties)
+    raise _refusal([report for report in tried if not machine.is_for_others(report.name)], tried)
 
 
-def for_own_programs() -> TierChoice:
+def for_own_programs(machine: Machine) -> TierChoice:
     """Return what isolates the network of programs that need no sandbox, or nothing and why."""
     try:
-        isolation = isolation_from_name(tiers.OWN_NETWORK_NAME)
+        isolation = machine.isolation(tiers.OWN_NETWORK_NAME)
     except EnvironmentFault as fault:
-        return TierChoice(isolation_from_name(NO_SANDBOX), lacks=fault.message)
+        return TierChoice(machine.isolation(NO_SANDBOX), lacks=fault.message)
     command = isolation.worker_command(("/bin/true",), {}, ())
     try:
         done = subprocess.run(
@@ -74,51 +91,49 @@ def for_own_programs() -> TierChoice:
         why = "" if done.returncode == 0 else done.stderr.strip()[:MOST_CHARACTERS] or f"code {done.returncode}"
     except (OSError, subprocess.SubprocessError) as error:
         why = str(error)[:MOST_CHARACTERS]
-    return TierChoice(isolation) if not why else TierChoice(isolation_from_name(NO_SANDBOX), lacks=f"bubblewrap: {why}")
+    return TierChoice(isolation) if not why else TierChoice(machine.isolation(NO_SANDBOX), lacks=f"bubblewrap: {why}")
 
 
-def inspect_tiers(ros: RosInstallation) -> tuple[TierReport, ...]:
+def inspect_tiers(machine: Machine) -> tuple[TierReport, ...]:
     """Test every tier and return the reports, strongest first; the tier without isolation comes last."""
     open_ones = tuple(Property(name, holds=False, mechanism=NOTHING) for name in PROPERTIES)
     nothing = TierReport(NO_SANDBOX, TIERS[NO_SANDBOX], usable=False, why="it contains nothing", properties=open_ones)
-    return (*(inspect_tier(name, ros, afresh=True) for name in ISOLATING), nothing)
+    return (*(inspect_tier(name, machine, afresh=True) for name in ISOLATING), nothing)
 
 
-def sandbox_memory(ros: RosInstallation) -> Fact:
+def sandbox_memory(machine: Machine) -> Fact:
     """Report whether a run would use the remembered result of a self-test, or why it would repeat it."""
     lapses = []
     for name in ISOLATING:
-        memory = Memory.of(name, ros)
+        memory = Memory.of(name, machine.ros)
         found = memory.recall()
         if found is not None and found.usable:
             return Fact("sandbox check", f"remembered for {name}: runs do not repeat it")
-        if not tiers.is_for_others(name):
+        if not machine.is_for_others(name):
             lapses.append(f"{name}: {memory.lapse() or 'it does not hold'}")
     return Fact("sandbox check", f"a run would repeat it; {lapses[0]}")
 
 
 def inspect_tier(
-    name: str, ros: RosInstallation, progress: Callable[[str], None] = _silent, *, afresh: bool = False
+    name: str, machine: Machine, progress: Callable[[str], None] = _silent, *, afresh: bool = False
 ) -> TierReport:
     """Return the report on one tier, from the last self-test if nothing relevant has changed since.
 
     When the tier is tested, `progress` gets the reason; `afresh` tests it in any case.
     """
     try:
-        isolation = isolation_from_name(name)
+        isolation = machine.isolation(name)
     except EnvironmentFault as fault:
         return TierReport(name, TIERS[name], usable=False, why=fault.message, remedy=fault.hint)
-    memory = Memory.of(name, ros)
+    memory = Memory.of(name, machine.ros)
     remembered = None if afresh else memory.recall()
     if remembered is not None:
         return remembered
-    from grader.runtime.sandbox import selftest  # noqa: PLC0415 - most runs use the result of an earlier one
-
     progress(f"trying the sandbox {name}{'' if afresh else f' ({memory.lapse()})'}")
-    report = selftest.inspect(isolation, ros)
+    report = machine.self_test(isolation, machine.ros)
     if report.properties and not _kept(report):
         # The machine may have been busy: try once more.
-        report = selftest.inspect(isolation, ros)
+        report = machine.self_test(isolation, machine.ros)
     report = replace(report, remedy=remedy_for(report))
     if _kept(report):
         # Only a success is kept: a failure may be due to a busy machine, or may soon be fixed.
@@ -126,9 +141,9 @@ def inspect_tier(
     return report
 
 
-def _named(wanted: str, ros: RosInstallation, progress: Callable[[str], None]) -> TierChoice:
-    isolation = isolation_from_name(wanted)
-    report = inspect_tier(wanted, ros, progress)
+def _named(wanted: str, machine: Machine, progress: Callable[[str], None]) -> TierChoice:
+    isolation = machine.isolation(wanted)
+    report = inspect_tier(wanted, machine, progress)
     if not _kept(report):
         raise EnvironmentFault(f"isolation {wanted}: expected a sandbox that holds, found: {report.why}", report.remedy)
     return TierChoice(isolation, report.properties)
@@ -141,8 +156,7 @@ def _kept(report: TierReport) -> bool:
     return bool(report.properties) and not broken and NO_EXCHANGE not in report.why
 
 
-def _refusal(tried: Sequence[TierReport]) -> EnvironmentFault:
-    mine = [report for report in tried if not tiers.is_for_others(report.name)]
+def _refusal(mine: Sequence[TierReport], tried: Sequence[TierReport]) -> EnvironmentFault:
     found = "; ".join(f"{report.name}: {_shortly(report)}" for report in mine)
     # The remedy of a tier for another user comes last, because it requires the most.
     remedies = [report.remedy for report in (*mine, *tried) if report.remedy]

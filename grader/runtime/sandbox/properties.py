@@ -10,6 +10,8 @@ from pathlib import Path
 from grader.runtime.model.checkup import TierReport
 
 NOTHING = "none"
+#: Where the kernel exposes its settings.
+SETTINGS_FOLDER = Path("/proc/sys")
 #: What is noted, and under which property, if no message made the round of a self-test.
 EXCHANGE, NO_EXCHANGE = "dds_private", "no ROS message came back"
 
@@ -76,19 +78,19 @@ def install_command(package: str) -> str:
     return f"{_sudo()}{installer} {package}"
 
 
-def remedy_for(report: TierReport) -> str:
+def remedy_for(report: TierReport, settings: Path = SETTINGS_FOLDER) -> str:
     """Return the command or action that would make a tier work; empty if none is known."""
     if any(found.name == "net_egress" and not found.holds for found in report.properties):
         return IN_CONTAINER if confined() else ""
     if report.name.startswith("bubblewrap") and not report.properties:
-        return setting_command()
+        return setting_command(settings)
     return ""
 
 
-def setting_command() -> str:
+def setting_command(settings: Path = SETTINGS_FOLDER) -> str:
     """Return the command that allows ordinary users to create namespaces; empty if they may, or in a container."""
     for name, bad, good in SETTINGS:
-        path = Path("/proc/sys", *name.split("."))
+        path = settings.joinpath(*name.split("."))
         if path.is_file() and path.read_text(encoding="ascii").strip() == bad:
             return f"{_sudo()}sysctl -w {name}={good}"
     return ""

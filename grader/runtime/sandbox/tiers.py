@@ -14,6 +14,7 @@ import sys
 import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import ClassVar
 
@@ -150,7 +151,8 @@ class FlatBubblewrap(InPlace):
 
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
         """Return the restrictions of a student's process."""
-        return confined(process, limits, Ground(SCRATCH, loopback=False, as_root=self.outer.as_root))
+        ground = Ground(SCRATCH, loopback=False, as_root=self.outer.as_root, landlock=_version())
+        return confined(process, limits, ground)
 
 
 class _OnSharedNetwork(InPlace):
@@ -191,6 +193,7 @@ class Landlock(_OnSharedNetwork):
 
     name: ClassVar[str] = LANDLOCK_NAME
     as_root: bool  # whether this process is root; students then run as another user
+    landlock: int = field(default_factory=_version)  # the version of it that the kernel has
 
     @classmethod
     def here(cls) -> Landlock:
@@ -201,7 +204,8 @@ class Landlock(_OnSharedNetwork):
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
         """Return the restrictions of a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, LANDLOCK_NAME)
-        return confined(process, limits, Ground(self.scratch, loopback=True, as_root=self.as_root))
+        ground = Ground(self.scratch, loopback=True, as_root=self.as_root, landlock=self.landlock)
+        return confined(process, limits, ground)
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,6 +268,7 @@ class Ground:
     scratch: Path  # the folder in which its own folder is created; any user may enter it
     loopback: bool  # whether to restrict Fast DDS to the loopback address, because the network is shared
     as_root: bool  # whether this process is root; the student's then runs as another user
+    landlock: int  # the version of Landlock that the kernel has
 
 
 def start_command(request: Mapping[str, object]) -> tuple[str, ...]:
@@ -335,7 +340,7 @@ def confined(process: StudentProcess, limits: Limits, ground: Ground) -> Prepare
         processes=limits.processes,
         user=[some_user(), STUDENT_GROUP] if ground.as_root else None,
         confinement=_confinement(process, ground),
-        filter=flat_filter(signals=_version() < WITH_SIGNALS).hex(),
+        filter=flat_filter(signals=ground.landlock < WITH_SIGNALS).hex(),
     )
     return PreparedSandbox(request, environment)
 

@@ -58,7 +58,7 @@ def made(name: str, path: str, content: bytes, parameters: Mapping[str, Any]) ->
     return guarded(name, path, make)
 
 
-def guarded(name: str, path: str, work: Callable[[], Result], begins: int = 1) -> Result:
+def guarded(name: str, path: str, work: Callable[[], Result], begins: int = 1, most_s: float = CALL_S) -> Result:
     """Call a simulation, and return what it returns.
 
     Args:
@@ -66,6 +66,7 @@ def guarded(name: str, path: str, work: Callable[[], Result], begins: int = 1) -
         path: The author's file, empty for a built-in simulation.
         work: The call.
         begins: The line to name if an error arises outside of the file, because a method returns something wrong.
+        most_s: Processor time that the call may take, in seconds.
 
     Raises:
         SimulationError: It is in an author's file, and raises an error or takes too long.
@@ -74,13 +75,13 @@ def guarded(name: str, path: str, work: Callable[[], Result], begins: int = 1) -
 
     def stop(number: int, frame: FrameType | None) -> None:
         del number, frame
-        raise _Endless(f"the call took more than {CALL_S:g} s of processor time")
+        raise _Endless(f"the call took more than {most_s:g} s of processor time")
 
     timed = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGVTALRM, stop) if timed else None
     try:
         if timed:
-            signal.setitimer(signal.ITIMER_VIRTUAL, CALL_S)
+            signal.setitimer(signal.ITIMER_VIRTUAL, most_s)
         return work()
     except (Exception, SystemExit, _Endless) as error:  # whatever the author's file raises, the author has to fix
         kind = "" if isinstance(error, _Endless) else f"{type(error).__name__}: "

@@ -41,23 +41,23 @@ BY_HASH, CHECK_SOURCE = 0b01, 0b10
 TIMEOUT_S = 120.0
 
 
-def compile_own() -> None:
+def compile_own(package: Path = PACKAGE) -> None:
     """Compile the modules of this package, where possible, if one of them has changed since this was last done.
 
     Byte code that was deleted since is not made again: the interpreter then compiles the module, which takes longer.
     """
-    compiled("byte_code", state_of_package(), _compile)
+    compiled("byte_code", state_of_package(package), lambda: _compile(package), package / "__pycache__")
 
 
-def _compile() -> bool:
+def _compile(package: Path) -> bool:
     import compileall  # noqa: PLC0415 - few runs compile anything
 
-    return bool(compileall.compile_dir(PACKAGE, quiet=2))
+    return bool(compileall.compile_dir(package, quiet=2))
 
 
 def byte_code(runtime: PythonRuntime) -> Fact:
     """Check whether the byte code of an installation is up to date, and name the command that compiles it."""
-    _compile()
+    _compile(PACKAGE)
     with tempfile.TemporaryDirectory(prefix="grade-doctor-") as folder:
         try:
             done = subprocess.run(

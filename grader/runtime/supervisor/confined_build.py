@@ -84,6 +84,7 @@ def build_confined(  # noqa: PLR0913  where it runs, what it reads, where it wri
     others: Sequence[InterfacePackage],
     taken: Collection[str],
     left_s: float = REAL_S,
+    processor_s: int = PROCESSOR_S,
 ) -> Build:
     """Build the interface packages in a submission.
 
@@ -97,6 +98,7 @@ def build_confined(  # noqa: PLR0913  where it runs, what it reads, where it wri
         others: Packages that the submission's may refer to.
         taken: Names of packages that a submission cannot bring.
         left_s: Real time that is left for the submission.
+        processor_s: Processor time that the process may take.
 
     Raises:
         HarnessError: The process failed for another reason than its limits or the definitions, or the machine is too
@@ -112,7 +114,7 @@ def build_confined(  # noqa: PLR0913  where it runs, what it reads, where it wri
     runtime = ros.runtime
     view = worker_view(runtime, into)
     view = replace(view, read=(*view.read, *ros.share, submission), own=(*view.own, PACKAGE / "runtime" / "interfaces"))
-    limits = {"RLIMIT_CPU": PROCESSOR_S, "RLIMIT_AS": MEMORY_BYTES, "RLIMIT_FSIZE": FILE_BYTES, "RLIMIT_CORE": 0}
+    limits = {"RLIMIT_CPU": processor_s, "RLIMIT_AS": MEMORY_BYTES, "RLIMIT_FSIZE": FILE_BYTES, "RLIMIT_CORE": 0}
     confined = isolation.name != PLAIN_NAME and landlock_version()
     confinement = {
         "read": [str(path) for path in view_of((*view.read, PACKAGE.parent)).bound],  # to be listed by imports
@@ -152,7 +154,7 @@ def build_confined(  # noqa: PLR0913  where it runs, what it reads, where it wri
         for descriptor in command.opened_fds:
             os.close(descriptor)
     if done.returncode in _AT_A_LIMIT or b"MemoryError" in done.stderr[-200:]:
-        limits_ = f"{PROCESSOR_S} s of processor time and {size(MEMORY_BYTES)} of memory"
+        limits_ = f"{processor_s} s of processor time and {size(MEMORY_BYTES)} of memory"
         return Build({}, problems=(f"{_NOT_USED}: building them takes more than {limits_}",))
     if done.returncode:
         said = done.stderr.decode("utf-8", "replace").strip().splitlines() or [f"code {done.returncode}"]

@@ -72,10 +72,12 @@ def rubric(folder: Path, *changes: tuple[str, str]) -> None:
     (folder / "rubric.yaml").write_text(text, encoding="utf-8")
 
 
-def grade(folder: Path, **changes: Any) -> tuple[Graded, list[str], list[str]]:
+def grade(
+    folder: Path, watched_by: Callable[[Callable[[str], None]], Watcher] = Watcher, **changes: Any
+) -> tuple[Graded, list[str], list[str]]:
     """Grade the class; also return who ran, and what was written meanwhile."""
     scheduler, lines = RecordingScheduler(), list[str]()
     grading = GradeRequest("", rubrics=(folder / "rubric.yaml",))
     wanted = course(folder / "in", folder / "out", **{"grading": grading, "jobs": 1, **changes})
-    graded = grade_class(wanted, Watcher(lines.append), lines.append, scheduler)
+    graded = grade_class(wanted, watched_by(lines.append), lines.append, scheduler)
     return graded, scheduler.ran, lines

@@ -19,6 +19,7 @@ from grader.api import grade_packed, pack_task, store_answer
 from grader.cli.main import app
 from grader.course.classroom.local import Attempt
 from grader.course.classroom.messages import Parcel, pack
+from grader.course.classroom.schedulers import DASK, named
 from grader.course.classroom.store import State
 from grader.grading.app.doctor import _added
 from grader.grading.model.entry_points import SCHEDULERS as GROUP
@@ -159,15 +160,12 @@ def test_an_unknown_name_is_answered_with_those_that_there_are(package: Path) ->
 
 
 @pytest.mark.parametrize("text", ["tcp://127.0.0.1:9", "a=b.json", "mine"])
-def test_addresses_and_files_stay_those_of_dask(package: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+def test_addresses_and_files_stay_those_of_dask(package: Path, text: str) -> None:
     """A file may have any name, even that of a scheduler."""
     register(package, GROUP, {"mine": "mine_module:connect"}, "1 / 0")
     if ":" not in text:
         Path(text).write_text("{}")
-    opened = []
-    monkeypatch.setattr("grader.course.classroom.cluster.connect", lambda place, jobs, warn: opened.append(place))
-    run(text, 2)
-    assert opened == [text]
+    assert named(text) == (DASK, text)
 
 
 def test_the_name_of_dask_stays_the_graders(package: Path) -> None:

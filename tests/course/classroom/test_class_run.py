@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -144,11 +146,10 @@ def test_results_have_one_writer(tmp_path: Path) -> None:
 def test_a_full_disk_ends_the_run_and_keeps_what_was_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The others would fail too; the same command continues when there is room again."""
     hand_in(tmp_path / "in", ada=10, bob="failed", cleo=5)
-    free = Store.free_bytes
-    monkeypatch.setattr(Store, "free_bytes", property(lambda self: 0))
-    with pytest.raises(HarnessError, match="found the disk full"):
-        regraded(tmp_path)
-    monkeypatch.setattr(Store, "free_bytes", free)
+    with monkeypatch.context() as disk:
+        disk.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=0))
+        with pytest.raises(HarnessError, match="found the disk full"):
+            regraded(tmp_path)
     names, graded = regraded(tmp_path)
     assert names == ["bob", "cleo"]
     assert scores(graded) == {"ada": 10, "bob": None, "cleo": 5}

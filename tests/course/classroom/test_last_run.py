@@ -17,6 +17,7 @@ from grader.cli import batch
 from grader.cli.main import app
 from grader.cli.remembered import KEPT
 from grader.course.classroom.last_run import LastRun, dump_last_run, read_last_run
+from grader.course.classroom.schedulers import ThisMachine
 from grader.grading.rubrics.builtin import builtin_recording
 from grader.runtime.model.errors import ClassError
 
@@ -28,23 +29,28 @@ OF_ONE_RUN = {
 DECISIONS = "students:\n  ada: {score: 8, reason: the machine was slow}\n"
 
 
+class ClassOfTwo(FakeScheduler):
+    """The scheduler of this machine, and commands that use it."""
+
+    def call(self, *arguments: str) -> Result:
+        """Call `grade batch`."""
+        return CliRunner().invoke(app, ["batch", *arguments], prog_name="grade", obj=ThisMachine(self))
+
+    def batch(self, *options: str, code: int = 0) -> Result:
+        """Grade the class in the current folder."""
+        done = self.call("in", "-o", "out", "--no-progress", *options)
+        assert done.exit_code == code, done.output
+        return done
+
+
 @pytest.fixture
-def scheduler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeScheduler:
+def scheduler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ClassOfTwo:
     """Return the scheduler that grades a class of two in the current folder."""
     hand_in(tmp_path / "in", ada=4, bob=10)
     (tmp_path / "adjust.yaml").write_text(DECISIONS, encoding="utf-8")
     (tmp_path / "roster.csv").write_text("username,name\nada,Ada\nbob,Bob\neve,Eve\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    found = FakeScheduler()
-    monkeypatch.setattr("grader.course.classroom.local.LocalScheduler", found)
-    return found
-
-
-def run(*options: str, code: int = 0) -> Result:
-    """Grade the class in the current folder."""
-    done = CliRunner().invoke(app, ["batch", "in", "-o", "out", "--no-progress", *options], prog_name="grade")
-    assert done.exit_code == code, done.output
-    return done
+    return ClassOfTwo()
 
 
 def marks() -> dict[str, str]:
@@ -56,147 +62,147 @@ def marks() -> dict[str, str]:
 FIRST = ("--exercise", "velocity_publisher", "--adjust", "adjust.yaml", "--roster", "roster.csv")
 
 
-def test_what_is_left_out_applies_again(scheduler: FakeScheduler, tmp_path: Path) -> None:
+def test_what_is_left_out_applies_again(scheduler: ClassOfTwo, tmp_path: Path) -> None:
     """Nothing changes, nobody is graded again, and one line says so; also from another folder."""
-    run(*FIRST)
+    scheduler.batch(*FIRST)
     before = marks()
     assert before == {"Ada": "8", "Bob": "10", "Eve": ""}
     scheduler.graded.clear()
-    again = run()
+    again = scheduler.batch()
     assert (marks(), scheduler.graded) == (before, [])
     said = "--exercise velocity_publisher, --adjust adjust.yaml (1 decision), --roster roster.csv"
     assert again.stderr.splitlines()[0].startswith("note: as in the last run: ")
     assert all(part in again.stderr for part in said.split(", "))
     assert "    Ada 4 -> 8 (score set, the machine was slow)" in again.stdout
-    other = CliRunner().invoke(app, ["batch", str(tmp_path / "in"), "-o", str(tmp_path / "out")], prog_name="grade")
+    other = scheduler.call(str(tmp_path / "in"), "-o", str(tmp_path / "out"))
     assert (other.exit_code, marks()) == (0, before)
     assert json.loads(Path("out/batch.json").read_text(encoding="utf-8"))["moved"] == []
 
 
 def test_a_recording_is_found_again_from_another_folder(
-    scheduler: FakeScheduler, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    scheduler: ClassOfTwo, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The path behind the topic is kept whole; one that is gone is asked for; both forms of one option are refused."""
     shutil.copytree(builtin_recording(), tmp_path / "drive")
     options = ("--exercise", "odom_subscriber", "--recording", "/odom=drive")
-    run(*options)
+    scheduler.batch(*options)
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    command = ["batch", str(tmp_path / "in"), "-o", str(tmp_path / "out"), "--no-progress"]
-    again = CliRunner().invoke(app, command, prog_name="grade")
+    command = [str(tmp_path / "in"), "-o", str(tmp_path / "out"), "--no-progress"]
+    again = scheduler.call(*command)
     assert again.exit_code == 0, again.output
     assert f"--recording /odom={tmp_path}/drive" in again.stderr
     assert scheduler.graded == ["ada", "bob"], "nobody is graded again by the same recording"
     shutil.rmtree(tmp_path / "drive")
-    gone = CliRunner().invoke(app, command, prog_name="grade")
+    gone = scheduler.call(*command)
     assert f"--recording: expected {tmp_path}/drive, which the last run used, found nothing there" in gone.output
     both = [*command, "--no-recording", "--odom-bag", "a", "--recording", "nav_msgs/msg/Odometry=b"]
-    assert "exclude each other" in CliRunner().invoke(app, both, prog_name="grade").output
+    assert "exclude each other" in scheduler.call(*both).output
 
 
-def test_an_option_is_left_out_by_name(scheduler: FakeScheduler) -> None:
+def test_an_option_is_left_out_by_name(scheduler: ClassOfTwo) -> None:
     """Then it stays left out, and every mark that changed is named."""
-    run(*FIRST)
-    done = run("--no-adjust", "--no-roster")
+    scheduler.batch(*FIRST)
+    done = scheduler.batch("--no-adjust", "--no-roster")
     assert marks() == {"ada": "4", "bob": "10"}
     assert "as in the last run: --exercise velocity_publisher;" in done.stderr
-    assert run().stderr.splitlines()[0] == done.stderr.splitlines()[0]
+    assert scheduler.batch().stderr.splitlines()[0] == done.stderr.splitlines()[0]
     assert marks() == {"ada": "4", "bob": "10"}
 
 
-def test_a_changed_mark_is_named_whatever_changed_it(scheduler: FakeScheduler) -> None:
+def test_a_changed_mark_is_named_whatever_changed_it(scheduler: ClassOfTwo) -> None:
     """Here the file of decisions."""
-    run(*FIRST)
+    scheduler.batch(*FIRST)
     Path("adjust.yaml").write_text(DECISIONS.replace("8", "6"), encoding="utf-8")
-    assert "final marks that differ from the last run (1): Ada 8 -> 6" in run().stdout
-    assert "final marks that differ" not in run().stdout
+    assert "final marks that differ from the last run (1): Ada 8 -> 6" in scheduler.batch().stdout
+    assert "final marks that differ" not in scheduler.batch().stdout
 
 
-def test_a_changed_option_is_told(scheduler: FakeScheduler) -> None:
+def test_a_changed_option_is_told(scheduler: ClassOfTwo) -> None:
     """With what the last run had."""
-    run(*FIRST)
-    done = run("--exercise", "odom_subscriber")
+    scheduler.batch(*FIRST)
+    done = scheduler.batch("--exercise", "odom_subscriber")
     assert "note: --exercise odom_subscriber; the last run had --exercise velocity_publisher" in done.stderr
     assert [e for e, _ in scheduler.tasks["bob"].conditions.rubrics] == ["odom_subscriber"]
 
 
 @pytest.mark.parametrize("file", ["adjust.yaml", "roster.csv"])
-def test_a_file_that_is_gone_is_asked_for(file: str, scheduler: FakeScheduler) -> None:
+def test_a_file_that_is_gone_is_asked_for(file: str, scheduler: ClassOfTwo) -> None:
     """No mark changes until it is given again or left out."""
-    run(*FIRST)
+    scheduler.batch(*FIRST)
     before = Path("out/gradebook.csv").read_bytes()
     Path(file).unlink()
-    done = run(code=2)
+    done = scheduler.batch(code=2)
     option = {"adjust.yaml": "adjust", "roster.csv": "roster"}[file]
     holds = " (1 decision)" if option == "adjust" else ""
     assert f"--{option}: expected {Path(file).resolve()}{holds}, which the last run used, found nothing" in done.stderr
     assert f"hint: give it again with --{option}, or leave it out with --no-{option}" in done.stderr
     assert Path("out/gradebook.csv").read_bytes() == before
-    run(f"--no-{option}")
+    scheduler.batch(f"--no-{option}")
 
 
-def test_the_file_in_the_results_is_asked_for_too(scheduler: FakeScheduler) -> None:
+def test_the_file_in_the_results_is_asked_for_too(scheduler: ClassOfTwo) -> None:
     """It applies without being named, so it must not stop applying without a word; --no-adjust leaves it out."""
     Path("out").mkdir()
     kept = Path("out/adjust.yaml")
     kept.write_text(DECISIONS, encoding="utf-8")
-    run("--exercise", "velocity_publisher")
+    scheduler.batch("--exercise", "velocity_publisher")
     assert marks()["ada"] == "8"
-    run("--no-adjust")
+    scheduler.batch("--no-adjust")
     assert marks()["ada"] == "4"
-    run()
+    scheduler.batch()
     assert marks()["ada"] == "8"
     kept.unlink()
-    done = run(code=2)
+    done = scheduler.batch(code=2)
     assert (
         f"--adjust: expected the 1 decision of {kept.resolve()}, which the last run applied, found none" in done.stderr
     )
     assert marks()["ada"] == "8"
 
 
-def test_two_files_of_decisions_are_not_mixed_up(scheduler: FakeScheduler) -> None:
+def test_two_files_of_decisions_are_not_mixed_up(scheduler: ClassOfTwo) -> None:
     """The one that is named counts, and the other one is mentioned."""
     Path("out").mkdir()
     Path("out/adjust.yaml").write_text(DECISIONS.replace("8", "6"), encoding="utf-8")
-    done = run(*FIRST)
+    done = scheduler.batch(*FIRST)
     assert marks()["Ada"] == "8"
     assert "warning: out/adjust.yaml is not applied, because --adjust names adjust.yaml" in done.stderr
 
 
-def test_options_that_exclude_each_other_are_not_both_repeated(scheduler: FakeScheduler) -> None:
+def test_options_that_exclude_each_other_are_not_both_repeated(scheduler: ClassOfTwo) -> None:
     """A seed key replaces a seed, a layout a pattern, and the other way around."""
     Path("k.key").write_text("x" * 44, encoding="utf-8")
-    run("--seed", "7", "--pattern", "(?P<name>.+)", "--exercise", "velocity_publisher")
-    assert "--seed 7" in run().stderr
-    run("--seed-key", "k.key", "--layout", "folders")
-    said = run().stderr
+    scheduler.batch("--seed", "7", "--pattern", "(?P<name>.+)", "--exercise", "velocity_publisher")
+    assert "--seed 7" in scheduler.batch().stderr
+    scheduler.batch("--seed-key", "k.key", "--layout", "folders")
+    said = scheduler.batch().stderr
     assert ("--seed-key k.key" in said, "--layout folders" in said) == (True, True)
     assert ("--seed 7" in said, "--pattern" in said) == (False, False)
 
 
-def test_an_option_and_its_opposite_are_refused(scheduler: FakeScheduler) -> None:
+def test_an_option_and_its_opposite_are_refused(scheduler: ClassOfTwo) -> None:
     """Which one was meant is not guessed."""
-    done = run("--adjust", "adjust.yaml", "--no-adjust", code=2)
+    done = scheduler.batch("--adjust", "adjust.yaml", "--no-adjust", code=2)
     assert "--adjust and --no-adjust exclude each other" in done.stderr
 
 
-def test_a_mistake_leaves_what_is_remembered(scheduler: FakeScheduler) -> None:
+def test_a_mistake_leaves_what_is_remembered(scheduler: ClassOfTwo) -> None:
     """A run that grades nothing is not the last run."""
-    run(*FIRST)
+    scheduler.batch(*FIRST)
     Path("bad.yaml").write_text("students:\n  zoe: {score: 1, reason: x}\n", encoding="utf-8")
-    run("--adjust", "bad.yaml", code=2)
+    scheduler.batch("--adjust", "bad.yaml", code=2)
     Path("adjust.yaml").write_text("students:\n  zoe: {score: 1, reason: x}\n", encoding="utf-8")
-    assert "error: adjust.yaml:2:3: expected a submission or a person of the class" in run(code=2).stderr
+    assert "error: adjust.yaml:2:3: expected a submission or a person of the class" in scheduler.batch(code=2).stderr
     Path("adjust.yaml").write_text(DECISIONS, encoding="utf-8")
-    run()
+    scheduler.batch()
     assert marks()["Ada"] == "8"
 
 
-def test_exports_follow_the_marks(scheduler: FakeScheduler) -> None:
+def test_exports_follow_the_marks(scheduler: ClassOfTwo) -> None:
     """A file for a platform that was written once is written again, and never holds old marks."""
-    run(*FIRST, "--moodle", "roster.csv")
+    scheduler.batch(*FIRST, "--moodle", "roster.csv")
     Path("adjust.yaml").write_text(DECISIONS.replace("8", "6"), encoding="utf-8")
-    run()
+    scheduler.batch()
     assert "ada,6," in Path("out/moodle.csv").read_text(encoding="utf-8")
 
 

@@ -52,8 +52,8 @@ def task(tmp_path: Path, label: str, deadline_s: float = 600.0) -> Task:
     return Task(label, label, tmp_path, tmp_path / label, CONDITIONS, 1, False, deadline_s)
 
 
-def scheduler(jobs: int = 2) -> LocalScheduler:
-    return LocalScheduler(jobs, (sys.executable, "-c", PROGRAM))
+def scheduler(jobs: int = 2, **options: Any) -> LocalScheduler:
+    return LocalScheduler(jobs, (sys.executable, "-c", PROGRAM), **options)
 
 
 def graded(
@@ -236,13 +236,11 @@ def test_tasks_reach_the_process_as_they_are(tmp_path: Path, odd: str) -> None:
     ("tier", "shares", "most"), [("landlock", True, 1), ("none", True, 3), ("bubblewrap", False, 3)]
 )
 def test_submissions_that_could_reach_each_other_go_one_at_a_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tier: str, shares: bool, most: int
+    tmp_path: Path, tier: str, shares: bool, most: int
 ) -> None:
     """Where the sandbox leaves them one network; without a sandbox it is the user's wish."""
     isolation = SimpleNamespace(name=tier, shares_network=shares)
-    choice = SimpleNamespace(isolation=isolation, containment=())
-    monkeypatch.setattr("grader.course.classroom.local.sandbox_here", lambda wanted: choice)
-    here = scheduler(jobs=3)
+    here = scheduler(jobs=3, sandbox=lambda wanted: SimpleNamespace(isolation=isolation, containment=()))
     warnings = here.prepare(tier)
     together = []
     tasks = [task(tmp_path, f"fine {n}") for n in range(6)]

@@ -15,10 +15,9 @@ import pytest
 from kept_runs import RUBRICS
 from regraded_class import RATES, grade, rubric
 
-from grader.course.classroom import regrading
-from grader.course.classroom.local import Task
 from grader.course.classroom.outputs import render_summary
-from grader.course.classroom.store import BEFORE, State
+from grader.course.classroom.store import BEFORE, ResultStatus, State
+from grader.course.classroom.watching import Watcher
 from grader.grading.app.kept_recordings import PlannedRun, recorded_alike
 from grader.grading.app.request import GradeRequest
 from grader.grading.evidence.store import open_evidence
@@ -149,21 +148,21 @@ def test_damaged_recordings_are_made_again(folder: Path, damage: str) -> None:
     assert len(told) == (damage == "recording")  # the others are found out before
 
 
-def test_a_killed_run_goes_on_and_tells_all_changes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+class InterruptedAfterBob(Watcher):
+    """Stands for Ctrl-C when two of three are done."""
+
+    def done(self, name: str, status: ResultStatus) -> None:
+        super().done(name, status)
+        if name == "bob":
+            raise KeyboardInterrupt
+
+
+def test_a_killed_run_goes_on_and_tells_all_changes(folder: Path) -> None:
     """Also of those that it judged before it was killed."""
     grade(folder)
     rubric(folder, POINTS)
-    judged = regrading._judged
-
-    def killed(task: Task, kept: regrading.KeptRecordings) -> Any:
-        if task.name == "cleo":
-            raise KeyboardInterrupt
-        return judged(task, kept)
-
-    monkeypatch.setattr(regrading, "_judged", killed)
     with pytest.raises(KeyboardInterrupt):
-        grade(folder)
-    monkeypatch.undo()
+        grade(folder, InterruptedAfterBob)
     graded, ran, lines = grade(folder)
     assert (lines[0], ran) == ("to grade: 1 (1 of them from kept recordings), done before: 2", [])
     assert len(graded.changes) == 3

@@ -13,7 +13,6 @@ from copies import FILE, handed
 from places import ROOT, TESTS
 from sample_folders import folder_of
 
-from grader.course.similarity import library
 from grader.course.similarity.finding import (
     COMMON_LEAST,
     COMMON_MOST,
@@ -230,11 +229,10 @@ def test_what_cannot_be_compared_is_named(content: bytes, why: str) -> None:
     assert one.passed_over == (f"{FILE}: {why}",)
 
 
-def test_a_file_that_takes_too_long_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_takes_too_long_is_named() -> None:
     """A program is read in milliseconds; what takes far longer is given up."""
-    monkeypatch.setattr(library, "FILE_LIMIT_S", 0.002)
     slow = "".join(f"a{k} = b{k}({k})\n" for k in range(3_000))
-    found = find_similar([handed("slow", slow), handed("quick", "x = 1\n")], ())
+    found = find_similar([handed("slow", slow), handed("quick", "x = 1\n")], (), limit_s=0.002)
     assert [one.passed_over for one in found.handed] == [(f"{FILE}: reading its tokens takes too long",), ()]
 
 

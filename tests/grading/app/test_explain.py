@@ -12,14 +12,12 @@ from kept_runs import kept_run, velocity_run, velocity_trace
 from places import ROOT
 
 from grader.cli import main
-from grader.grading.app import explain as explaining
-from grader.grading.app import grade as session
 from grader.grading.app.explain import explain
+from grader.grading.app.grade import read_exercises
 from grader.grading.app.hint_rules import explain_rules, try_rules
 from grader.grading.app.request import GradeRequest
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.diagnosis import RULES
-from grader.grading.model.exercise import Exercise
 from grader.grading.model.report import CheckExplanation, CriterionExplanation
 from grader.grading.rubrics.builtin import builtin_rubrics
 from grader.grading.rubrics.check_parameters import manual_of
@@ -27,21 +25,6 @@ from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.errors import GraderError
 
 CRITERIA = [(e.id, c.id) for path in builtin_rubrics().values() for e in [read_rubric(path)] for c in e.criteria]
-
-
-@pytest.fixture(autouse=True)
-def _read_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every test explains the same rubrics, and reading them takes longer than all the rest."""
-    monkeypatch.setattr(explaining, "read_exercises", _read)
-
-
-def _read(request: GradeRequest, *, recorded: bool) -> list[Exercise]:
-    if request.rubrics not in _READ:
-        _READ[request.rubrics] = session.read_exercises(request, recorded=recorded)
-    return _READ[request.rubrics]
-
-
-_READ: dict[tuple[Path, ...], list[Exercise]] = {}
 
 
 def grade(*words: str) -> Result:
@@ -165,7 +148,7 @@ def test_without_a_name_all_of_them_are_listed() -> None:
     assert [name for name in CHECKS if not any(line.startswith(f"  {name} ") for line in lines)] == []
     assert [
         c.id
-        for e in _read(GradeRequest("", every=True), recorded=True)
+        for e in read_exercises(GradeRequest("", every=True), recorded=True)
         for c in e.criteria
         if not any(line.split() == [c.id, *c.title.split()] for line in lines)
     ] == []

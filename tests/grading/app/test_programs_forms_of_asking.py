@@ -16,6 +16,7 @@ from grader.grading.app.request import GradeRequest
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.submission import stage_submission
 from grader.runtime.model.errors import SubmissionError
+from grader.runtime.model.limits import MAX_DEPTH
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.programs.executables import find_executable
 
@@ -312,14 +313,14 @@ def test_files_that_are_named_together_are_the_ones_that_run(tmp_path: Path, sha
     assert len(found) == len(named)
 
 
-def test_files_of_different_places_run_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_of_different_places_run_together(tmp_path: Path) -> None:
     """Where their common folder holds too much, each is staged with its own package."""
-    monkeypatch.setattr("grader.grading.submissions.staging.MAX_ENTRIES", 40)
-    write({f"full/{n}.txt": "" for n in range(50)}, tmp_path / "all")
+    write({f"{'deep/' * (MAX_DEPTH + 1)}notes.txt": ""}, tmp_path / "all")
     one = write(python("drive", "talker"), tmp_path / "all" / "one") / "src/drive/drive/talker.py"
     two = write({"talker.py": NODE.format(name="t", text="loose")}, tmp_path / "all" / "two") / "talker.py"
     found = observed((one, two), tmp_path / "staged")
     assert found == {"drive/talker.py": "TEXT = 'drive/talker'", "two/talker.py": "TEXT = 'loose'"}
+    assert sorted(path.name for path in (tmp_path / "staged" / "alone").iterdir()) == ["1_drive", "2_two"]
 
 
 def test_a_program_is_named_once(tmp_path: Path) -> None:

@@ -1,14 +1,14 @@
 """What gives a report again: the command with every option that matters, and digests."""
 
+import time
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
-import pytest
 from click.testing import CliRunner
 
 from grader.cli import main
-from grader.grading.app import start
 from grader.grading.app.bags import recording_digest
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest, command_words, reproduction
@@ -21,7 +21,7 @@ def test_the_seed_is_named_even_if_nobody_asked_for_one() -> None:
     assert command_words(GradeRequest("./ada"), 7) == ("grade", "./ada", "--seed", "7")
 
 
-def test_every_option_that_the_result_depends_on_comes_back(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_option_that_the_result_depends_on_comes_back() -> None:
     """The command, given to the command line, asks for the same."""
     asked = GradeRequest(
         submission="./ada lovelace",
@@ -35,12 +35,19 @@ def test_every_option_that_the_result_depends_on_comes_back(monkeypatch: pytest.
     )
     heard: list[GradeRequest] = []
 
-    def hear(request: GradeRequest, *_: object, **__: object) -> NoReturn:
-        heard.append(request)
-        raise KeyboardInterrupt
+    class Hearing:
+        def opened_early(self, *_: object) -> AbstractContextManager[None]:
+            return nullcontext()
 
-    monkeypatch.setattr(start, "grade", hear)
-    CliRunner().invoke(main.app, list(command_words(asked, 7))[1:])
+        def opened(self, *_: object) -> NoReturn:
+            raise AssertionError
+
+        def grade(self, request: GradeRequest, *_: object, **__: object) -> NoReturn:
+            heard.append(request)
+            raise KeyboardInterrupt
+
+    invocation = main.Invocation(time.monotonic(), Hearing)
+    CliRunner().invoke(main.app, list(command_words(asked, 7))[1:], obj=invocation)
     assert heard == [asked]
 
 

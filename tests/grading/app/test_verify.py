@@ -19,11 +19,14 @@ from sandboxes import USER, unreachable, user_start
 from verifying import differences, program, verified, written
 
 from grader.cli.main import app
+from grader.cli.verify import exit_code
 from grader.grading.app import verify as verifying
 from grader.grading.app.conditions import LOOPS, VerifyCondition, conditions, surroundings
+from grader.grading.app.request import GradeRequest
+from grader.grading.app.verify import VerifyRequest, verify
 from grader.grading.model.conditions import CONDITIONS, SANDBOXES, USUAL
-from grader.grading.model.verification import ConditionState
-from grader.runtime.model.errors import EnvironmentFault
+from grader.grading.model.verification import ConditionState, Verification
+from grader.runtime.model.errors import EnvironmentFault, HarnessError
 from grader.runtime.ros_installation import RosInstallation
 from grader.runtime.sandbox.tiers import isolation_from_name
 
@@ -397,10 +400,11 @@ def test_what_cannot_be_used(
     assert (code, message in " ".join(output.split())) == (2, True), output
 
 
-def stand_in(monkeypatch: pytest.MonkeyPatch, code: str) -> None:
-    monkeypatch.setattr(
-        verifying, "PROGRAM", (sys.executable, "-c", f"import json, sys\ntold = json.load(sys.stdin)\n{code}")
-    )
+def recorded_by(code: str, path: str) -> Verification:
+    """Verify a submission of which other code makes the recordings."""
+    program = (sys.executable, "-c", f"import json, sys\ntold = json.load(sys.stdin)\n{code}")
+    request = VerifyRequest((path,), GradeRequest("", seed=1), ("again",), program=program)
+    return verify(request, lambda text: None)
 
 
 @pytest.mark.parametrize(
@@ -411,14 +415,11 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, code: str) -> None:
         ('print(json.dumps({"problem": "isolation: none holds", "hint": "install it"}))', "isolation: none holds"),
     ],
 )
-def test_a_first_recording_that_fails_is_no_difference(
-    code: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_first_recording_that_fails_is_no_difference(code: str, message: str, tmp_path: Path) -> None:
     """Nothing was compared: the machine has a problem, and it is said which."""
-    stand_in(monkeypatch, code)
     (path,) = written(tmp_path, {"ada": REPEATING["plain"]})
-    found = run(path, "--condition", "again")
-    assert (found[0], message in found[1]) == (3, True), found
+    with pytest.raises(HarnessError, match=message):
+        recorded_by(code, path)
 
 
 #: Answers with the same empty trace each time, or as another one does from the second time on.
@@ -450,13 +451,9 @@ print(json.dumps({{"number": 0, "sources": {{}}}}))
         ('line = {"number": 0, "sources": {}}', 3, ConditionState.FAILED),
     ],
 )
-def test_exit_codes(
-    then: str, code: int, state: ConditionState, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_exit_codes(then: str, code: int, state: ConditionState, tmp_path: Path) -> None:
     """A recording that is missing or failed is no difference, and does not count as the same either."""
-    stand_in(monkeypatch, ANSWERS.format(mark=str(tmp_path / "mark"), then=then))
     (path,) = written(tmp_path, {"ada": REPEATING["plain"]})
-    found = CliRunner().invoke(app, ["verify", path, "--condition", "again", "--json", "--no-progress"])
-    assert found.exit_code == code, found.output
-    (condition,) = json.loads(found.stdout)["conditions"]
-    assert condition["state"] == state.value
+    found = recorded_by(ANSWERS.format(mark=str(tmp_path / "mark"), then=then), path)
+    assert exit_code(found) == code, found
+    assert [condition.state for condition in found.tried] == [state]

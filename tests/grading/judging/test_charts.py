@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 from tracing import (
@@ -22,13 +23,12 @@ from tracing import (
 )
 
 from grader.grading.judging.charts import MOST_POINTS, MOST_TEXTS, kept_indices
-from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.checks.rate import TopicRate
 from grader.grading.judging.figures import expectation, figures_of, illustrated
 from grader.grading.judging.judge_run import judge_exercise
 from grader.grading.judging.recorded_values import MOST_SAMPLES, recorded_values
 from grader.grading.model.chart import Chart, Figure, GraphFigure, Look, Playback, Tone
-from grader.grading.model.exercise import Exercise
+from grader.grading.model.exercise import Criterion, Exercise
 from grader.grading.rubrics.builtin import builtin_rubrics
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.loader import read_rubric
@@ -228,14 +228,25 @@ def test_a_node_that_does_nothing_has_figures_too(exercise: Exercise, tmp_path: 
         assert len(illustrated(report, exercise, traces, submission, {}).figures) == len(traces)
 
 
-def test_a_picture_that_fails_costs_only_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The other figures are there all the same."""
+class Broken(TopicRate):
+    """A check that cannot be drawn."""
 
-    def broken(check: TopicRate, trace: Trace) -> None:
+    def drawing(self, trace: Trace) -> NoReturn:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(CHECKS["topic_rate"], "drawing", broken)
-    titles = [f.title for f in figures_of(ONE, {"alone": velocity().trace()})]
+
+def test_a_picture_that_fails_costs_only_itself() -> None:
+    """The other figures are there all the same."""
+
+    def broken(criterion: Criterion) -> Criterion:
+        if not isinstance(criterion.check, TopicRate):
+            return criterion
+        values = {field.name: getattr(criterion.check, field.name) for field in fields(criterion.check)}
+        return replace(criterion, check=Broken(**values))
+
+    exercise = replace(ONE, criteria=tuple(map(broken, ONE.criteria)))
+    assert exercise != ONE
+    titles = [f.title for f in figures_of(exercise, {"alone": velocity().trace()})]
     assert not any(t.startswith("Rate of") for t in titles)
     assert len(titles) == 4
 

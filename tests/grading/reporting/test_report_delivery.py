@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from report_samples import hostile, middling, partial
 
-from grader.grading.reporting import delivery
 from grader.grading.reporting.delivery import Output, deliver, early_delivery, prepared
 from grader.grading.reporting.formats import FORMATS
 from grader.grading.reporting.platforms.classroom50 import VARIABLES
@@ -88,10 +88,10 @@ def test_the_whole_report_takes_the_place_of_the_partial_one(tmp_path: Path) -> 
 def test_a_partial_report_that_cannot_be_written_ends_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The disk may have room again at the end; if not, the whole report says so."""
 
-    def full(path: Path, data: bytes) -> None:
+    def full(descriptor: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(delivery, "write_whole", full)
+    monkeypatch.setattr(os, "fsync", full)
     outputs = [Output("gradescope", tmp_path / "results.json")]
     write = early_delivery(outputs)
     assert write is not None

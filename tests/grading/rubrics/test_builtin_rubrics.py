@@ -17,12 +17,13 @@ from ruamel.yaml import YAML
 from grader.grading.judging.checks import CHECKS
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.rubric_files import rubrics_in
-from grader.grading.rubrics.builtin import builtin_headers, builtin_rubrics
+from grader.grading.rubrics.builtin import builtin_headers, builtin_rubrics, headers_in
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.loader import read_rubric
 from grader.grading.rubrics.schema import rubric_schema, schema_text
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import shortest
+from grader.runtime.shipped import shipped
 from grader.runtime.stimuli.recorded import RecordedStream
 
 RUBRICS = ROOT / "rubrics"
@@ -189,7 +190,7 @@ def test_the_schema_is_plain_json(schema: Mapping[str, Any]) -> None:
     assert json.loads(schema_text()) == schema
 
 
-def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path: Path) -> None:
     """Beside the package's code, exercise 2 before exercise 10."""
     rubrics = tmp_path / "grader" / "shipped" / "rubrics"
     rubrics.mkdir(parents=True)
@@ -198,9 +199,10 @@ def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path: Path, monk
         changed = text.replace('number: "1"', f'number: "{number}"').replace("id: velocity_publisher", f"id: {name}")
         (rubrics / name).mkdir()
         (rubrics / name / "rubric.yaml").write_text(changed, encoding="utf-8")
-    monkeypatch.setattr("grader.runtime.shipped.PACKAGE", tmp_path / "grader")
-    assert builtin_rubrics() == {name: rubrics / name / "rubric.yaml" for name in "cab"}
-    assert list(builtin_rubrics()) == ["c", "a", "b"]
+    headers = headers_in(shipped("rubrics", tmp_path / "grader"))
+    assert [(header.id, header.path) for header in headers] == [
+        (name, rubrics / name / "rubric.yaml") for name in "cab"
+    ]
 
 
 def test_every_criterion_says_which_part_of_the_chapter_asks_for_it() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bz2
 import contextlib
+import ctypes.util
 import gzip
 import io
 import lzma
@@ -17,6 +18,7 @@ import tarfile
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +28,11 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies._internal.core import DataObject
 
-from grader.grading.submissions import archives, foreign_archives
-from grader.grading.submissions.foreign_archives import is_installed
+from grader.grading.submissions.archives import collect_archive
+from grader.grading.submissions.collected import SubmissionLimits
+from grader.grading.submissions.foreign_archives import UnpackerLimits, foreign_members, is_installed
+from grader.grading.submissions.members import UnusableArchiveError
 from grader.grading.submissions.submission import stage_submission
-from grader.runtime import contained
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.submission import Submission
 
@@ -297,27 +300,24 @@ def test_what_is_no_file_in_a_zip_is_refused(tmp_path: Path, mode: int, found: s
 @pytest.mark.parametrize(
     ("limit", "value", "files", "found"),
     [
-        ("MAX_FILES", 3, [f"{n}.py" for n in range(4)], "expected at most 3 files, found more"),
-        ("MAX_ENTRIES", 3, [f".git/{n}" for n in range(4)], "expected at most 3 entries, found more"),
-        ("MAX_DEPTH", 2, ["a/b/c/x.py"], "expected at most 2 folders inside each other, found more"),
-        ("MAX_TOTAL_BYTES", 1 << 20, ["a.py", "b.py"], "expected at most 1 MiB in all, found more"),
-        ("MAX_ARCHIVE_BYTES", 0, ["a.py"], "expected at most 0 MiB, found more"),
+        ("files", 3, [f"{n}.py" for n in range(4)], "expected at most 3 files, found more"),
+        ("entries", 3, [f".git/{n}" for n in range(4)], "expected at most 3 entries, found more"),
+        ("depth", 2, ["a/b/c/x.py"], "expected at most 2 folders inside each other, found more"),
+        ("total_bytes", 1 << 20, ["a.py", "b.py"], "expected at most 1 MiB in all, found more"),
+        ("archive_bytes", 0, ["a.py"], "expected at most 0 MiB, found more"),
     ],
 )
 def test_a_limit_exceeded_is_refused(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    packed: Callable[..., Any],
-    limit: str,
-    value: int,
-    files: Sequence[str],
-    found: str,
+    packed: Callable[..., Any], limit: str, value: int, files: Sequence[str], found: str
 ) -> None:
-    """Members, files, levels, bytes in all and of the archive itself; nothing has been written by then."""
-    monkeypatch.setattr(archives, limit, value)
-    if limit == "MAX_ENTRIES" and packed is tarred:
+    """Members, files, levels, bytes in all and of the archive itself."""
+    if limit == "entries" and packed is tarred:
         files = [f".git/{n}" for n in range(10)]
-    assert refusal(tmp_path, packed({name: os.urandom(600 << 10) for name in files}))[0] == found
+    data = packed({name: os.urandom(600 << 10) for name in files})
+    with pytest.raises(SubmissionError) as caught:
+        collect_archive(data, where="alice.zip", limits=SubmissionLimits(**{limit: value}))
+    assert caught.value.message == f"alice.zip: {found}"
+    assert caught.value.hint
 
 
 def test_a_file_that_is_too_large_is_left_out_with_a_note(tmp_path: Path) -> None:
@@ -476,16 +476,14 @@ def test_bombs_and_noise_in_a_rar_or_7z_are_refused(tmp_path: Path) -> None:
 
 
 @needs_libarchive
-def test_the_limits_of_the_process_that_unpacks_refuse_the_archive(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_limits_of_the_process_that_unpacks_refuse_the_archive() -> None:
     """Too little memory to unpack, or too little time: the student's archive, not the grader's fault."""
     large = rarred({"a.py": os.urandom(6 << 20)})
-    monkeypatch.setattr(foreign_archives, "MEMORY_BYTES", 16 << 20)
-    assert "found a damaged, incomplete or unusual one" in refusal(tmp_path / "1", large)[0]
-    monkeypatch.undo()
-    monkeypatch.setattr(contained, "REAL_S", 0.001)
-    assert "found a damaged, incomplete or unusual one" in refusal(tmp_path / "2", rarred(FILES))[0]
+    limits = UnpackerLimits(entries=10, file_bytes=8 << 20, total_bytes=8 << 20, words="8 MiB")
+    assert [member.size for member in foreign_members(large, "rar", limits)] == [6 << 20]
+    for too_little in (replace(limits, memory_bytes=16 << 20), replace(limits, real_s=0.001)):
+        with pytest.raises(UnusableArchiveError, match="found a damaged, incomplete or unusual one"):
+            foreign_members(large, "rar", too_little)
 
 
 @pytest.mark.sandbox
@@ -516,7 +514,7 @@ def test_without_libarchive_a_rar_or_7z_is_refused_with_the_way_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, start: bytes
 ) -> None:
     """For the student a zip, for who grades what to install."""
-    monkeypatch.setattr(archives, "is_installed", lambda: False)
+    monkeypatch.setattr(ctypes.util, "find_library", lambda name: None)
     message, hint = refusal(tmp_path, start)
     assert message.startswith("expected a zip or tar archive, found ")
     assert message.endswith(", which cannot be read")

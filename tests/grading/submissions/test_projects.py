@@ -7,13 +7,14 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import pytest
 from places import TESTS
 
 from grader.grading.submissions import projects
-from grader.grading.submissions.projects import read_projects
+from grader.grading.submissions.projects import read_projects, told_by_process
 from grader.runtime.model.projects import Project
 from grader.runtime.programs.executables import executables, find_executable
 from grader.runtime.programs.shares import install_shares
@@ -222,21 +223,23 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss << 10)
     assert contained_bytes < TRUSTED_BYTES
 
 
-def test_a_process_that_is_ended_costs_no_package_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_is_ended_costs_no_package_before(tmp_path: Path) -> None:
     """What it has told by then counts; the others have names and no more."""
-    monkeypatch.setattr(projects, "OUTPUT_BYTES", 200)
     made(tmp_path / "a", {"setup.py": f"{SETUP}setup(name='a')\n"})
     made(tmp_path / "b", {"setup.py": scripts("'node = own.node:main'")})
-    found, notes = read_projects(tmp_path)
+    found, notes = read_projects(tmp_path, partial(told_by_process, output_bytes=200))
     assert found == (Project("a", "a"), Project("b", "b"))
     assert notes == (f"b/{COSTLY}",)
 
 
-def test_a_submission_without_packages_starts_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_submission_without_packages_starts_no_process(tmp_path: Path) -> None:
     """A folder of plain files pays nothing."""
     (tmp_path / "node.py").touch()
-    monkeypatch.setattr(subprocess, "run", None)
-    assert read_projects(tmp_path) == ((), ())
+
+    def never(asked: bytes) -> bytes:
+        raise AssertionError(asked)
+
+    assert read_projects(tmp_path, never) == ((), ())
 
 
 @pytest.mark.parametrize(
@@ -250,15 +253,9 @@ def test_a_submission_without_packages_starts_no_process(tmp_path: Path, monkeyp
         b'{"scripts": 5, "data_files": [[1, 2]], "problems": {}}\n',
     ],
 )
-def test_what_the_process_says_is_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: bytes) -> None:
+def test_what_the_process_says_is_checked(tmp_path: Path, lines: bytes) -> None:
     """It has read what students made, and might say anything."""
-
-    def answer(*arguments: object) -> int:
-        arguments[-1].write(lines)  # type: ignore[attr-defined]
-        return 0
-
-    monkeypatch.setattr(projects, "run_contained", answer)
-    ((project,), _) = read_projects(made(tmp_path / "ws", {"setup.py": ""}))
+    ((project,), _) = read_projects(made(tmp_path / "ws", {"setup.py": ""}), lambda files: lines)
     assert project == Project("", "ws")
 
 

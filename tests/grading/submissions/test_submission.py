@@ -15,6 +15,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from grader.grading.submissions import staging
+from grader.grading.submissions.collected import LeftOut, SubmissionLimits
+from grader.grading.submissions.staging import collect_folder
 from grader.grading.submissions.submission import stage_submission
 from grader.runtime.model.errors import HarnessError, SubmissionError
 
@@ -293,22 +295,21 @@ def test_the_copy_is_readable_by_every_user(work: Path, into: Path) -> None:
 @pytest.mark.parametrize(
     ("limit", "value", "files", "found"),
     [
-        ("MAX_FILES", 3, [f"{n}.py" for n in range(4)], "expected at most 3 files, found more"),
-        ("MAX_ENTRIES", 3, [f"d{n}/x.py" for n in range(2)], "expected at most 3 entries, found more"),
-        ("MAX_DEPTH", 2, ["a/b/c/x.py"], "expected at most 2 folders inside each other, found more"),
-        ("MAX_TOTAL_BYTES", 1 << 20, ["a.py", "b.py"], "expected at most 1 MiB in all, found more"),
+        ("files", 3, [f"{n}.py" for n in range(4)], "expected at most 3 files, found more"),
+        ("entries", 3, [f"d{n}/x.py" for n in range(2)], "expected at most 3 entries, found more"),
+        ("depth", 2, ["a/b/c/x.py"], "expected at most 2 folders inside each other, found more"),
+        ("total_bytes", 1 << 20, ["a.py", "b.py"], "expected at most 1 MiB in all, found more"),
     ],
 )
 def test_a_limit_exceeded_is_one_clear_error(
-    work: Path, into: Path, monkeypatch: pytest.MonkeyPatch, limit: str, value: int, files: Sequence[str], found: str
+    work: Path, into: Path, limit: str, value: int, files: Sequence[str], found: str
 ) -> None:
     """Too many files, entries, levels or bytes: an error with the number."""
-    monkeypatch.setattr(staging, limit, value)
     for name in files:
         put(work, name, b"#" * (600 << 10))
     with pytest.raises(SubmissionError) as caught:
-        stage_submission(str(work), WANTED, into)
-    assert caught.value.message == f"{work}: {found}"
+        collect_folder(work, into=into, where="alice", limits=SubmissionLimits(**{limit: value}))
+    assert caught.value.message == f"alice: {found}"
     assert caught.value.hint
 
 
@@ -523,25 +524,19 @@ def test_any_name_can_be_asked_for(tmp_path_factory: pytest.TempPathFactory, nam
     assert submission.files["velocity_publisher.py"].found is not None
 
 
-def test_a_folder_exchanged_for_a_link_meanwhile_is_not_followed(
-    work: Path, tmp_path: Path, into: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_exchanged_for_a_link_meanwhile_is_not_followed(work: Path, tmp_path: Path) -> None:
     """Between listing and reading, nothing can be slipped in from elsewhere."""
-    put(work, "velocity_publisher.py")
     put(work, "sub/odom_subscriber.py", "mine")
     secret = put(tmp_path, "secret/odom_subscriber.py", "secret").parent
-    real = staging._content
-
-    def exchanged(*arguments: Any) -> bytes | None:
-        if not (work / "sub").is_symlink():
-            (work / "sub").rename(tmp_path / "moved")
-            (work / "sub").symlink_to(secret)
-        return real(*arguments)
-
-    monkeypatch.setattr(staging, "_content", exchanged)
-    submission = stage_submission(str(work), WANTED, into)
-    assert staged_files(into) == ["velocity_publisher.py"]
-    assert submission.notes == ("not copied: sub/odom_subscriber.py (it cannot be read: Not a directory)",)
+    top, left = os.open(work, os.O_RDONLY), LeftOut()
+    try:
+        assert staging._content(top, "sub/odom_subscriber.py", left, 100) == b"mine"
+        (work / "sub").rename(tmp_path / "moved")
+        (work / "sub").symlink_to(secret)
+        assert staging._content(top, "sub/odom_subscriber.py", left, 100) is None
+    finally:
+        os.close(top)
+    assert left.notes() == ("not copied: sub/odom_subscriber.py (it cannot be read: Not a directory)",)
 
 
 def test_what_file_managers_leave_is_passed_over(work: Path, into: Path) -> None:

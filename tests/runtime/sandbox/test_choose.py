@@ -19,12 +19,13 @@ import grader
 from grader.runtime.model.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Property, TierReport, missing
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import RosInstallation, find_ros
-from grader.runtime.sandbox import choose, memory, selftest, tiers
+from grader.runtime.sandbox import memory, selftest
 from grader.runtime.sandbox import properties as remedies
 from grader.runtime.sandbox.bubblewrap import Bubblewrap
-from grader.runtime.sandbox.choose import choose_isolation, inspect_tier, inspect_tiers, sandbox_memory
-from grader.runtime.sandbox.memory import Memory
+from grader.runtime.sandbox.choose import Machine, choose_isolation, inspect_tier, inspect_tiers, sandbox_memory
+from grader.runtime.sandbox.memory import Memory, circumstances
 from grader.runtime.sandbox.properties import NO_EXCHANGE
+from grader.runtime.sandbox.protocol import Isolation
 from grader.runtime.sandbox.tiers import ISOLATING, Plain, isolation_from_name
 from grader.runtime.temp_dirs import OWN
 
@@ -50,121 +51,121 @@ def without(*names: str) -> tuple[Property, ...]:
     return tuple(replace(found, holds=found.name not in names) for found in ALL_HOLD)
 
 
+class Offered(Plain):
+    """A tier that this machine has, whatever it needs."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name  # type: ignore[misc]
+
+
+class Trials:
+    """A machine that has every tier, and the reports that its self-tests make."""
+
+    def __init__(self, ros: RosInstallation) -> None:
+        self.asked: list[str] = []  # the tiers that were tested
+        self.reports: dict[str, TierReport] = {}  # what is found, by tier; every other tier holds
+        self.machine = Machine(ros, Offered, self._inspected, lambda name: name == "bubblewrap-root")
+
+    def _inspected(self, isolation: Isolation, ros: RosInstallation) -> TierReport:
+        assert ros is self.machine.ros
+        self.asked.append(isolation.name)
+        return self.reports.get(isolation.name, report(isolation.name))
+
+
 @pytest.fixture
-def tested(monkeypatch: pytest.MonkeyPatch, ros: RosInstallation) -> tuple[list[str], dict[str, TierReport]]:
-    """Replace the self-test by given reports, and note which tiers it is asked for; every tier can be had."""
-    asked: list[str] = []
-    reports: dict[str, TierReport] = {}
-
-    def inspected(isolation: str, _: object) -> TierReport:
-        asked.append(isolation)
-        return reports.get(isolation, report(isolation))
-
-    monkeypatch.setattr(choose, "isolation_from_name", lambda name: Plain() if name == NO_SANDBOX else name)
-    monkeypatch.setattr(selftest, "inspect", inspected)
-    monkeypatch.setattr(tiers, "is_for_others", lambda name: name == "bubblewrap-root")
-    return asked, reports
+def trials(ros: RosInstallation) -> Trials:
+    return Trials(ros)
 
 
 # --- the choice ---
 
 
-def test_the_strongest_tier_that_holds_is_taken(
-    tested: tuple[list[str], dict[str, TierReport]], ros: RosInstallation
-) -> None:
+def test_the_strongest_tier_that_holds_is_taken(trials: Trials) -> None:
     """Weaker ones are not even tried."""
-    asked, reports = tested
-    reports["bubblewrap-root"] = report("bubblewrap-root", (), usable=False, why="no process runs in it")
-    reports["bubblewrap"] = report("bubblewrap", without("shm"), usable=False, why="shm NOT CONTAINED")
-    chosen = choose_isolation("auto", ros)
-    assert chosen.isolation == "bubblewrap-flat"
+    trials.reports["bubblewrap-root"] = report("bubblewrap-root", (), usable=False, why="no process runs in it")
+    trials.reports["bubblewrap"] = report("bubblewrap", without("shm"), usable=False, why="shm NOT CONTAINED")
+    chosen = choose_isolation("auto", trials.machine)
+    assert chosen.isolation.name == "bubblewrap-flat"
     assert chosen.containment == ALL_HOLD
-    assert asked == ["bubblewrap-root", "bubblewrap", "bubblewrap", "bubblewrap-flat"], "the broken one twice"
+    assert trials.asked == ["bubblewrap-root", "bubblewrap", "bubblewrap", "bubblewrap-flat"], "the broken one twice"
 
 
 @pytest.mark.parametrize("name", REQUIRED)
-def test_without_a_required_property_auto_refuses(
-    tested: tuple[list[str], dict[str, TierReport]], ros: RosInstallation, name: str
-) -> None:
+def test_without_a_required_property_auto_refuses(trials: Trials, name: str) -> None:
     """Whichever it is; the tiers, what they lack and what to do are told."""
     for tier in ISOLATING:
-        tested[1][tier] = report(tier, without(name), usable=False, why=f"{name} NOT CONTAINED")
+        trials.reports[tier] = report(tier, without(name), usable=False, why=f"{name} NOT CONTAINED")
     with pytest.raises(EnvironmentFault, match=f"landlock: not contained: {name}") as refused:
-        choose_isolation("auto", ros)
+        choose_isolation("auto", trials.machine)
     assert "bubblewrap-root" not in refused.value.message, "no news for this user"
     assert refused.value.hint
 
 
 @pytest.mark.parametrize("name", sorted(set(PROPERTIES) - set(REQUIRED)))
-def test_what_is_not_required_is_told_and_not_refused(
-    tested: tuple[list[str], dict[str, TierReport]], ros: RosInstallation, name: str
-) -> None:
+def test_what_is_not_required_is_told_and_not_refused(trials: Trials, name: str) -> None:
     """The report carries it."""
-    tested[1]["bubblewrap-root"] = report("bubblewrap-root", without(name))
-    assert [found.name for found in choose_isolation("auto", ros).containment if not found.holds] == [name]
+    trials.reports["bubblewrap-root"] = report("bubblewrap-root", without(name))
+    containment = choose_isolation("auto", trials.machine).containment
+    assert [found.name for found in containment if not found.holds] == [name]
 
 
-def test_a_tier_asked_for_by_name_must_keep_its_promises(
-    tested: tuple[list[str], dict[str, TierReport]], ros: RosInstallation, cache: Path
-) -> None:
+def test_a_tier_asked_for_by_name_must_keep_its_promises(trials: Trials, cache: Path) -> None:
     """Landlock promises nothing about the network that it was given; every other tier does."""
     for tier in ISOLATING:
-        tested[1][tier] = report(tier, without("net_egress"), usable=False, why="net_egress NOT CONTAINED")
-    assert choose_isolation("landlock", ros).isolation == "landlock"
+        trials.reports[tier] = report(tier, without("net_egress"), usable=False, why="net_egress NOT CONTAINED")
+    assert choose_isolation("landlock", trials.machine).isolation.name == "landlock"
     with pytest.raises(EnvironmentFault, match=r"bubblewrap-flat: .*net_egress"):
-        choose_isolation("bubblewrap-flat", ros)
+        choose_isolation("bubblewrap-flat", trials.machine)
     next(cache.glob("sandbox-landlock-*.json")).unlink()
-    tested[1]["landlock"] = report("landlock", without("net_egress", "fs_write"), usable=False, why="fs_write open")
+    trials.reports["landlock"] = report(
+        "landlock", without("net_egress", "fs_write"), usable=False, why="fs_write open"
+    )
     with pytest.raises(EnvironmentFault, match="fs_write"):
-        choose_isolation("landlock", ros)
+        choose_isolation("landlock", trials.machine)
 
 
-def test_none_is_taken_at_its_word(tested: tuple[list[str], dict[str, TierReport]], ros: RosInstallation) -> None:
+def test_none_is_taken_at_its_word(trials: Trials) -> None:
     """Nothing is tried, and nothing is said to be contained."""
-    chosen = choose_isolation("none", ros)
-    assert (chosen.isolation, chosen.containment, tested[0]) == (Plain(), (), [])
+    chosen = choose_isolation("none", trials.machine)
+    assert (chosen.isolation.name, chosen.containment, trials.asked) == (NO_SANDBOX, (), [])
 
 
-@pytest.mark.parametrize("make", [lambda name: choose_isolation(name, find_ros()), isolation_from_name])
+@pytest.mark.parametrize("make", [lambda name: choose_isolation(name, Machine(find_ros())), isolation_from_name])
 def test_an_unknown_tier_is_a_fault_of_the_set_up(make: Callable[[str], object]) -> None:
     """The names that exist are told."""
     with pytest.raises(EnvironmentFault, match=r"expected .*bubblewrap.*, found docker"):
         make("docker")
 
 
-def test_a_self_test_is_made_once(tested: tuple[list[str], dict[str, TierReport]], ros: RosInstallation) -> None:
+def test_a_self_test_is_made_once(trials: Trials) -> None:
     """A second choice remembers the first one; an inspection tests anew."""
-    asked, _ = tested
-    assert choose_isolation("auto", ros) == choose_isolation("auto", ros)
-    assert asked == ["bubblewrap-root"]
-    assert [found.name for found in inspect_tiers(ros)] == list(TIERS)
-    assert asked == ["bubblewrap-root", *ISOLATING]
+    first, second = (choose_isolation("auto", trials.machine) for _ in range(2))
+    assert (first.isolation.name, first.containment) == (second.isolation.name, second.containment)
+    assert trials.asked == ["bubblewrap-root"]
+    assert [found.name for found in inspect_tiers(trials.machine)] == list(TIERS)
+    assert trials.asked == ["bubblewrap-root", *ISOLATING]
 
 
-def test_a_failed_self_test_is_made_again(
-    tested: tuple[list[str], dict[str, TierReport]], ros: RosInstallation
-) -> None:
+def test_a_failed_self_test_is_made_again(trials: Trials) -> None:
     """The machine may have been busy, or was mended."""
-    asked, reports = tested
-    reports["bubblewrap"] = report("bubblewrap", without("shm"), usable=False, why="shm")
-    inspect_tier("bubblewrap", ros)
-    assert asked == ["bubblewrap"] * 2, "it is tried twice, for a busy machine"
-    reports.clear()
-    assert inspect_tier("bubblewrap", ros).usable
+    trials.reports["bubblewrap"] = report("bubblewrap", without("shm"), usable=False, why="shm")
+    inspect_tier("bubblewrap", trials.machine)
+    assert trials.asked == ["bubblewrap"] * 2, "it is tried twice, for a busy machine"
+    trials.reports.clear()
+    assert inspect_tier("bubblewrap", trials.machine).usable
 
 
 def test_without_bubblewrap_auto_names_the_command_that_installs_it(
-    ros: RosInstallation, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    ros: RosInstallation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where the network is open, Landlock alone does not do."""
-    monkeypatch.setattr("grader.runtime.sandbox.bubblewrap.SYSTEM_PROGRAMS", str(tmp_path))
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(selftest, "inspect", lambda *_: report("landlock", without("net_egress"), usable=False))
+    monkeypatch.setattr(shutil, "which", lambda name, path=None: None)
+    machine = Machine(ros, self_test=lambda *_: report("landlock", without("net_egress"), usable=False))
     with pytest.raises(EnvironmentFault, match="lacks bubblewrap, which keeps your program from harming it") as refused:
-        choose_isolation("auto", ros)
+        choose_isolation("auto", machine)
     assert refused.value.hint.endswith("install -y bubblewrap")
     with pytest.raises(EnvironmentFault, match="bwrap"):
-        choose_isolation("bubblewrap-flat", ros)
+        choose_isolation("bubblewrap-flat", machine)
 
 
 # --- the self-test, with real processes ---
@@ -288,19 +289,18 @@ def test_what_is_kept_is_recalled(place: Memory) -> None:
     assert len(list(file_of(place).parent.iterdir())) == 1
 
 
-def test_under_other_circumstances_nothing_is_recalled(
-    place: Memory, ros: RosInstallation, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_under_other_circumstances_nothing_is_recalled(place: Memory, ros: RosInstallation) -> None:
     """Another boot, ROS or version has another key, and what has changed is told."""
     assert place.lapse() == "none is remembered"
     place.keep(report())
     assert place.lapse() == ""
     assert Memory.of("bubblewrap", replace(ros, rclpy_version="0")).lapse() == "changed since: ROS"
-    monkeypatch.setattr(grader, "__version__", "0.0.0")
-    assert Memory.of("bubblewrap", ros).lapse() == "changed since: grader"
-    monkeypatch.setattr(memory, "_content", lambda path: "another boot")
-    assert Memory.of("bubblewrap", ros).lapse().startswith("changed since: boot, ")
-    assert Memory.of("bubblewrap", ros).recall() is None
+    for what in place.key:
+        changed = replace(place, key={**place.key, what: "another"})
+        assert changed.lapse() == f"changed since: {what}"
+        assert changed.recall() is None
+    boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii")
+    assert {("boot", boot), ("grader", grader.__version__)} < set(circumstances(ros))
 
 
 def test_two_installations_of_one_user_remember_side_by_side(place: Memory, ros: RosInstallation) -> None:
@@ -319,23 +319,22 @@ def test_nothing_is_forgotten_for_what_does_not_matter(
     kept = Memory.of("bubblewrap", ros)
     kept.keep(report())
     monkeypatch.setattr(socket, "if_nameindex", lambda: [(1, "lo"), (2, "eth0"), (7, "veth12ab")])
-    stamped = memory._stamp
-    monkeypatch.setattr(memory, "_stamp", lambda path: "new" if path.name == "__pycache__" else stamped(path))
     assert Memory.of("bubblewrap", ros).lapse() == ""
     monkeypatch.setattr(socket, "if_nameindex", lambda: [(1, "lo")])
     assert Memory.of("bubblewrap", ros).lapse() == "changed since: network"
+    folder = Path(memory.__file__).parent
+    stamped = [Path(text.partition(" ")[0]) for what, text in circumstances(ros) if what == "grader"]
+    assert {path.suffix for path in stamped if path.is_relative_to(folder)} == {".py", ".xml"}
 
 
-def test_a_run_says_why_it_tries_a_sandbox(
-    tested: tuple[list[str], dict[str, TierReport]], ros: RosInstallation
-) -> None:
+def test_a_run_says_why_it_tries_a_sandbox(trials: Trials) -> None:
     """Once; with what is remembered nothing is tried and nothing is said. `grade doctor` knows beforehand."""
     heard: list[str] = []
-    assert sandbox_memory(ros).value == "a run would repeat it; bubblewrap: none is remembered"
-    choose_isolation("auto", ros, heard.append)
-    choose_isolation("auto", ros, heard.append)
+    assert sandbox_memory(trials.machine).value == "a run would repeat it; bubblewrap: none is remembered"
+    choose_isolation("auto", trials.machine, heard.append)
+    choose_isolation("auto", trials.machine, heard.append)
     assert heard == ["trying the sandbox bubblewrap-root (none is remembered)"]
-    assert sandbox_memory(ros).value == "remembered for bubblewrap-root: runs do not repeat it"
+    assert sandbox_memory(trials.machine).value == "remembered for bubblewrap-root: runs do not repeat it"
 
 
 def _spoil(place: Memory, text: str) -> None:
@@ -403,14 +402,17 @@ def test_without_a_place_nothing_is_kept(ros: RosInstallation, monkeypatch: pyte
 # --- remedies ---
 
 
-def test_a_setting_that_forbids_namespaces_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_setting_that_forbids_namespaces_is_named(tmp_path: Path) -> None:
     """With the command that changes it; a setting with another value, or that does not exist, is none."""
-    settings = (("no.such.setting", "1", "0"), ("kernel.ostype", "Plan9", "x"), ("kernel.ostype", "Linux", "Minix"))
-    monkeypatch.setattr(remedies, "SETTINGS", settings)
+    for folder in ("kernel", "user"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "kernel" / "unprivileged_userns_clone").write_text("1\n", encoding="ascii")
+    (tmp_path / "user" / "max_user_namespaces").write_text("0\n", encoding="ascii")
     failed = report("bubblewrap", (), usable=False, why="no process runs in it")
-    assert remedies.remedy_for(failed).removeprefix("sudo ") == "sysctl -w kernel.ostype=Minix"
-    monkeypatch.setattr(remedies, "SETTINGS", settings[:2])
-    assert remedies.remedy_for(failed) == ""
+    command = remedies.remedy_for(failed, tmp_path)
+    assert command.removeprefix("sudo ") == "sysctl -w user.max_user_namespaces=15000"
+    (tmp_path / "user" / "max_user_namespaces").write_text("15000\n", encoding="ascii")
+    assert remedies.remedy_for(failed, tmp_path) == ""
 
 
 def test_the_systems_own_installer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -55,12 +55,13 @@ def test_an_error_in_the_file_is_told_with_its_line(content: bytes, told: str) -
         assert error.value.message.startswith(told)
 
 
-def test_a_call_without_end_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_call_without_end_is_ended() -> None:
     """It would take the worker to its limit of processor time, which counts as a fault of the student's nodes."""
-    monkeypatch.setattr(loading, "CALL_S", 0.05)
     slow = made("slow", "slow.py", FILE, {})
-    with pytest.raises(HarnessError, match=r"slow.py:\d+: the simulation `slow` failed: the call took more than"):
-        guarded("slow", "slow.py", lambda: slow.step(None))  # type: ignore[arg-type]
+    with pytest.raises(
+        HarnessError, match=r"slow.py:\d+: the simulation `slow` failed: the call took more than 0.05 s"
+    ):
+        guarded("slow", "slow.py", lambda: slow.step(None), most_s=0.05)  # type: ignore[arg-type]
     assert guarded("slow", "slow.py", lambda: 1) == 1
 
 

@@ -7,16 +7,15 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from grader.runtime import compiled as compiled_module
+from grader.runtime.compiled import state_of_package
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import find_ros
-from grader.runtime.sandbox import environment
 from grader.runtime.sandbox.environment import PACKAGE
-from grader.runtime.supervisor import byte_code as byte_code_module
 from grader.runtime.supervisor.byte_code import _roots, byte_code, compile_command, compile_own, is_current
 
 MODE = py_compile.PycInvalidationMode
@@ -105,7 +104,7 @@ def test_the_command_that_is_named_mends_it(source: Path, change: Callable[[Path
 
 @pytest.mark.ros
 def test_a_stale_installation_is_told_with_the_command_that_mends_it(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    tmp_path: Path,
 ) -> None:
     """Of what nodes load, nothing is stale in the environment of the tests; with one file that is, it is named."""
     try:
@@ -113,28 +112,25 @@ def test_a_stale_installation_is_told_with_the_command_that_mends_it(
     except EnvironmentFault as fault:
         pytest.skip(fault.message)
     assert byte_code(ros.runtime).value == "up to date", "in the environment that .ci/setup made"
-    # A copy of the package: other processes compile this one whenever they like.
+    # A copy of the package, which nodes load instead: other processes compile this one whenever they like.
     copy = tmp_path / PACKAGE.name
     shutil.copytree(PACKAGE, copy)
-    for module in (byte_code_module, environment):
-        monkeypatch.setattr(module, "PACKAGE", copy)
-    monkeypatch.setattr(byte_code_module, "_compile", lambda: None)
     Path(importlib.util.cache_from_source(str(copy / "runtime" / "host" / "launcher.py"))).write_bytes(b"")
-    fact = byte_code(ros.runtime)
+    fact = byte_code(replace(ros.runtime, python_paths=(tmp_path, *ros.runtime.python_paths)))
     assert fact.fits
     assert fact.value.startswith("missing or stale for 1 file:")
-    assert fact.remedy.endswith(f"-m compileall -q -f {copy}")
+    assert fact.remedy.endswith(f"-m compileall -q -f {tmp_path}")
 
 
-def test_own_modules_are_compiled_once_for_each_state(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_own_modules_are_compiled_once_for_each_state(source: Path) -> None:
     """A start looks at the byte code of the package only if a module has changed since it was last compiled."""
-    calls: list[bytes] = []
-    state = b"before"
-    monkeypatch.setattr(compiled_module, "COMPILED", tmp_path)
-    monkeypatch.setattr(byte_code_module, "state_of_package", lambda: state)
-    monkeypatch.setattr(byte_code_module, "_compile", lambda: calls.append(state))
-    compile_own()
-    compile_own()
-    state = b"after"
-    compile_own()
-    assert calls == [b"before", b"after"]
+    place = Path(importlib.util.cache_from_source(str(source)))
+    compile_own(source.parent)
+    assert is_current(source, place)
+    place.unlink()
+    compile_own(source.parent)
+    assert not place.exists()
+    source.write_text("x = 1000\n", encoding="utf-8")
+    state_of_package.cache_clear()  # as in the next process
+    compile_own(source.parent)
+    assert is_current(source, place)

@@ -19,15 +19,6 @@ from grader.course.classroom.messages import JobResult
 from grader.course.classroom.store import ResultStatus, State
 from grader.runtime.model.errors import HarnessError
 
-
-@pytest.fixture(autouse=True)
-def _without_rubrics(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What files exercises ask for is no matter here."""
-    monkeypatch.setattr(
-        "grader.course.classroom.cluster.dispatcher.files_wanted", lambda task: ("velocity_publisher.py",)
-    )
-
-
 NAMES = ("ada", "bob", "cleo", "dan")
 
 

@@ -73,8 +73,11 @@ def exercise_of(file: str) -> Exercise:
 def report(file: str, traces: Mapping[str, Trace], texts: Mapping[str, str] | None) -> ExerciseReport:
     """Judge the exercise of a file, with the sources or, for None, without."""
     exercise = exercise_of(file)
-    submission = Submission("s", "s", Path("s"), "sha256:1", {n: StudentFile(n, n) for n in exercise.files})
-    return judge_exercise(exercise, traces, submission, texts)
+    return judge_exercise(exercise, traces, submission_to(exercise), texts)
+
+
+def submission_to(exercise: Exercise) -> Submission:
+    return Submission("s", "s", Path("s"), "sha256:1", {n: StudentFile(n, n) for n in exercise.files})
 
 
 def lost(given: ExerciseReport) -> list[Verdict]:

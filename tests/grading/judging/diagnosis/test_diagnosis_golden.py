@@ -21,12 +21,13 @@ from diagnosis_samples import (
     report,
     rows,
     spoilt,
+    submission_to,
 )
 from sample_folders import folders_in
 
-from grader.grading.judging import judge_run
-from grader.grading.judging.diagnosis import CAUSE_KEY, RULES
+from grader.grading.judging.diagnosis import CAUSE_KEY, RULES, cases_of, diagnose, rules_of
 from grader.grading.judging.diagnosis.rules import FIRST, Case, Rule, in_order
+from grader.grading.judging.judge_run import undiagnosed
 from grader.grading.model.exercise import Outcome
 from grader.grading.model.report import ExerciseReport, Verdict
 from grader.grading.rubrics.builtin import builtin_exercises
@@ -44,8 +45,13 @@ ENDED = [row for row in SLIPS if "fault" in row]
 
 
 def explained(row: Row, traces: Mapping[str, Trace]) -> ExerciseReport:
+    return report(row["file"], traces, texts_of(row))
+
+
+def texts_of(row: Row) -> dict[str, str]:
+    """Return the right files of the exercise of a row, with its spoilt one among them."""
     texts = {name: RIGHT[name] for name in exercise_of(row["file"]).files}
-    return report(row["file"], traces, {**texts, row["file"]: spoilt(row["file"], row["change"])})
+    return {**texts, row["file"]: spoilt(row["file"], row["change"])}
 
 
 def crash_traces(row: Row) -> dict[str, Trace]:
@@ -127,34 +133,35 @@ def test_a_cause_is_explained_once() -> None:
     assert [row["name"] for row in (*CRASHES, *BEHAVIOURS) if repeats(row)] == []
 
 
-def test_no_cause_is_found_in_the_words_of_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+def diagnosed(
+    row: Row, traces: Mapping[str, Trace], *, reasons: bool = True, more: tuple[Rule, ...] = ()
+) -> list[Verdict]:
+    """Return the verdicts of a row as reports have them, looked for without any reason, or with more rules before."""
+    exercise, texts = exercise_of(row["file"]), texts_of(row)
+    given = (exercise, traces, submission_to(exercise), texts)
+    verdicts, facts = undiagnosed(*given)
+    verdicts = verdicts if reasons else tuple(replace(v, reason="") for v in verdicts)
+    return [*diagnose(verdicts, cases_of(verdicts, *given, facts), (*more, *rules_of(exercise)), [])]
+
+
+def test_no_cause_is_found_in_the_words_of_a_reason() -> None:
     """Without any reason the hints and places are the same."""
     rows = [(row, traces_of(row)) for row in (*CRASHES, *BEHAVIOURS)]
     known = [[replace(v, reason="") for v in explained(row, traces).verdicts] for row, traces in rows]
-    build = judge_run._verdicts
-
-    def without_reasons(*given: Any) -> tuple[tuple[Verdict, ...], Mapping[str, object]]:
-        verdicts, facts = build(*given)
-        return tuple(replace(v, reason="") for v in verdicts), facts
-
-    monkeypatch.setattr(judge_run, "_verdicts", without_reasons)
-    found = [list(explained(row, traces).verdicts) for row, traces in rows]
+    found = [diagnosed(row, traces, reasons=False) for row, traces in rows]
     assert [row["name"] for (row, _), a, b in zip(rows, known, found, strict=True) if a != b] == []
 
 
-def test_a_rule_that_fails_is_logged_and_passed_over(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_rule_that_fails_is_logged_and_passed_over(caplog: pytest.LogCaptureFixture) -> None:
     """The others are looked for all the same; elsewhere in these tests the log makes the test fail."""
 
     def fails(case: Case) -> None:
         raise ValueError(case.criterion.id)
 
     row = CRASHES[0]
-    usual = lost(explained(row, crash_traces(row)))
-    monkeypatch.setattr("grader.grading.judging.diagnosis.RULES", (Rule("fails", fails, fault=None), *RULES))
-    assert lost(explained(row, crash_traces(row))) == usual
-    assert caplog.messages[0] == f"the rule fails failed on the criterion {usual[0].id}"
+    usual = explained(row, crash_traces(row))
+    assert diagnosed(row, crash_traces(row), more=(Rule("fails", fails, fault=None),)) == [*usual.verdicts]
+    assert caplog.messages[0] == f"the rule fails failed on the criterion {lost(usual)[0].id}"
 
 
 def test_every_rule_is_shown_to_work() -> None:
