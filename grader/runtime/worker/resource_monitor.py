@@ -73,7 +73,7 @@ class ResourceMonitor:
         students: The processes to monitor.
         limits: Limits of each process.
         budget: Real time that is left for the submission, if it is limited.
-        sockets: Looks at the sockets of the processes; by default, they share their network with nobody.
+        sockets: Looks at the sockets of the processes.
         own_s: Seconds of processor time that this process may use itself; as much as a node by default.
         kernel: Reads what processes use.
     """
@@ -84,7 +84,7 @@ class ResourceMonitor:
         limits: Limits,
         budget: Budget | None = None,
         *,
-        sockets: SocketMemory | None = None,
+        sockets: SocketMemory,
         own_s: int | None = None,
         kernel: Kernel = usage,
     ) -> None:
@@ -94,7 +94,7 @@ class ResourceMonitor:
         self._limits = limits
         self._budget = budget
         self._families: dict[int, set[int]] = {}
-        self._sockets = sockets or SocketMemory(shared=False)
+        self._sockets = sockets
         self._held: dict[int, KernelMemory] = {}
         self._last_pid = ""
         self._started_ns = time.monotonic_ns()

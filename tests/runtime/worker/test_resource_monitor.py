@@ -44,9 +44,24 @@ def processes(*students: Watched) -> list[NodeProcess]:
     return cast("list[NodeProcess]", list(students))
 
 
+class QuietSockets(SocketMemory):
+    """Knows of no connections, whatever else this machine does."""
+
+    def may_be_much(self) -> tuple[bool, bool]:
+        return False, False
+
+
+def guarding(
+    kernel: QuietKernel, *students: Watched, limits: Limits | None = None, budget: Budget | None = None
+) -> ResourceMonitor:
+    """Return a monitor that knows nothing of the machine but what a kernel tells."""
+    sockets = QuietSockets(shared=False)
+    return ResourceMonitor(processes(*students), limits or Limits(), budget, sockets=sockets, kernel=kernel)
+
+
 def watch(kernel: QuietKernel, student: Watched, limits: Limits, budget: Budget | None = None) -> ResourceMonitor:
     """Look again and again until a limit is reached."""
-    guard = ResourceMonitor(processes(student), limits, budget, kernel=kernel)
+    guard = guarding(kernel, student, limits=limits, budget=budget)
     while not student.stopped:
         guard.poll()
     return guard
@@ -75,7 +90,7 @@ def test_within_its_limits_nobody_is_ended() -> None:
     kernel, student = QuietKernel(), Watched()
     kernel.told[student.process.pid] = Usage(200 * MIB, 6 * NS_PER_S, 20)
     limits = Limits(memory_bytes=200 * MIB, processor_ns=6 * NS_PER_S)
-    ResourceMonitor(processes(student), limits, kernel=kernel).poll()
+    guarding(kernel, student, limits=limits).poll()
     assert not student.stopped
     assert (student.most_bytes, student.most_threads) == (200 * MIB, 20)
 
@@ -83,7 +98,7 @@ def test_within_its_limits_nobody_is_ended() -> None:
 def test_messages_that_fill_the_worker_end_the_nodes() -> None:
     """The grader's own memory is not the student's to fill."""
     kernel, students = QuietKernel(), [Watched(4_000_000), Watched(4_000_001)]
-    guard = ResourceMonitor(processes(*students), Limits(), kernel=kernel)
+    guard = guarding(kernel, *students)
     kernel.told[os.getpid()] = Usage(memory_bytes=module.UNREAD_BYTES + MIB)
     guard.poll()
     assert {s.stopped for s in students} == {"stopped at 224 MiB of messages in transit at once"}
@@ -114,7 +129,7 @@ def test_a_budget_that_is_used_up_ends_the_nodes() -> None:
 def test_the_workers_own_processor_time_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     """It goes to what the nodes send."""
     student = Watched()
-    guard = ResourceMonitor(processes(student), Limits(processor_ns=NS_PER_S), kernel=QuietKernel())
+    guard = guarding(QuietKernel(), student, limits=Limits(processor_ns=NS_PER_S))
     monkeypatch.setattr(time, "process_time_ns", lambda: 10_000 * NS_PER_S)
     guard.poll()
     assert student.stopped == "stopped at 1 s of processor time to receive what was sent"
@@ -125,23 +140,16 @@ def test_the_guard_ends_with_its_block() -> None:
     before = threading.active_count()
     kernel, student = QuietKernel(), Watched()
     kernel.told[student.process.pid] = Usage(halted=True)
-    with ResourceMonitor(processes(student), Limits(), kernel=kernel):
+    with guarding(kernel, student):
         assert threading.active_count() == before + 1
         assert student.held.wait(30)
     assert threading.active_count() == before
 
 
-class QuietSockets(SocketMemory):
-    """Knows of no connections, whatever else this machine does."""
-
-    def may_be_much(self) -> tuple[bool, bool]:
-        return False, False
-
-
 def test_looks_are_rare_while_nothing_grows() -> None:
     """They cost processor time; memory that begins to grow is looked at often again."""
     kernel, student, intervals = QuietKernel(), Watched(), [1]
-    guard = ResourceMonitor(processes(student), Limits(), sockets=QuietSockets(shared=False), kernel=kernel)
+    guard = guarding(kernel, student)
     for mib in (*[100] * 5, 130, 160, *[160] * 4):
         kernel.told[student.process.pid] = Usage(memory_bytes=mib * MIB)
         intervals.append(guard.poll(intervals[-1]))
@@ -167,7 +175,7 @@ class StartingKernel(QuietKernel):
 def test_children_are_looked_for_only_if_something_was_started() -> None:
     """Searching all processes of a machine takes long; where the kernel does not tell, each time is needed."""
     kernel = StartingKernel("7", "7", "7", "8", "8", "", "", "9")
-    guard = ResourceMonitor(processes(Watched()), Limits(), kernel=kernel)
+    guard = guarding(kernel, Watched())
     for _ in range(7 * module.SEARCH_EVERY):
         guard.poll()
     assert kernel.last == ["9"]
