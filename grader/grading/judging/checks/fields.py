@@ -187,7 +187,8 @@ class InRange:
         kept = [(name, pick) for name, pick, edge in _EXTREMES if getattr(self, edge) is not None]
         ends = [(m.t_ns, {name: pick(v) for name, pick in kept}) for m in messages if (v := self.numbers(m.value))]
         plot = Plot(self.topic, rules={name: self.rule for name, _ in kept})
-        return Drawing(panels=tuple(value_panels(plot, ends, f"{self.field} on {self.topic}")))
+        panels = tuple(value_panels(plot, ends, f"{self.field} on {self.topic}"))
+        return Drawing(panels=panels, title=f"The numbers in {self.field} of {self.topic}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from check_instances import INSTANCES
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from nodes import (
     BATTERY,
@@ -197,6 +197,7 @@ def test_no_recording_makes_a_check_raise(observations: list[Any], clock: ClockK
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(st.lists(OBSERVATIONS, max_size=25), st.integers(0, 30 * NS_PER_S))
+@example([Message(0, "/temperature", "std_msgs/msg/Float64MultiArray", {"data": [1.0, 2.0]})], NS_PER_S)
 def test_every_recording_gives_every_check_a_chart_that_a_page_can_hold_or_none(
     observations: list[Any], stop_ns: int
 ) -> None:
