@@ -53,7 +53,9 @@ if TYPE_CHECKING:
 
     from grader.grading.app.keeping import EvidenceWriter
     from grader.grading.app.request import GradeRequest
+    from grader.grading.model.exercise import Exercise
     from grader.grading.model.report import Report
+    from grader.grading.model.run import Run
     from grader.grading.reporting.audience import Readers
     from grader.grading.reporting.delivery import Output
     from grader.runtime.session import RecordingSession
@@ -69,7 +71,17 @@ if TYPE_CHECKING:
 
         def opened(self, request: GradeRequest, progress: Progress, /) -> AbstractContextManager[RecordingSession]: ...
 
-        def grade(self, *given: Any, **options: Any) -> Report: ...
+        def grade(  # noqa: PLR0913  as in that module
+            self,
+            request: GradeRequest,
+            progress: Progress,
+            on_recorded: Callable[[Run, Sequence[Exercise]], None] | None,
+            on_partial_report: Callable[[Report], None] | None,
+            /,
+            *,
+            pictures: bool,
+            session: RecordingSession | None,
+        ) -> Report: ...
 
 
 _EPILOG = (
