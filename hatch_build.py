@@ -101,7 +101,7 @@ def write_man_pages(root: Path, folder: Path, version: str) -> list[Path]:
         command.short_help = command.help.partition("\n")[0].rstrip(".")
         for word, subcommand in below(command).items():
             write(subcommand, f"{name} {word}")
-        page = generate_man_page(click.Context(command, info_name=name), version)
+        page = generate_man_page(click.Context(command, info_name=name, **app.context_settings), version)
         (folder / f"{name.replace(' ', '-')}.1").write_text(page, encoding="utf-8")
 
     shutil.rmtree(folder, ignore_errors=True)

@@ -77,7 +77,8 @@ def _subcommands(path: str, group: click.Group) -> Iterator[str]:
 
 
 def _sections(path: str, command: click.Command) -> Iterator[str]:
-    context = click.Context(command, info_name=path)
+    # A command keeps the help option that it has in its first context
+    context = click.Context(command, info_name=path, **app.context_settings)
     level = "##" if path.count(" ") < 2 else "###"
     usage = " ".join([path, *command.collect_usage_pieces(context)])
     yield f"\n{level} `{path}`\n\n    {usage}\n\n{_described(command)}\n"

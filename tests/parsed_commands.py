@@ -33,4 +33,6 @@ def parsed(words: list[str]) -> None:
     # In a sentence, `grade batch` and `grade rubric` name a command.
     if [word for word in words if not word.startswith("-")]:
         with suppress(click.exceptions.Exit):  # `--help`
-            command.make_context("grade", [_STAND_INS.get(word, word) for word in words])
+            # A command keeps the help option that it has in its first context
+            settings = {**app.context_settings, **command.context_settings}
+            command.make_context("grade", [_STAND_INS.get(word, word) for word in words], **settings)

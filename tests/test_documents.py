@@ -15,6 +15,7 @@ from pathlib import Path
 import click
 import generated
 import pytest
+from click.testing import CliRunner
 from parsed_commands import parsed
 from places import ROOT
 from sample_folders import GOLDEN, collections
@@ -201,6 +202,14 @@ def test_an_old_part_is_noticed() -> None:
     assert "old\n" not in new
     assert new.startswith("# Commands\n\n<!-- generated: commands -->\n\n## `grade`\n")
     assert new.endswith("\n\n<!-- end of generated: commands -->\n\nMore.\n")
+
+
+@pytest.mark.parametrize("words", [["-h"], ["batch", "-h"], ["rubric", "check", "-h"]])
+def test_commands_that_were_described_and_parsed_are_as_before(words: list[str]) -> None:
+    """In one process: a command of click keeps the help option of the first context that it is seen in."""
+    generated.commands()
+    parsed(shlex.split("batch --help"))
+    assert CliRunner().invoke(app, words, prog_name="grade").exit_code == 0
 
 
 def test_the_site_names_every_command_option_check_and_key() -> None:
