@@ -1,4 +1,4 @@
-"""The studio: which traces are final when, and what is recorded again on the wall clock."""
+"""The session: which traces are final when, and what is recorded again on the wall clock."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture(scope="module")
-def studio() -> Iterator[RecordingSession]:
+def session() -> Iterator[RecordingSession]:
     """The strongest sandbox of this machine, with warm workers."""
     from hostile import staging
 
     from grader.runtime.session import open_session
 
-    with open_session("auto") as studio:
-        yield staging(studio)
+    with open_session("auto") as session:
+        yield staging(session)
 
 
 @pytest.fixture(scope="module")
@@ -35,8 +35,8 @@ def one_worker() -> Iterator[RecordingSession]:
 
     from grader.runtime.session import open_session
 
-    with open_session("auto", 1) as studio:
-        yield staging(studio)
+    with open_session("auto", 1) as session:
+        yield staging(session)
 
 
 @pytest.fixture

@@ -85,12 +85,12 @@ def hostile(harm: str = "", later: str = "", before: str = "") -> str:
     )
 
 
-def staging(studio: RecordingSession) -> RecordingSession:
-    """Have a studio copy what is recorded into its own folder, because workers see no other."""
-    each = studio.recorder.each
+def staging(session: RecordingSession) -> RecordingSession:
+    """Have a session copy what is recorded into its own folder, because workers see no other."""
+    each = session.recorder.each
 
     def each_staged(jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
-        root = Path(tempfile.mkdtemp(dir=studio.folder))
+        root = Path(tempfile.mkdtemp(dir=session.folder))
         for number, job in enumerate(jobs):
             shutil.copytree(job.plan.root, root / str(number))
         root.chmod(0o755)
@@ -98,8 +98,8 @@ def staging(studio: RecordingSession) -> RecordingSession:
             [replace(j, plan=replace(j.plan, root=str(root / str(n)))) for n, j in enumerate(jobs)], progress
         )
 
-    studio.recorder.each = each_staged  # type: ignore[method-assign]
-    return studio
+    session.recorder.each = each_staged  # type: ignore[method-assign]
+    return session
 
 
 def planned(folder: Path, *programs: str, limits: Limits | None = None, **fields: Any) -> Plan:
@@ -124,10 +124,10 @@ def planned(folder: Path, *programs: str, limits: Limits | None = None, **fields
     return Plan(**{**usual, **fields})
 
 
-def record(studio: RecordingSession, folder: Path, *programs: str, **fields: Any) -> Trace:
+def record(session: RecordingSession, folder: Path, *programs: str, **fields: Any) -> Trace:
     """Record programs together, as `planned` says."""
     plan = planned(folder, *programs, **fields)
-    return studio.recorder.record([Job("hostile", plan)], lambda step: None)[0]
+    return session.recorder.record([Job("hostile", plan)], lambda step: None)[0]
 
 
 def printed(trace: Trace) -> list[str]:

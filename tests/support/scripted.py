@@ -173,7 +173,7 @@ class ScriptedStudent:
         return self.workload
 
     def tell(self, answer: dict[str, Any]) -> None:
-        """Take an answer of the conductor."""
+        """Take an answer of the runner."""
         self._discovery = "match" in answer
         if not self._discovery:
             self._answer = answer

@@ -120,12 +120,12 @@ ASKS_MORE = "New subscription discovered on topic '/count', requesting incompati
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     tmp_path.chmod(0o755)
 
     def run_all(*programs: str, clock: str, **fields: Any) -> Trace:
         whole = [BEFORE + textwrap.dedent(program) for program in programs]
-        trace = record(studio, tmp_path / "s", *whole, clock=clock, **{"duration_ns": 4 * NS_PER_S, **fields})
+        trace = record(session, tmp_path / "s", *whole, clock=clock, **{"duration_ns": 4 * NS_PER_S, **fields})
         assert (trace.harness_problem, trace.incomplete) == ("", False)
         assert [note for note in trace.notes if "in time" in note or "not seen" in note] == []
         return trace

@@ -59,11 +59,11 @@ print("all tried", flush=True)
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     tmp_path.chmod(0o755)
 
     def run_one(program: str, clock: str = "virtual") -> Trace:
-        trace = record(studio, tmp_path / "s", textwrap.dedent(program), clock=clock, duration_ns=4 * NS_PER_S)
+        trace = record(session, tmp_path / "s", textwrap.dedent(program), clock=clock, duration_ns=4 * NS_PER_S)
         assert trace.harness_problem == ""
         return trace
 

@@ -125,10 +125,10 @@ def said(trace: Trace) -> str:
 
 @pytest.mark.parametrize(("entity", "writes", "spin"), CASES)
 def test_an_exception_surfaces_as_on_a_real_clock(
-    studio: RecordingSession, tmp_path: Path, entity: str, writes: str, spin: str
+    session: RecordingSession, tmp_path: Path, entity: str, writes: str, spin: str
 ) -> None:
     """What each says was counted with plain Python on an idle machine, where it is what comes most often."""
     made, silent, loud = ENTITIES[entity]
     program = PROGRAM.format(entity=made, writes=WRITES[writes], spin=SPINS[spin])
-    trace: Any = record(studio, tmp_path / "s", program, duration_ns=4 * NS_PER_S)
+    trace: Any = record(session, tmp_path / "s", program, duration_ns=4 * NS_PER_S)
     assert said(trace) == (silent if writes == "nothing" else loud)

@@ -38,21 +38,21 @@ def marks(number: int, name: str) -> list[Any]:
     return [pytest.mark.long] if number % SHARE and name not in ALWAYS else []
 
 
-def recorded(studio: RecordingSession, folder: Path, name: str, clock: str) -> Told:
+def recorded(session: RecordingSession, folder: Path, name: str, clock: str) -> Told:
     """Return what a program does beside its partner."""
     for each in (folder, folder.parent):
         each.chmod(0o755)
     texts = [path.read_text(encoding="utf-8") for path in (PROGRAMS / f"{name}.py", PARTNER)]
-    trace = record(studio, folder / "s", *texts, clock=clock, duration_ns=5 * NS_PER_S)
+    trace = record(session, folder / "s", *texts, clock=clock, duration_ns=5 * NS_PER_S)
     assert (trace.harness_problem, trace.clock.value) == ("", clock)
     assert trace.clock_reason == "" or clock == "wall"
     return told(trace)
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks(n, name)) for n, name in enumerate(NAMES)])
-def test_what_a_program_does_in_virtual_time(studio: RecordingSession, tmp_path: Path, name: str) -> None:
+def test_what_a_program_does_in_virtual_time(session: RecordingSession, tmp_path: Path, name: str) -> None:
     """As it is written down; and virtual time suits it."""
-    found = recorded(studio, tmp_path, name, "virtual")
+    found = recorded(session, tmp_path, name, "virtual")
     known: dict[str, Any] = json.loads(GOLDEN.read_text(encoding="utf-8")) if GOLDEN.exists() else {}
     if "UPDATE_GOLDEN" in os.environ:
         text = json.dumps(dict(sorted({**known, name: found}.items())), indent=1, ensure_ascii=False)
@@ -63,13 +63,13 @@ def test_what_a_program_does_in_virtual_time(studio: RecordingSession, tmp_path:
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", NAMES)
-def test_what_a_program_does_on_the_wall_clock(studio: RecordingSession, tmp_path: Path, name: str) -> None:
+def test_what_a_program_does_on_the_wall_clock(session: RecordingSession, tmp_path: Path, name: str) -> None:
     """The same, as far as it comes, in one of three recordings: a busy machine can make clocks differ, never agree."""
     known = json.loads(GOLDEN.read_text(encoding="utf-8"))
     found: list[str] = []
     for number in range(3):
         (tmp_path / str(number)).mkdir()
-        found = differences(known[name], recorded(studio, tmp_path / str(number), name, "wall"))
+        found = differences(known[name], recorded(session, tmp_path / str(number), name, "wall"))
         if not found:
             return
     assert found == []

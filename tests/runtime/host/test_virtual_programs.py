@@ -313,13 +313,13 @@ EACH_LOOK = ("coroutines_that_wait_for_each_other", "coroutine_that_ends_a_spin"
         for name, program in PROGRAMS.items()
     ],
 )
-def test_a_program_says_the_same_on_both_clocks(studio: RecordingSession, tmp_path: Path, program: str) -> None:
+def test_a_program_says_the_same_on_both_clocks(session: RecordingSession, tmp_path: Path, program: str) -> None:
     """The same lines, at the same distances from the first one; the wall clock starts later and so ends earlier."""
     tmp_path.chmod(0o755)
     begin = BEFORE + "rclpy.init()\nnode = Node('node')\n"
     whole: Any = [begin + textwrap.dedent(program), BEFORE + OTHER]
     virtual, again, wall = (
-        said(record(studio, tmp_path / "s", *whole, clock=clock, duration_ns=4 * NS_PER_S))
+        said(record(session, tmp_path / "s", *whole, clock=clock, duration_ns=4 * NS_PER_S))
         for clock in ("virtual", "virtual", "wall")
     )
     assert virtual == again

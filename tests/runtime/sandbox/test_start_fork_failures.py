@@ -159,11 +159,11 @@ def test_each_call_that_sets_up_a_fork_ends_it_when_it_fails(sandbox: Sandbox) -
     assert {"w 1", "s 20", *(f"{role} {most}" for role, most in told["beside"].items())} <= set(results)
 
 
-def test_a_fork_that_cannot_be_sandboxed_is_no_fault_of_the_node(studio: RecordingSession, tmp_path: Path) -> None:
+def test_a_fork_that_cannot_be_sandboxed_is_no_fault_of_the_node(session: RecordingSession, tmp_path: Path) -> None:
     """Nothing is judged; the reason is the grader's, and the next recording is as usual."""
     tmp_path.chmod(0o755)
     impossible = replace(Limits(), file_bytes="much")  # type: ignore[arg-type]  # no number for the kernel
-    trace = record(studio, tmp_path / "s", hostile(), limits=impossible)
+    trace = record(session, tmp_path / "s", hostile(), limits=impossible)
     assert "a student's process did not start" in trace.harness_problem
     assert trace.observations == ()
-    assert len(record(studio, tmp_path / "s", hostile()).messages("/cmd_vel")) == 199
+    assert len(record(session, tmp_path / "s", hostile()).messages("/cmd_vel")) == 199

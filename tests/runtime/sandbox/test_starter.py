@@ -123,9 +123,9 @@ def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Pa
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     def run_one(source: str, **fields: Any) -> Trace:
-        return record(studio, tmp_path / "s", source, duration_ns=2 * S, **fields)
+        return record(session, tmp_path / "s", source, duration_ns=2 * S, **fields)
 
     tmp_path.chmod(0o755)
     return run_one
@@ -177,17 +177,17 @@ def test_a_forked_process_is_in_the_sandbox_of_an_executed_one(sandbox: Sandbox)
 
 
 @pytest.mark.parametrize("clock", ["virtual", "wall"])
-def test_a_node_has_the_same_surroundings_in_both_ways(studio: RecordingSession, tmp_path: Path, clock: str) -> None:
+def test_a_node_has_the_same_surroundings_in_both_ways(session: RecordingSession, tmp_path: Path, clock: str) -> None:
     """A node that is forked and one that is executed, each with the host in its process.
 
     They differ in the placeholder; the number of the connection to the grader; whether the empty input could be written
     to; the session, which a forked process leads; and files and threads of LTTng, which the starter keeps to itself.
     """
     tmp_path.chmod(0o755)
-    with open_session(studio.isolation.name, 1, executes=True) as other:
+    with open_session(session.isolation.name, 1, executes=True) as other:
         found, expected = (
-            json.loads("".join(printed(record(session, tmp_path / way, INSPECT, duration_ns=S, clock=clock))))
-            for way, session in (("forked", studio), ("executed", staging(other)))
+            json.loads("".join(printed(record(each, tmp_path / way, INSPECT, duration_ns=S, clock=clock))))
+            for way, each in (("forked", session), ("executed", staging(other)))
         )
     for surroundings in (found, expected):
         surroundings["folders"]["/dev/shm"] = [

@@ -140,13 +140,13 @@ Record = Callable[..., Trace]
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Record:
+def run(session: RecordingSession, tmp_path: Path) -> Record:
     tmp_path.chmod(0o755)
 
     def run_one(program: str, *, clock: str = AUTO, work: float = 0.02, **fields: Any) -> Trace:
         whole = BEFORE.replace("{work}", library_call(work).partition("\n")[2]) + textwrap.dedent(program)
         plan = planned(tmp_path / "s", whole, duration_ns=3 * NS_PER_S, first_message_on="/pace", **fields)
-        return studio.record({"": Job("pace", plan)}, clock, lambda step: None)[""]
+        return session.record({"": Job("pace", plan)}, clock, lambda step: None)[""]
 
     return run_one
 

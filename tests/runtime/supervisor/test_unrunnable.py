@@ -39,9 +39,9 @@ def _plan(folder: Path, *names: str) -> Plan:
 
 
 @pytest.mark.parametrize("name", BROKEN | INERT)
-def test_the_trace_is_the_one_that_a_run_records(name: str, studio: RecordingSession, tmp_path: Path) -> None:
+def test_the_trace_is_the_one_that_a_run_records(name: str, session: RecordingSession, tmp_path: Path) -> None:
     """All but the text that Python prints, which the report takes from the fault."""
-    run = record(studio, tmp_path / "in", (BROKEN | INERT)[name])
+    run = record(session, tmp_path / "in", (BROKEN | INERT)[name])
     known = trace_without_run(_plan(tmp_path / "in", "a.py"))
     assert known is not None
     assert known.observations == tuple(o for o in run.observations if not isinstance(o, OutputLine))

@@ -78,7 +78,7 @@ def test_large_and_many_files_are_left_out(tmp_path: Path) -> None:
     "how", [{}, {"clock": "wall"}, {"clock": "wall", "bare": True}], ids=["virtual", "wall", "bare"]
 )
 def test_a_program_reads_and_writes_beside_itself(
-    studio: RecordingSession, tmp_path: Path, how: dict[str, Any]
+    session: RecordingSession, tmp_path: Path, how: dict[str, Any]
 ) -> None:
     """On every clock; the files that were handed in stay as they are."""
     pytest.importorskip("rclpy")
@@ -89,7 +89,7 @@ def test_a_program_reads_and_writes_beside_itself(
     write(root, "settings.txt", "deep/table.csv")
     for path in (root, *root.rglob("*")):
         path.chmod(0o755 if path.is_dir() else 0o644)
-    trace = record(studio, root, PROGRAM, duration_ns=60 * NS_PER_S, **how)  # it ends by itself
+    trace = record(session, root, PROGRAM, duration_ns=60 * NS_PER_S, **how)  # it ends by itself
     lines = [o.text for o in trace.observations if isinstance(o, OutputLine)]
     assert lines[:2] == ["read text", "30 text ['a.py', 'deep', 'settings.txt']"]
     assert (root / "settings.txt").read_text() == "text"

@@ -24,10 +24,10 @@ SECOND_NS = 1_000_000_000
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     """Record a publisher that does something more when it is made, for a second."""
     tmp_path.chmod(0o755)
-    return lambda harm, clock: record(studio, tmp_path / "s", hostile(harm), clock=clock, duration_ns=5 * SECOND_NS)
+    return lambda harm, clock: record(session, tmp_path / "s", hostile(harm), clock=clock, duration_ns=5 * SECOND_NS)
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
@@ -79,7 +79,7 @@ def test_no_variable_and_no_option_tells_the_token(run: Callable[..., Trace], cl
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
-def test_each_record_names_its_own_place(studio: RecordingSession, tmp_path: Path, clock: str) -> None:
+def test_each_record_names_its_own_place(session: RecordingSession, tmp_path: Path, clock: str) -> None:
     """Also of functions that are the same in two files, in a loop, and of one that rclpy is told to leave out."""
     tmp_path.chmod(0o755)
     says = "def say(logger, text):\n    logger.info(text)\n"
@@ -101,7 +101,7 @@ def test_each_record_names_its_own_place(studio: RecordingSession, tmp_path: Pat
         b.say(logger, "left out")
     """
     programs = (textwrap.dedent(program), says, says)  # they end by themselves
-    trace = record(studio, tmp_path / "s", *programs, clock=clock, duration_ns=60 * SECOND_NS)
+    trace = record(session, tmp_path / "s", *programs, clock=clock, duration_ns=60 * SECOND_NS)
     found = [(r.severity, r.text, r.file, r.line) for r in trace.records() if r.process == "a.py"]
     each = [
         [

@@ -83,14 +83,14 @@ rclpy.spin(node)
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     tmp_path.chmod(0o755)
 
     def run_all(*programs: str, clock: str, **fields: Any) -> Trace:
         whole = [BEFORE + textwrap.dedent(program) for program in programs]
         # Two seconds from the first message on: a busy machine takes long to get there.
         usual: dict[str, Any] = {"duration_ns": 2 * NS_PER_S, "first_message_on": "/count"}
-        trace = record(studio, tmp_path / "s", *whole, clock=clock, **{**usual, **fields})
+        trace = record(session, tmp_path / "s", *whole, clock=clock, **{**usual, **fields})
         assert trace.harness_problem == ""
         return trace
 

@@ -71,10 +71,10 @@ if 20 <= self.count < 30:
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     tmp_path.chmod(0o755)
     numbers = itertools.count()
-    return lambda *programs, **fields: record(studio, tmp_path / f"s{next(numbers)}", *programs, **fields)
+    return lambda *programs, **fields: record(session, tmp_path / f"s{next(numbers)}", *programs, **fields)
 
 
 def sender(packets: list[bytes]) -> str:

@@ -64,12 +64,12 @@ def numbers(trace: Trace, topic: str = "/words") -> list[int]:
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     tmp_path.chmod(0o755)
 
     def run_all(*programs: str, **fields: Any) -> Trace:
         whole = [BEFORE + textwrap.dedent(program) for program in programs]
-        trace = record(studio, tmp_path / "s", *whole, **{"duration_ns": 3 * NS_PER_S, **fields})
+        trace = record(session, tmp_path / "s", *whole, **{"duration_ns": 3 * NS_PER_S, **fields})
         assert trace.harness_problem == ""
         return trace
 

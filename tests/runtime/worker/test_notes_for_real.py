@@ -40,10 +40,10 @@ for report in (
 
 
 @pytest.mark.parametrize("clock", ["virtual", "wall"])
-def test_no_sentence_of_a_process_becomes_the_graders(studio: RecordingSession, tmp_path: Path, clock: str) -> None:
+def test_no_sentence_of_a_process_becomes_the_graders(session: RecordingSession, tmp_path: Path, clock: str) -> None:
     """Neither as a note nor as a fault; places that the submission does not have are left out."""
     tmp_path.chmod(0o755)
-    trace = record(studio, tmp_path / "s", hostile(SAYS), clock=clock, duration_ns=5 * SECOND_NS)
+    trace = record(session, tmp_path / "s", hostile(SAYS), clock=clock, duration_ns=5 * SECOND_NS)
     assert SENTENCE not in repr(trace.notes)
     assert not any("nothing starts" in note or "beside it" in note for note in trace.notes)
     assert trace.starts == (Start("a.py", "a.py", StartWay.SCRIPT),)
@@ -54,11 +54,11 @@ def test_no_sentence_of_a_process_becomes_the_graders(studio: RecordingSession, 
 
 
 @pytest.mark.parametrize("clock", ["virtual", "wall"])
-def test_a_thread_that_raises_ends_no_node(studio: RecordingSession, tmp_path: Path, clock: str) -> None:
+def test_a_thread_that_raises_ends_no_node(session: RecordingSession, tmp_path: Path, clock: str) -> None:
     """Its exception is a fault in its own words, and the node goes on."""
     tmp_path.chmod(0o755)
     harm = "threading.Thread(target=lambda: [].pop()).start()"
-    trace = record(studio, tmp_path / "s", hostile(harm), clock=clock, duration_ns=5 * SECOND_NS)
+    trace = record(session, tmp_path / "s", hostile(harm), clock=clock, duration_ns=5 * SECOND_NS)
     (fault,) = trace.faults()
     assert (fault.kind, fault.text, fault.file) == (FaultKind.EXCEPTION, "IndexError: pop from empty list", "a.py")
     assert trace.messages("/cmd_vel")[-1].t_ns > SECOND_NS // 2

@@ -27,14 +27,14 @@ REST = "the rest was ignored"
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     """Record a program that does harm at its 40th tick."""
     tmp_path.chmod(0o755)
 
     def run_one(harm: str, limits: Limits | None = None, *, busy: bool = False, **fields: Any) -> Trace:
         folded = "\n".join(f"    {line}" for line in harm.splitlines())
         trace = record(
-            studio, tmp_path / "s", hostile(later=f"if self.count == 40:\n{folded}"), limits=limits, **fields
+            session, tmp_path / "s", hostile(later=f"if self.count == 40:\n{folded}"), limits=limits, **fields
         )
         assert not trace.harness_problem or (busy and "too busy" in trace.harness_problem)
         return trace

@@ -96,10 +96,10 @@ def test_installed_types_are_found(name: str) -> None:
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     """Record programs together."""
     tmp_path.chmod(0o755)
-    return lambda *programs, **fields: record(studio, tmp_path / "s", *programs, **fields)
+    return lambda *programs, **fields: record(session, tmp_path / "s", *programs, **fields)
 
 
 FORGED = ["//bad__name/", "/1", "/a//b", "/a/", "/" + "a" * 250]

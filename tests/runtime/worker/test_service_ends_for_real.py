@@ -37,7 +37,7 @@ TEXT = "std_msgs/msg/String"
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     """Record some of the nodes beside this file, for so many seconds."""
     tmp_path.chmod(0o755)
 
@@ -48,7 +48,7 @@ def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
         submission = stage_submission(str(NODES), files, tmp_path / "s")
         asked = Scenario("alone", files, Span(seconds * NS_PER_S), stimuli, **fields)
         plan = plan_scenario("services", asked, submission, seed=1, recordings={}, clock=clock)
-        traces = [studio.record({"t": Job("t", plan)}, clock, lambda _: None)["t"] for _ in range(times)]
+        traces = [session.record({"t": Job("t", plan)}, clock, lambda _: None)["t"] for _ in range(times)]
         assert [trace.harness_problem for trace in traces] == [""] * times
         assert len({json.dumps(trace_to_json(trace)) for trace in traces}) == 1
         return traces[0]

@@ -178,14 +178,14 @@ for _ in range(50):
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     tmp_path.chmod(0o755)
 
     def run_one(harm: str, *others: str, **fields: Any) -> Trace:
         indented = "\n".join(f"    {line}" for line in harm.splitlines())
         harms = f"{KEEPS}\ndef harm():\n{indented}\n"
         program = hostile(before=harms, later="if self.count == 40: harm()")
-        return record(studio, tmp_path / "s", program, *others, clock="wall", **fields)
+        return record(session, tmp_path / "s", program, *others, clock="wall", **fields)
 
     return run_one
 

@@ -1,4 +1,4 @@
-"""The conductor before scripted processes: what comes first inside an instant, where time jumps, where it ends."""
+"""The runner before scripted processes: what comes first inside an instant, where time jumps, where it ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The conductor of the wall clock, on a clock that the tests advance: what it writes down, and when it says nothing."""
+"""The runner of the wall clock, on a clock that the tests advance: what it writes down, and when it says nothing."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Run:
 
 
 def publisher(topic: str, *, every_ms: int, first_ms: int = 0, interface: str = FLOAT) -> Behaviour:
-    """A program that publishes on a topic in the loops of the conductor, one a millisecond."""
+    """A program that publishes on a topic in the loops of the runner, one a millisecond."""
 
     def program(me: ScriptedStudent, world: World) -> Program:
         world.have(me.name, claim("publisher", topic, interface))
@@ -79,7 +79,7 @@ def quiet(me: ScriptedStudent, world: World) -> Program:
 
 
 def test_messages_get_the_time_at_which_they_came() -> None:
-    """To the millisecond in which the conductor looks."""
+    """To the millisecond in which the runner looks."""
     run = Run(publisher("/cmd_vel", every_ms=50))
     assert [m.t_ns // MS for m in run.trace.messages("/cmd_vel")] == list(range(0, 1000, 50))
     assert (run.trace.clock, run.trace.stop_ns, run.trace.harness_problem) == (ClockKind.WALL, 1000 * MS, "")

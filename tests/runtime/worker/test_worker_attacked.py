@@ -69,12 +69,12 @@ class Listener(Node):
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     """Record programs together; whatever they do, the grader does not fail."""
     tmp_path.chmod(0o755)
 
     def run_all(*programs: str, **fields: Any) -> Trace:
-        trace = record(studio, tmp_path / "s", *programs, **fields)
+        trace = record(session, tmp_path / "s", *programs, **fields)
         assert trace.harness_problem == ""
         return trace
 
@@ -292,7 +292,7 @@ def test_a_flood_of_giants_leaves_the_grader_standing(run: Callable[..., Trace])
 
 
 @pytest.mark.parametrize("clock", ["wall", "virtual"])
-def test_nobody_is_waited_for_in_another_domain(studio: RecordingSession, tmp_path: Path, clock: str) -> None:
+def test_nobody_is_waited_for_in_another_domain(session: RecordingSession, tmp_path: Path, clock: str) -> None:
     """A message waits for its subscription to be matched; where the grader is not, there will be none."""
     tmp_path.chmod(0o755)
     elsewhere = """
@@ -305,7 +305,7 @@ def test_nobody_is_waited_for_in_another_domain(studio: RecordingSession, tmp_pa
     """
     later = "if self.count == 3:\n    for _, publisher in self.others: publisher.publish(Twist())"
     program = hostile(harm=elsewhere, later=later)
-    trace = record(studio, tmp_path / "s", program, clock=clock, duration_ns=5 * NS_PER_S, first_message_on="/cmd_vel")
+    trace = record(session, tmp_path / "s", program, clock=clock, duration_ns=5 * NS_PER_S, first_message_on="/cmd_vel")
     assert len(trace.messages("/cmd_vel")) > 10, "three waits take longer than the recording"
     assert [note.partition(" is in the ROS domain ")[2][:1] for note in trace.notes] == ["1", "2", "3"]
     assert not trace.incomplete
@@ -407,7 +407,7 @@ def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path: Path) -> None:
     """Its scenario is recorded again by another worker; what a killed one had is gone with it."""
     tmp_path.chmod(0o755)
     with open_session("auto") as opened:
-        studio = staging(opened)
+        session = staging(opened)
         killed = threading.Event()
 
         def kill() -> None:
@@ -418,7 +418,7 @@ def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path: Path) -> None:
 
         killer = threading.Thread(target=kill)
         killer.start()
-        trace = record(studio, tmp_path / "s", hostile())
+        trace = record(session, tmp_path / "s", hostile())
         killer.join()
     assert killed.is_set()
     assert trace.harness_problem == ""
@@ -429,7 +429,7 @@ def test_a_worker_that_is_always_killed_decides_nothing(tmp_path: Path) -> None:
     """No trace, no marks: a problem of ours."""
     tmp_path.chmod(0o755)
     with open_session("auto") as opened:
-        studio = staging(opened)
+        session = staging(opened)
         done = threading.Event()
 
         def kill() -> None:
@@ -440,7 +440,7 @@ def test_a_worker_that_is_always_killed_decides_nothing(tmp_path: Path) -> None:
 
         killer = threading.Thread(target=kill)
         killer.start()
-        trace = record(studio, tmp_path / "s", hostile(later="time.sleep(0.01)"))
+        trace = record(session, tmp_path / "s", hostile(later="time.sleep(0.01)"))
         done.set()
         killer.join()
     assert trace.harness_problem.startswith("worker: expected a trace of alone, found none")

@@ -46,25 +46,25 @@ def limits(trace: Trace) -> list[str]:
     return [mark.detail for mark in trace.marks("limit")]
 
 
-def test_a_node_that_hears_itself_goes_on(studio: RecordingSession, tmp_path: Path) -> None:
+def test_a_node_that_hears_itself_goes_on(session: RecordingSession, tmp_path: Path) -> None:
     """It takes more messages than nodes may take from each other without a rest, and rests between them."""
-    trace = record(studio, tmp_path / "s", BEFORE + ITSELF, duration_ns=24 * NS_PER_S)
+    trace = record(session, tmp_path / "s", BEFORE + ITSELF, duration_ns=24 * NS_PER_S)
     assert (limits(trace), len(trace.messages("/n"))) == ([], 4799)
 
 
-def test_nodes_that_answer_each_other_without_a_rest_are_ended(studio: RecordingSession, tmp_path: Path) -> None:
+def test_nodes_that_answer_each_other_without_a_rest_are_ended(session: RecordingSession, tmp_path: Path) -> None:
     """No time would ever pass."""
     both = [BEFORE + SERVES.format(mine=mine, theirs=theirs) for mine, theirs in ("ab", "ba")]
-    trace = record(studio, tmp_path / "s", *both, duration_ns=24 * NS_PER_S)
+    trace = record(session, tmp_path / "s", *both, duration_ns=24 * NS_PER_S)
     assert trace.stop_ns < 2 * NS_PER_S
     assert len(limits(trace)) == 1
 
 
 @pytest.mark.nightly
 @pytest.mark.skipif(not CASES.exists(), reason="the shared cases are not beside this folder")
-def test_a_robot_and_its_controller_go_on(studio: RecordingSession, tmp_path: Path) -> None:
+def test_a_robot_and_its_controller_go_on(session: RecordingSession, tmp_path: Path) -> None:
     """The controller answers each odometry of a robot that is simulated at 50 Hz."""
     both = [(CASES / "hops_loop" / name).read_text(encoding="utf-8") for name in ("robot.py", "controller.py")]
-    trace = record(studio, tmp_path / "s", *both, duration_ns=90 * NS_PER_S)
+    trace = record(session, tmp_path / "s", *both, duration_ns=90 * NS_PER_S)
     assert limits(trace) == []
     assert min(len(trace.messages(topic)) for topic in {m.topic for m in trace.messages()}) > 4_000

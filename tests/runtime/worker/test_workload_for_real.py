@@ -69,13 +69,13 @@ WORK = {
 
 
 @pytest.fixture
-def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     tmp_path.chmod(0o755)
 
     def run_one(harm: str, later: str, **fields: Any) -> Trace:
         program = hostile(harm=harm, later=later)
         return record(
-            studio, tmp_path / "s", program, **{"duration_ns": 3 * NS_PER_S, "stop_when_unfit": True, **fields}
+            session, tmp_path / "s", program, **{"duration_ns": 3 * NS_PER_S, "stop_when_unfit": True, **fields}
         )
 
     return run_one
