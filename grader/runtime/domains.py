@@ -9,7 +9,10 @@ from collections.abc import Iterator, Sequence
 
 from grader.runtime.model.errors import EnvironmentFault
 
-#: Domains whose ports lie below Linux's ephemeral port range.
+#: Domains whose ports lie above Linux's ephemeral port range. Nobody writes one of them into a program, so none that
+#: chooses a domain of its own is by chance in the one that it should be in.
+UNUSUAL = range(215, 232)
+#: Domains whose ports lie below that range.
 USABLE = range(10, 101)
 #: How many reservations to keep: for the running scenarios, and for earlier ones whose endpoints have not yet expired.
 HELD = 8
@@ -21,14 +24,16 @@ _RESERVED: list[Reservation] = []
 
 def private_domains() -> Iterator[int]:
     """Yield domains in a private network, a different one each time: a scenario sees no endpoints of the last one."""
-    return itertools.cycle(USABLE)
+    return itertools.cycle(UNUSUAL)
 
 
-def shared_domains(usable: Sequence[int] = USABLE, held: list[Reservation] = _RESERVED) -> Iterator[int]:
+def shared_domains(
+    usable: Sequence[Sequence[int]] = (UNUSUAL, USABLE), held: list[Reservation] = _RESERVED
+) -> Iterator[int]:
     """Yield domains on a shared network; each is unused and reserved against other graders.
 
     Args:
-        usable: Domains to choose from.
+        usable: Domains to choose from; the second ones if the first are in use.
         held: Where reservations are kept, at most `HELD`, oldest first; those of all callers by default.
 
     Raises:
@@ -42,8 +47,8 @@ def shared_domains(usable: Sequence[int] = USABLE, held: list[Reservation] = _RE
         yield held[-1][0]
 
 
-def _reserve(usable: Sequence[int]) -> Reservation:
-    for domain in random.sample(usable, len(usable)):
+def _reserve(usable: Sequence[Sequence[int]]) -> Reservation:
+    for domain in itertools.chain.from_iterable(random.sample(domains, len(domains)) for domains in usable):
         claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
             claim.bind(f"\0rclpy-grader-domain-{domain}")

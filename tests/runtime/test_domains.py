@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import socket
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from grader.runtime.domains import HELD, USABLE, Reservation, private_domains, shared_domains
+from grader.runtime.domains import HELD, UNUSUAL, USABLE, Reservation, private_domains, shared_domains
 from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.session import RecordingSession
 
 
 @pytest.fixture
@@ -23,8 +28,8 @@ def held() -> Iterator[list[Reservation]]:
 
 def test_in_a_network_of_ones_own_every_scenario_gets_another_domain() -> None:
     """All of them before the first comes again: its ghosts have gone by then."""
-    given = list(itertools.islice(private_domains(), len(USABLE) + 1))
-    assert sorted(given[:-1]) == list(USABLE)
+    given = list(itertools.islice(private_domains(), len(UNUSUAL) + 1))
+    assert sorted(given[:-1]) == list(UNUSUAL)
     assert given[-1] == given[0]
 
 
@@ -33,7 +38,17 @@ def test_domains_that_are_shared_are_distinct_while_they_are_held(held: list[Res
     one, other = shared_domains(held=held), shared_domains(held=held)
     given = [next(source) for source in (one, other, one, other)]
     assert len(set(given)) == 4
-    assert set(given) <= set(USABLE)
+    assert set(given) <= {*UNUSUAL, *USABLE}
+
+
+def test_a_domain_that_a_program_may_choose_is_the_last_resort(held: list[Reservation]) -> None:
+    """A node that is in such a domain by mistake would be right by chance."""
+    unusual, usable = range(215, 217), range(90, 92)
+    source = shared_domains((unusual, usable), held)
+    given = []
+    with contextlib.suppress(EnvironmentFault):  # others on this machine may use some of them
+        given = [next(source) for _ in range(4)]
+    assert given == sorted(given, key=usable.__contains__)
 
 
 def test_a_domain_somebody_talks_on_is_not_given_out(held: list[Reservation]) -> None:
@@ -43,7 +58,7 @@ def test_a_domain_somebody_talks_on_is_not_given_out(held: list[Reservation]) ->
         free = [domain for domain in usable if bound(talker, domain)]
         if not free:
             pytest.skip("both domains are in use on this machine")
-        source = shared_domains(usable, held)
+        source = shared_domains((usable,), held)
         (other,) = set(usable) - {free[0]}
         try:
             assert next(source) == other
@@ -74,6 +89,71 @@ def test_only_the_last_claims_are_held(held: list[Reservation]) -> None:
     assert all(claim.fileno() >= 0 for _, claim in held)
 
 
-def test_ports_of_usable_domains_are_below_those_handed_out() -> None:
-    """Linux hands out ports from 32768 on."""
+def test_ports_of_domains_are_not_among_those_handed_out() -> None:
+    """Linux hands out ports from 32768 to 60999, and there is none above 65535."""
     assert 7400 + 250 * max(USABLE) + 249 < 32768
+    assert 7400 + 250 * min(UNUSUAL) > 60999
+    assert 7400 + 250 * max(UNUSUAL) + 249 <= 65535
+
+
+#: What a program does before it creates its node, and whether that is in the domain of everybody else.
+CHOICES = {
+    "": True,
+    "domain = None": True,
+    "domain = 0": True,
+    "import numpy; domain = numpy.int64(0)": True,
+    "domain = int(os.environ.get('ROS_DOMAIN_ID', '0'))": True,
+    "os.environ['ROS_DOMAIN_ID'] = '0'": True,
+    "os.environ['ROS_DOMAIN_ID'] = ''": True,
+    "os.environ.pop('ROS_DOMAIN_ID', None)": True,
+    "os.environ['ROS_DOMAIN_ID'] = '7'; domain = 0": True,
+    "os.environ['ROS_DOMAIN_ID'] = '7'": False,
+    "domain = 1": False,
+    "domain = True": False,
+}
+CLOCKS: dict[str, dict[str, Any]] = {"virtual": {}, "wall": {"clock": "wall"}, "bare": {"clock": "wall", "bare": True}}
+CHOOSER = """
+import os
+import rclpy
+from std_msgs.msg import String
+
+domain = None
+{choice}
+context = rclpy.context.Context()
+context.init(domain_id=domain)
+node = rclpy.create_node("chooser", context=context)
+publisher = node.create_publisher(String, "/words", 10)
+timer = node.create_timer(0.1, lambda: publisher.publish(String()))
+executor = rclpy.executors.SingleThreadedExecutor(context=context)
+executor.add_node(node)
+executor.spin()
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize(("choice", "heard"), CHOICES.items())
+def test_a_node_is_heard_in_domain_0(
+    session: RecordingSession, tmp_path: Path, clock: str, choice: str, *, heard: bool
+) -> None:
+    """However the program chose it; in any other it is not."""
+    pytest.importorskip("rclpy")
+    from hostile import record
+
+    tmp_path.chmod(0o755)
+    trace = record(session, tmp_path / "s", CHOOSER.format(choice=choice), duration_ns=2 * NS_PER_S, **CLOCKS[clock])
+    assert trace.faults() == ()
+    assert bool(trace.messages("/words")) == heard
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize("choice", ["domain = -1", "domain = 'a'", "os.environ['ROS_DOMAIN_ID'] = 'a'"])
+def test_a_domain_that_is_none_is_an_error(session: RecordingSession, tmp_path: Path, clock: str, choice: str) -> None:
+    """The one of ROS."""
+    pytest.importorskip("rclpy")
+    from hostile import record
+
+    tmp_path.chmod(0o755)
+    trace = record(session, tmp_path / "s", CHOOSER.format(choice=choice), duration_ns=2 * NS_PER_S, **CLOCKS[clock])
+    assert [fault.line for fault in trace.faults()] == [9]

@@ -122,7 +122,8 @@ def _other_domain(case: Case) -> Clue | None:
 
 
 def _sets_domain(node: ast.Assign | ast.keyword) -> bool:
-    if isinstance(node.value, ast.Constant) and node.value.value in (None, ""):
+    # A machine on which nobody chose a domain is in domain 0.
+    if isinstance(node.value, ast.Constant) and node.value.value in (None, "", 0, "0"):
         return False
     if isinstance(node, ast.keyword):
         return node.arg == "domain_id"

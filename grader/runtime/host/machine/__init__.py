@@ -17,7 +17,7 @@ import pwd
 import signal
 import socket
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from types import ModuleType
 from typing import Any
 
@@ -35,9 +35,10 @@ RELEASE, VERSION = "6.8.0-generic", "#1 SMP"
 #: The hardware address of the network card, in the range for local use.
 NODE = 0x02_00_00_00_00_01
 UMASK = 0o022
-#: Signals that Python ignores in every process.
 #: The variable that chooses matplotlib's backend, and its value. Its own choice would be a backend without windows.
 BACKEND = {"MPLBACKEND": "module://matplotlib.backends.backend_tkagg"}
+#: The variable that chooses the ROS domain of nodes that choose none themselves.
+DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
 _FOLDER = os.path.dirname(os.path.abspath(__file__))
 #: What `backend_NAME.py` begins with for those that open windows.
 _TOOLKITS = ("gtk", "macosx", "qt", "tk", "wx")
@@ -46,6 +47,7 @@ _WINDOW_FUNCTIONS = (
     *("imshow", "namedWindow", "destroyWindow", "destroyAllWindows", "moveWindow", "resizeWindow", "setWindowTitle"),
     *("setWindowProperty", "createTrackbar", "setTrackbarPos", "setTrackbarMin", "setTrackbarMax", "setMouseCallback"),
 )
+#: Signals that Python ignores in every process.
 _IGNORED_BY_PYTHON = frozenset({signal.SIGPIPE, signal.SIGXFSZ})
 
 
@@ -59,7 +61,10 @@ def install() -> None:
     _install_host()
     _install_names()
     _install_folders()
-    sys.meta_path.insert(0, Display())
+    own_domain = functools.partial(_with_own_domain, given=os.environ.get(DOMAIN_VARIABLE, ""))
+    if "rclpy.context" in sys.modules:  # a fork of a process that has imported it
+        own_domain(sys.modules["rclpy.context"])
+    sys.meta_path.insert(0, Changes({"cv2": _without_windows, "rclpy.context": own_domain}))
 
 
 def even_inherited() -> None:
@@ -233,13 +238,20 @@ def _install_folders() -> None:
     os.listdir, os.scandir = sorted_listdir, sorted_scandir
 
 
-class Display:
-    """Finds the modules that open windows, or look for the fonts of the machine, and lets them do without either."""
+class Changes:
+    """Finds the modules that ask for the screen, the fonts or the ROS domain of the machine, and changes them.
+
+    Args:
+        changes: What is done to modules after their import, by their name.
+    """
+
+    def __init__(self, changes: Mapping[str, Callable[[Any], None]]) -> None:
+        self._changes = changes
 
     def find_spec(self, name: str, path: Any = None, target: Any = None) -> Any:
         """Return the spec of one of these modules; None for any other."""
-        if name == "cv2":
-            return self._changed(name, path, target, _without_windows)
+        if name in self._changes:
+            return self._changed(name, path, target, self._changes[name])
         if not name.startswith("matplotlib."):
             return None
         if name == "matplotlib.font_manager":
@@ -267,6 +279,27 @@ class Display:
         with contextlib.suppress(AttributeError):
             spec.loader.exec_module = exec_module  # type: ignore[method-assign]
         return spec
+
+
+def _with_own_domain(module: Any, given: str) -> None:
+    """Let rclpy's contexts take ROS domain 0, in which nodes are on a machine where nobody chose one, for a given one.
+
+    Args:
+        module: `rclpy.context`, or a module of the program in its place.
+        given: The domain that the grader chose for this process.
+    """
+    context: Any = getattr(module, "Context", None)
+    if not given.isdecimal() or not hasattr(context, "init"):
+        return
+    init = context.init
+
+    @functools.wraps(init)
+    def init_in_domain(*arguments: Any, domain_id: Any = None, **named: Any) -> Any:
+        # ROS itself says what is wrong with a value that is not a number.
+        chosen = os.environ.get(DOMAIN_VARIABLE, "") if domain_id is None else domain_id
+        return init(*arguments, domain_id=int(given) if chosen in (0, "", "0") else domain_id, **named)
+
+    context.init = init_in_domain
 
 
 def _with_own_fonts(work: Callable[[], None]) -> None:

@@ -263,6 +263,13 @@ NEAR_MISSES: list[tuple[str, list[tuple[str, str]], str, dict[str, Any], str]] =
     ),
     (
         "velocity_publisher.py",
+        [("rclpy.init(args=args)", "rclpy.init(args=args, domain_id=0)")],
+        "silent",
+        {},
+        "other_domain",
+    ),
+    (
+        "velocity_publisher.py",
         [("import rclpy\n", "import os\nimport rclpy\nos.environ['ROBOT_ID'] = '42'\n")],
         "silent",
         {},
