@@ -134,7 +134,8 @@ def test_each_command_has_a_man_page_that_can_be_shown(wheel: Path, tmp_path: Pa
         command = ["groff", "-man", "-ww", "-Tutf8", "-Kutf8", *plain, archive.extract(name, tmp_path)]
         done = subprocess.run(command, check=True, capture_output=True, text=True, encoding="utf-8")
         assert done.stderr == "", name
-        assert f"\nNAME\n       {Path(name).stem} " in done.stdout  # newer versions shorten a long name in the header
+        # Versions differ in the indentation, and newer ones shorten a long name in the header.
+        assert re.search(rf"^NAME\n +{Path(name).stem} ", done.stdout, re.MULTILINE)
 
 
 @pytest.fixture

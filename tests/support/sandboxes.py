@@ -83,6 +83,11 @@ class Sandbox:
     start_as: tuple[str, ...] = ()
     forks: bool = False
 
+    @property
+    def is_ordinary(self) -> bool:
+        """Whether its worker runs as an ordinary user, whose other programs count against the same limits."""
+        return bool(self.start_as) or os.getuid() != 0
+
     def student(
         self,
         code: str,

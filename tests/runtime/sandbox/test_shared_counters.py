@@ -104,7 +104,9 @@ def test_signals_and_timers_that_wait_are_few(sandbox: Sandbox) -> None:
         """,
     )
     assert isinstance(found, list)
-    assert 0 < found[0] <= PENDING_SIGNALS
+    # None, where the same test beside this one has made as many as the same user may.
+    assert found[0] <= PENDING_SIGNALS
+    assert found[0] > 0 or sandbox.is_ordinary
     assert found[1:] == [[PENDING_SIGNALS] * 2, [0, 0], [LOCKED_BYTES] * 2, [0, 0]]
 
 

@@ -166,7 +166,7 @@ def test_a_forked_process_is_in_the_sandbox_of_an_executed_one(sandbox: Sandbox)
         found["mounts"] = [mount for mount in found["mounts"] if mount[0] not in placeholder]
         assert expected.pop("leads") == [False, False]
         del found["leads"], found["dies by"], expected["dies by"]
-    elif sandbox.start_as:
+    elif sandbox.is_ordinary:
         # The limit is above what the user runs at that moment.
         assert resource.RLIM_INFINITY not in found["limits"].pop("RLIMIT_NPROC")
         del expected["limits"]["RLIMIT_NPROC"]

@@ -280,7 +280,7 @@ except BlockingIOError:
     pass
 print(count)
 """
-    allowed = 20 + (SPARE if sandbox.start_as else 0)
+    allowed = 20 + (SPARE if sandbox.is_ordinary else 0)
 
     def started() -> int:
         return int(sandbox.run(code, limits=Limits(processes=20)).stdout)
