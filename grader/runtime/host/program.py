@@ -17,12 +17,13 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from . import closures, entry, launch_files, machine, originals
-from .faults import Describer, report_threads
+from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_processes
 from .quick_imports import import_without_needless
-from .replaced import guard_methods, rename_functions
+from .replaced import guard_methods, hide_frames, rename_functions, without_own_frames
 from .shadows import ROS_PARTS, Around
+from .threads import report_threads
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
@@ -125,6 +126,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
             Watch(link, request["root"]).install()
     # Last: what is replaced after this would show names of the host in tracebacks.
     rename_functions()
+    hide_frames()
     home = os.environ.get("HOME", "")
     kept = tuple(os.path.join(home, name) for name in ("log", ".cache", ".config"))
     # Where a program runs in place, whoever started it finds its files there, among as many others as there may be.
@@ -202,17 +204,17 @@ def evaluate(request: dict[str, Any]) -> None:
 def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | WallTime:
     """Create the clock that a scenario runs on."""
 
-    def report_fault(error: BaseException) -> None:
-        link.send({"kind": "fault", "fault": describer.exception(error)})
+    def report(fault: dict[str, Any]) -> None:
+        link.send({"kind": "fault", "fault": fault})
 
     if clock == "virtual":
         time = VirtualTime(link)
-        time.install(report_fault)
+        time.install(describer.exception, report)
         return time
 
     from .wall import WallTime
 
-    report_threads(report_fault)
+    report_threads(describer.exception, report)
     return WallTime(link)
 
 
@@ -237,6 +239,7 @@ def play(request: dict[str, Any], describer: Describer, link: Link, install_ros:
         ending = {"code": 1, "fault": describer.exception(error)}
         # What the program prints about its own end is what it would print without the host.
         error.__traceback__ = of_program(error.__traceback__)
+        without_own_frames(error)
         sys.last_type, sys.last_value, sys.last_traceback = type(error), error, error.__traceback__
         sys.excepthook(type(error), error, error.__traceback__)
     with contextlib.suppress(BaseException):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import functools
 import os
 import sys
+import traceback
 from collections.abc import Callable, Iterable, Iterator
-from types import FunctionType
+from types import FrameType, FunctionType, TracebackType
 from typing import Any
 
 _HOST = os.path.join(os.path.dirname(os.path.abspath(__file__)), "")
@@ -47,6 +48,51 @@ def guard_methods(modules: Iterable[str]) -> None:
                 original = original.__wrapped__
             if not _is_own(original):
                 setattr(cls, name, _guarded(cls, value, original))
+
+
+def hide_frames() -> None:
+    """Leave the frames of this package out of the stacks that `traceback` shows, and so `logging` and `asyncio`."""
+    summary: Any = traceback.StackSummary
+    extract = summary._extract_from_extended_frame_gen
+
+    def extract_others(cls: Any, /, frames: Iterable[tuple[FrameType, Any]], **options: Any) -> Any:
+        # Walked here: it begins a fixed number of frames above the one that asks for the first.
+        walked = list(frames)
+        others = [(frame, places) for frame, places in walked if not is_own_frame(frame)]
+        return extract.__func__(cls, iter(others), **options)
+
+    summary._extract_from_extended_frame_gen = classmethod(extract_others)
+
+
+def is_own_frame(frame: FrameType) -> bool:
+    """Return whether a frame runs code of this package."""
+    return frame.f_code.co_filename.startswith(_HOST)
+
+
+def without_own_frames(error: BaseException) -> BaseException:
+    """Remove the frames of this package from the traceback of an exception, and of all that it is shown with."""
+    pending: list[BaseException | None] = [error]
+    seen: set[int] = set()
+    while pending:
+        one = pending.pop()
+        if one is None or id(one) in seen:
+            continue
+        seen.add(id(one))
+        shown = [step for step in _steps(one.__traceback__) if not is_own_frame(step.tb_frame)]
+        rest: TracebackType | None = None
+        for step in reversed(shown):
+            rest = TracebackType(rest, step.tb_frame, step.tb_lasti, step.tb_lineno)
+        one.__traceback__ = rest
+        pending += [one.__cause__, one.__context__]
+        if isinstance(one, BaseExceptionGroup):
+            pending += one.exceptions
+    return error
+
+
+def _steps(step: TracebackType | None) -> Iterator[TracebackType]:
+    while step is not None:
+        yield step
+        step = step.tb_next
 
 
 def _classes(modules: Iterable[str]) -> Iterator[type]:

@@ -16,8 +16,8 @@ from typing import Any
 
 from . import originals
 from .clock import VirtualClock
-from .faults import report_threads
 from .outside import any_outside
+from .replaced import without_own_frames
 from .scheduler import GreenThread, Scheduler
 
 NS_PER_S = 1_000_000_000
@@ -158,8 +158,44 @@ def install_locks(scheduler: Scheduler, clock: VirtualClock) -> None:
     concurrent.futures.thread._global_shutdown_lock = virtual()
 
 
-def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Callable[[BaseException], None]) -> None:
-    """Make every thread that is started from now on a green thread, and joining one a virtual wait."""
+def report_threads(
+    describe: Callable[[BaseException], dict[str, Any]], report: Callable[[dict[str, Any]], None]
+) -> None:
+    """Describe each exception that ends a thread, and report it once Python has printed it.
+
+    The grader reads what was written whenever it hears of something: the other way round, chance would decide how much
+    of the text is recorded before the fault.
+    """
+
+    def excepthook(args: Any) -> None:
+        kind, error, _, thread = args
+        if error is None or issubclass(kind, SystemExit):
+            threading.__excepthook__(args)
+            return
+        fault = describe(error)  # while its traceback tells whether it is the grader's
+        try:
+            shown = without_own_frames(error)
+            threading.__excepthook__(threading.ExceptHookArgs((kind, shown, shown.__traceback__, thread)))
+        finally:
+            report(fault)
+
+    threading.excepthook = excepthook
+
+
+def install_threads(
+    scheduler: Scheduler,
+    clock: VirtualClock,
+    describe: Callable[[BaseException], dict[str, Any]],
+    report: Callable[[dict[str, Any]], None],
+) -> None:
+    """Make every thread that is started from now on a green thread, and joining one a virtual wait.
+
+    Args:
+        scheduler: Runs the threads.
+        clock: Provides deadlines.
+        describe: As for `VirtualTime.install`.
+        report: As for `VirtualTime.install`.
+    """
 
     def start_new_thread(function: Callable[..., Any], args: tuple[Any, ...] = (), kwargs: Any = None) -> int:
         run = scheduler.start(function, tuple(args), kwargs or {})
@@ -219,7 +255,7 @@ def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Cal
     threading.Thread.join = join  # type: ignore[method-assign]
     threading.Thread.is_alive = is_alive  # type: ignore[method-assign]
 
-    report_threads(report_fault)
+    report_threads(describe, report)
 
 
 def install_selectors(scheduler: Scheduler, clock: VirtualClock, give_up: Callable[[], None]) -> None:

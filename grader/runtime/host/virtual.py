@@ -96,14 +96,17 @@ class VirtualTime:
         #: Called with a reason before the program waits for something outside of virtual time.
         self.give_up_outside: Callable[[str], None] = lambda reason: None
 
-    def install(self, report_fault: Callable[[BaseException], None]) -> None:
+    def install(
+        self, describe: Callable[[BaseException], dict[str, Any]], report: Callable[[dict[str, Any]], None]
+    ) -> None:
         """Make the threads, locks, selectors and clocks of this process virtual.
 
         Args:
-            report_fault: Called with an exception that ended one of the student's threads.
+            describe: Describes an exception that ends one of the student's threads.
+            report: Called with the description once Python has printed the exception.
         """
         threads.install_locks(self.scheduler, self.clock)
-        threads.install_threads(self.scheduler, self.clock, report_fault)
+        threads.install_threads(self.scheduler, self.clock, describe, report)
         times.install_looks(self.clock)
         times.install_sleep_and_clocks(self.scheduler, self.clock)
         threads.install_selectors(self.scheduler, self.clock, lambda: self.give_up_outside("waiting"))

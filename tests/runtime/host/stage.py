@@ -41,7 +41,7 @@ class Stage:
         self._said: list[str] = []
         self._questions = 0
         self.time = virtual.VirtualTime(self)
-        self.time.install(self.fault)
+        self.time.install(self.fault, self.say)
 
     def say(self, text: object) -> None:
         """Note something with the virtual milliseconds since the start; a pause may end some microseconds late."""
@@ -53,9 +53,10 @@ class Stage:
         self.say(text)
         self.time.scheduler.wrote()
 
-    def fault(self, error: BaseException) -> None:
-        """Note what ended a thread."""
-        self.say(f"fault {type(error).__name__}: {error}")
+    @staticmethod
+    def fault(error: BaseException) -> Any:
+        """Return what ended a thread."""
+        return f"fault {type(error).__name__}: {error}"
 
     def ask(self, report: dict[str, Any]) -> dict[str, Any]:
         """Answer as the grader does."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-import threading
 import types
 from collections.abc import Callable
 from pathlib import Path
@@ -173,27 +172,3 @@ def test_the_first_exception_of_a_chain_is_told(
         exec(compile(program, str(file), "exec"), {})
     told = faults.Describer(str(tmp_path)).exception(caught.value)
     assert (told["type"], told["file"], told["line"]) == (kind, "node.py", line)
-
-
-def test_a_thread_is_reported_once_its_exception_is_printed(
-    faults: types.ModuleType, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What was written before a report is recorded before it; also where the program has broken its own output."""
-    events: list[str] = []
-    monkeypatch.setattr(threading, "excepthook", threading.excepthook)
-    monkeypatch.setattr(threading, "__excepthook__", lambda args: events.append("printed"))
-    faults.report_threads(lambda error: events.append(str(error)))
-    thread = threading.Thread(target=int, args=("x",))
-    thread.start()
-    thread.join()
-    assert events == ["printed", "invalid literal for int() with base 10: 'x'"]
-
-    def broken(args: Any) -> None:
-        raise OSError("closed")
-
-    monkeypatch.setattr(threading, "__excepthook__", broken)
-    with pytest.raises(OSError, match="closed"):
-        threading.excepthook(threading.ExceptHookArgs((ValueError, ValueError("second"), None, None)))
-    with pytest.raises(OSError, match="closed"):
-        threading.excepthook(threading.ExceptHookArgs((SystemExit, SystemExit(0), None, None)))
-    assert events[2:] == ["second"]

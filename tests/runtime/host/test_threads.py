@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import textwrap
+import threading
+from typing import Any
 
 import pytest
 from staging_programs import play
 from thread_orders import IMPORTS, ORDERS
+
+from grader.runtime.host.threads import report_threads
 
 
 def test_sleeping_threads_interleave() -> None:
@@ -525,3 +529,25 @@ def test_a_thread_that_writes_waits_for_nobody_who_waits() -> None:
             write("main 1"); time.sleep(1); write("main 2")
         thread.join()
     """) == ["0 main 1", "1000 main 2", "1000 a 1", "1000 a 2", "1000 end"]
+
+
+def test_a_thread_is_reported_once_its_exception_is_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was written before a report is recorded before it; also where the program has broken its own output."""
+    events: list[str] = []
+    monkeypatch.setattr(threading, "excepthook", threading.excepthook)
+    monkeypatch.setattr(threading, "__excepthook__", lambda args: events.append("printed"))
+    report_threads(lambda error: {"message": str(error)}, lambda fault: events.append(fault["message"]))
+    thread = threading.Thread(target=int, args=("x",))
+    thread.start()
+    thread.join()
+    assert events == ["printed", "invalid literal for int() with base 10: 'x'"]
+
+    def broken(args: Any) -> None:
+        raise OSError("closed")
+
+    monkeypatch.setattr(threading, "__excepthook__", broken)
+    with pytest.raises(OSError, match="closed"):
+        threading.excepthook(threading.ExceptHookArgs((ValueError, ValueError("second"), None, None)))
+    with pytest.raises(OSError, match="closed"):
+        threading.excepthook(threading.ExceptHookArgs((SystemExit, SystemExit(0), None, None)))
+    assert events[2:] == ["second"]

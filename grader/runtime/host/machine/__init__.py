@@ -294,10 +294,12 @@ def _with_own_domain(module: Any, given: str) -> None:
     init = context.init
 
     @functools.wraps(init)
-    def init_in_domain(*arguments: Any, domain_id: Any = None, **named: Any) -> Any:
+    def init_in_domain(*arguments: Any, **named: Any) -> Any:
+        chosen = named.get("domain_id")
         # ROS itself says what is wrong with a value that is not a number.
-        chosen = os.environ.get(DOMAIN_VARIABLE, "") if domain_id is None else domain_id
-        return init(*arguments, domain_id=int(given) if chosen in (0, "", "0") else domain_id, **named)
+        if chosen == 0 or (chosen is None and os.environ.get(DOMAIN_VARIABLE, "") in ("", "0")):
+            named["domain_id"] = int(given)
+        return init(*arguments, **named)
 
     context.init = init_in_domain
 

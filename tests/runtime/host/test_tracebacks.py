@@ -1,0 +1,90 @@
+"""What a program prints of its exceptions and stacks is what it prints without the grader."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from grader.runtime.domains import shared_domains
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.session import RecordingSession
+
+pytest.importorskip("rclpy")
+
+from hostile import record
+
+pytestmark = pytest.mark.ros
+
+BEGIN = """
+import asyncio, logging, sys, threading, time, traceback
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+rclpy.init()
+node = Node("n")
+"""
+#: Each ends at once, and writes what Python says to the standard error stream.
+PROGRAMS = {
+    "a wrong class": "node.create_publisher(str, '/words', 10)",
+    "a wrong message": "node.create_publisher(String, '/words', 10).publish('hello')",
+    "no callback": "node.create_subscription(String, '/words', 10)",
+    "a second node of a context that is shut down": "rclpy.shutdown()\nNode('m')",
+    "a pause without a number": "time.sleep('1')",
+    "a spin": "node.create_timer(0.1, lambda: 1 / 0)\nrclpy.spin(node)",
+    "a wrong domain": "rclpy.init(context=rclpy.Context(), domain_id='1')",
+    "a thread": "thread = threading.Thread(target=lambda: time.sleep('1'))\nthread.start()\nthread.join()",
+    "a timer of Python": "threading.Timer(0.1, lambda: node.create_publisher(str, '/words', 10)).start()",
+    "a chain": "try:\n    node.create_publisher(str, '/words', 10)\nexcept Exception:\n    time.sleep(None)",
+    "a cause": "try:\n    time.sleep(None)\nexcept Exception as error:\n    raise ValueError('no') from error",
+    "a group": (
+        "try:\n    time.sleep(None)\n"
+        "except Exception as error:\n    raise ExceptionGroup('several', [error, ValueError()])"
+    ),
+    "print_exc": "try:\n    node.create_publisher(str, '/words', 10)\nexcept Exception:\n    traceback.print_exc()",
+    "print_exc, the last two": "try:\n    time.sleep(None)\nexcept Exception:\n    traceback.print_exc(-2)",
+    "logging": "try:\n    time.sleep(None)\nexcept Exception:\n    logging.exception('failed')",
+    "print_stack": "node.create_timer(0.1, lambda: (traceback.print_stack(), sys.exit()))\nrclpy.spin(node)",
+    "the stack of a walk": (
+        "def work():\n    print(traceback.StackSummary.extract(traceback.walk_stack(None)), file=sys.stderr)\nwork()"
+    ),
+    "a task": (
+        "async def fail():\n    time.sleep(None)\n"
+        "async def main():\n    asyncio.create_task(fail())\n    await asyncio.sleep(0.1)\n"
+        "asyncio.run(main())"
+    ),
+}
+
+
+def normalised(text: str) -> list[str]:
+    """Return the lines that were printed, without empty ones, which are not recorded, and the addresses of objects."""
+    return [re.sub(r"0x[0-9a-f]+", "0x", line) for line in text.splitlines() if line.strip()]
+
+
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_traceback_is_that_of_plain_python(session: RecordingSession, tmp_path: Path, name: str, clock: str) -> None:
+    """Line by line, without frames of the grader."""
+    program = BEGIN + PROGRAMS[name] + "\n"
+    tmp_path.chmod(0o755)
+    plain = tmp_path / "plain" / "a.py"
+    plain.parent.mkdir()
+    plain.write_text(program, encoding="utf-8")
+    environment = {
+        **os.environ,
+        "ROS_DOMAIN_ID": str(next(shared_domains())),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    }
+    done = subprocess.run(
+        [sys.executable, str(plain)], check=False, capture_output=True, encoding="utf-8", env=environment
+    )
+    expected = done.stderr.replace(f"{plain.parent}/", "")
+    trace = record(session, tmp_path / "s", program, clock=clock, duration_ns=2 * NS_PER_S)
+    found = "".join(f"{line.text}\n" for line in trace.lines() if line.stream == "stderr")
+    assert expected
+    assert normalised(found) == normalised(expected)
