@@ -12,8 +12,16 @@ import click
 
 from grader.cli.completion import complete_exercise
 from grader.cli.options import PATH, RUBRIC
-from grader.grading.model.grading_options import OBSERVE, GradingOptions, Option, OptionKind, names, percent, rows
-from grader.runtime.model.scenario import ODOMETRY
+from grader.grading.model.grading_options import (
+    OBSERVE,
+    ODOMETRY,
+    GradingOptions,
+    Option,
+    OptionKind,
+    names,
+    percent,
+    rows,
+)
 
 _Command = Callable[..., int]
 _Function = TypeVar("_Function", bound=Callable[..., Any])

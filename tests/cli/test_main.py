@@ -22,9 +22,9 @@ import grader
 from grader.cli import interactive, main
 from grader.grading.app.request import GradeRequest
 from grader.grading.model.exercise import Outcome
+from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.model.report import Report
 from grader.runtime.model import errors
-from grader.runtime.model.scenario import ODOMETRY
 
 
 class Session:

@@ -12,8 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from grader.grading.model.grading_options import ODOMETRY
 from grader.runtime.host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
-from grader.runtime.model.scenario import ODOMETRY, Between, JustAbove, JustBelow, Scenario, Span, Stimulus
+from grader.runtime.model.scenario import Between, JustAbove, JustBelow, Scenario, Span, Stimulus
 from grader.runtime.model.submission import StudentFile, Submission
 from grader.runtime.plan import Plan, derive, plan_scenario
 from grader.runtime.recording.codec import from_json, to_json

@@ -16,10 +16,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.grading.evidence.manifest import scenario_digest
+from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.builtin import builtin_rubrics
 from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.scenario import (
-    ODOMETRY,
     AnyOrder,
     Between,
     CountBetween,

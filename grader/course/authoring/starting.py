@@ -26,6 +26,7 @@ from grader.grading.app.observe import ObserveRequest, undisturbed, watch
 from grader.grading.judging.findings import fault_sentence
 from grader.grading.judging.values import carries_number, student_endpoints
 from grader.grading.model.exercise import Exercise
+from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.model.wording import quote
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric
@@ -33,7 +34,7 @@ from grader.grading.rubrics.simulations import offered
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError, RubricError, SubmissionError
 from grader.runtime.model.quantities import NS_PER_S, seconds
-from grader.runtime.model.scenario import ODOMETRY, Scenario
+from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.trace import FaultKind, Trace
 from grader.runtime.stimuli import Simulated
 

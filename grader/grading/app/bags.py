@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.grading.model.exercise import Exercise, recordings_in
+from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.builtin import builtin_recording
 from grader.runtime.compiled import COMPILED, compiled, state_of
 from grader.runtime.model.errors import RecordingError
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.scenario import ODOMETRY
 from grader.runtime.model.wording import listed, shown
 from grader.runtime.recording.bag import BagMinimum, Define, read_bag, topics_in
 from grader.runtime.shipped import PACKAGE, shipped

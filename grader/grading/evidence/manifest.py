@@ -18,11 +18,12 @@ from typing import Any
 
 import msgspec
 
+from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.model.report import Environment
 from grader.runtime.files import replace_file
 from grader.runtime.model.errors import EvidenceError
 from grader.runtime.model.packages import BroughtPackage
-from grader.runtime.model.scenario import ODOMETRY, Scenario
+from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.submission import Definition, StudentFile
 from grader.runtime.stimuli import RecordedStream
 

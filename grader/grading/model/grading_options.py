@@ -15,7 +15,6 @@ from typing import Any, TypeVar
 from grader.runtime.model.checkup import TIERS
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import TIME_BUDGET_S
-from grader.runtime.model.scenario import ODOMETRY
 
 #: The commands that take options of a run.
 GRADE, BATCH, VERIFY, OBSERVE = "grade", "batch", "verify", "observe"
@@ -23,6 +22,9 @@ GRADE, BATCH, VERIFY, OBSERVE = "grade", "batch", "verify", "observe"
 ISOLATION = "GRADER_ISOLATION"
 #: The values of `--clock`, and of `--isolation`.
 CLOCKS, SANDBOXES = ("virtual", "wall", "auto"), ("auto", *TIERS)
+#: The type of messages that the stimulus `odometry` plays and `--odom-bag` replaces. Both are older than `recorded` and
+#: `--recording TYPE=BAG`, and aliases of them.
+ODOMETRY = "nav_msgs/msg/Odometry"
 _AS_IN_GRADE = "As in `grade`."
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeV
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag, create_model, model_validator
 from typing_extensions import TypeAliasType
 
+from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.types import (
     Choice,
     Duration,
@@ -28,7 +29,6 @@ from grader.grading.rubrics.types import (
 )
 from grader.runtime.model.limits import MAX_CALLS, MAX_CASES, MAX_CLIENTS
 from grader.runtime.model.scenario import (
-    ODOMETRY,
     AnyOrder,
     Between,
     Choose,

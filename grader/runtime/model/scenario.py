@@ -124,11 +124,6 @@ class JustBelow:
     limit: float
 
 
-#: The type of messages that the stimulus `odometry` plays and `--odom-bag` replaces. Both are older than `recorded` and
-#: `--recording TYPE=BAG`, and aliases of them.
-ODOMETRY = "nav_msgs/msg/Odometry"
-
-
 @dataclass(frozen=True, slots=True)
 class Choose:
     """One of several values, drawn from the seed."""

@@ -156,8 +156,7 @@ class Worker:
             limit_processor_time(STEPPED_CPU_S)
             observer = Observer(domain, plan.limits)
             began.callback(observer.close)
-            sockets = SocketMemory(shared=self._isolation.shares_network)
-            began.enter_context(ResourceMonitor(students, plan.limits, sockets=sockets, own_s=STEPPED_CPU_S))
+            began.enter_context(self._monitor(students, plan, own_s=STEPPED_CPU_S))
             runner = STEPPED[plan.clock](plan, students, observer, start, other.ask)
             is_real = plan.clock == ClockKind.WALL.value
             if is_real:
@@ -243,8 +242,7 @@ class Worker:
         with ExitStack() as stack:
             stack.callback(stop, students)
             students.append(self._execute(plan, name, file, domain, told))
-            sockets = SocketMemory(shared=self._isolation.shares_network)
-            monitor = stack.enter_context(ResourceMonitor(students, plan.limits, budget, sockets=sockets))
+            monitor = stack.enter_context(self._monitor(students, plan, budget))
             stack.callback(self._account, monitor)
             _await_ready(students[0])
             self.has_started = True
@@ -269,10 +267,7 @@ class Worker:
             for name, file in plan.processes:
                 start = self._start_bare if plan.bare else self._start
                 students.append(start(plan, name, file, domain))
-            sockets = SocketMemory(shared=self._isolation.shares_network)
-            monitor = stack.enter_context(
-                ResourceMonitor(students, plan.limits, budget, sockets=sockets, own_s=own_processor_s(plan))
-            )
+            monitor = stack.enter_context(self._monitor(students, plan, budget, own_s=own_processor_s(plan)))
             stack.callback(self._account, monitor)
             runner = _import_runners()["bare" if plan.bare else plan.clock]
             if not plan.bare:
@@ -287,6 +282,12 @@ class Worker:
             written = tuple(file for student in students for file in student.written)
             trace = replace(trace, written=written)
             return replace(trace, reached=tuple(dict.fromkeys(what for s in students for what in s.reached)))
+
+    def _monitor(
+        self, students: Sequence[NodeProcess], plan: Plan, budget: Budget | None = None, *, own_s: int | None = None
+    ) -> ResourceMonitor:
+        sockets = SocketMemory(shared=self._isolation.shares_network)
+        return ResourceMonitor(students, plan.limits, budget, sockets=sockets, own_s=own_s)
 
     def _account(self, monitor: ResourceMonitor) -> None:
         self._real_ns += monitor.real_ns

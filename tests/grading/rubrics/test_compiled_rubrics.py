@@ -12,6 +12,7 @@ import pytest
 from grader.grading.app.bags import read_recordings, shipped_recording
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest
+from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.builtin import (
     builtin_exercises,
     builtin_headers,
@@ -21,7 +22,6 @@ from grader.grading.rubrics.builtin import (
 )
 from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.compiled import compiled, state_in, state_of, state_of_package
-from grader.runtime.model.scenario import ODOMETRY
 from grader.runtime.recording.bag import read_bag
 from grader.runtime.shipped import shipped
 

@@ -14,10 +14,11 @@ from ruamel.yaml import YAML
 from stand_in_checks import CHECKS, Everything, FieldValues, Point, Publishes, TopicRate, UsesLogger
 
 from grader.grading.model.exercise import Criterion, Exercise
+from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.loader import MAX_MISTAKES, RubricMistakes, read_rubric
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.limits import MAX_RUBRIC_BYTES
-from grader.runtime.model.scenario import ODOMETRY, Between, JustAbove, JustBelow, Scenario, Span
+from grader.runtime.model.scenario import Between, JustAbove, JustBelow, Scenario, Span
 from grader.runtime.stimuli.numbers import NumberStream
 from grader.runtime.stimuli.recorded import RecordedStream
 

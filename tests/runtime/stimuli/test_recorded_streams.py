@@ -21,10 +21,10 @@ from grader.grading.app.bags import observed, read_given, read_recordings, recor
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest, command_words, request_of, request_to_json
 from grader.grading.evidence.manifest import scenario_digest
+from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.errors import RecordingError, RubricError
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.scenario import ODOMETRY
 from grader.runtime.recording.bag import read_bag
 from grader.runtime.stimuli.recorded import RecordedStream
 
