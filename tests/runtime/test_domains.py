@@ -3,67 +3,76 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import socket
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from grader.runtime.domains import HELD, UNUSUAL, USABLE, Reservation, private_domains, shared_domains
+from grader.runtime.domains import KEPT, UNUSUAL, USABLE, PrivateDomains, SharedDomains
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.session import RecordingSession
 
 
-@pytest.fixture
-def held() -> Iterator[list[Reservation]]:
-    """Claims of one test, which are not held over the next."""
-    held: list[Reservation] = []
-    yield held
-    for _, claim in held:
-        claim.close()
-
-
-def test_in_a_network_of_ones_own_every_scenario_gets_another_domain() -> None:
-    """All of them before the first comes again: its ghosts have gone by then."""
-    given = list(itertools.islice(private_domains(), len(UNUSUAL) + 1))
-    assert sorted(given[:-1]) == list(UNUSUAL)
-    assert given[-1] == given[0]
-
-
-def test_domains_that_are_shared_are_distinct_while_they_are_held(held: list[Reservation]) -> None:
-    """Of one grader and of two."""
-    one, other = shared_domains(held=held), shared_domains(held=held)
-    given = [next(source) for source in (one, other, one, other)]
-    assert len(set(given)) == 4
-    assert set(given) <= {*UNUSUAL, *USABLE}
-
-
-def test_a_domain_that_a_program_may_choose_is_the_last_resort(held: list[Reservation]) -> None:
-    """A node that is in such a domain by mistake would be right by chance."""
-    unusual, usable = range(215, 217), range(90, 92)
-    source = shared_domains((unusual, usable), held)
+def test_in_a_network_of_ones_own_no_two_scenarios_have_one_domain() -> None:
+    """However long one of them takes; all others have a turn before a domain comes again."""
+    domains = PrivateDomains()
+    longest = domains.take()
     given = []
-    with contextlib.suppress(EnvironmentFault):  # others on this machine may use some of them
-        given = [next(source) for _ in range(4)]
+    for _ in range(3 * len(UNUSUAL)):
+        given.append(domains.take())
+        domains.give_back(given[-1])
+    assert sorted({longest, *given}) == list(UNUSUAL)
+    assert longest not in given
+    assert given[: len(UNUSUAL) - 1] == given[len(UNUSUAL) - 1 : 2 * len(UNUSUAL) - 2]
+
+
+def test_a_domain_that_a_program_may_choose_is_the_last_resort() -> None:
+    """A node that is in such a domain by mistake would be right by chance."""
+    domains = PrivateDomains()
+    given = [domains.take() for _ in range(len(UNUSUAL) + 2)]
+    assert given == [*UNUSUAL, *USABLE[:2]]
+    for domain in reversed(given):
+        domains.give_back(domain)
+    assert domains.take() == UNUSUAL[-1]
+
+
+def test_domains_that_are_shared_are_distinct_while_they_are_taken() -> None:
+    """Of one grader and of two; others on this machine may use some of the first ones."""
+    unusual, usable = range(215, 217), range(90, 96)
+    given = []
+    choice = (unusual, usable)
+    with contextlib.suppress(EnvironmentFault), SharedDomains(choice) as one, SharedDomains(choice) as other:
+        given = [source.take() for source in (one, other, one, other)]
+    assert len(set(given)) == len(given)
     assert given == sorted(given, key=usable.__contains__)
 
 
-def test_a_domain_somebody_talks_on_is_not_given_out(held: list[Reservation]) -> None:
+def test_a_shared_domain_is_kept_for_a_while_after_it_is_given_back() -> None:
+    """What has ended may still be known to others; and a long class does not run out of domains."""
+    given = []
+    with SharedDomains() as source:
+        for _ in range(KEPT + 3):
+            given.append(source.take())
+            source.give_back(given[-1])
+    for number in range(KEPT, len(given)):
+        assert given[number] not in given[number - KEPT : number]
+
+
+def test_a_domain_somebody_talks_on_is_not_given_out() -> None:
     """Its discovery port is in use, whoever uses it."""
     usable = range(90, 92)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as talker:
         free = [domain for domain in usable if bound(talker, domain)]
         if not free:
             pytest.skip("both domains are in use on this machine")
-        source = shared_domains((usable,), held)
         (other,) = set(usable) - {free[0]}
-        try:
-            assert next(source) == other
-        except EnvironmentFault:
-            pytest.skip("the other domain is in use on this machine")
+        with SharedDomains((usable,)) as source:
+            try:
+                assert source.take() == other
+            except EnvironmentFault:
+                pytest.skip("the other domain is in use on this machine")
 
 
 def bound(talker: socket.socket, domain: int) -> bool:
@@ -75,18 +84,11 @@ def bound(talker: socket.socket, domain: int) -> bool:
     return True
 
 
-def test_no_free_domain_is_said() -> None:
+@pytest.mark.parametrize("kind", [PrivateDomains, SharedDomains])
+def test_no_free_domain_is_said(kind: type[PrivateDomains | SharedDomains]) -> None:
     """Instead of two graders hearing each other."""
     with pytest.raises(EnvironmentFault, match="expected a free one, found all in use"):
-        next(shared_domains(()))
-
-
-def test_only_the_last_claims_are_held(held: list[Reservation]) -> None:
-    """A long class does not run out of domains."""
-    source = shared_domains(held=held)
-    given = [next(source) for _ in range(HELD + 3)]
-    assert [domain for domain, _ in held] == given[3:]
-    assert all(claim.fileno() >= 0 for _, claim in held)
+        kind(()).take()
 
 
 def test_ports_of_domains_are_not_among_those_handed_out() -> None:

@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 import grader
-from grader.runtime.domains import Reservation, shared_domains
+from grader.runtime.domains import SharedDomains
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.limits import Limits
 from grader.runtime.recording.codec import to_json
@@ -33,8 +33,8 @@ HOST = Path(grader.__file__).resolve().parent / "runtime" / "host"
 USER = 1000
 #: Not every tier has a network of its own: neither tests that run side by side nor graders may use the same domain. It
 #: is reserved until this process ends.
-_HELD: list[Reservation] = []
-DOMAIN = str(next(shared_domains(held=_HELD)))
+_DOMAINS = SharedDomains()
+DOMAIN = str(_DOMAINS.take())
 
 # The worker of these tests: starts the student's command that the test prepared, and ends as it ends.
 RELAY = """

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from grader.runtime.domains import private_domains, shared_domains
+from grader.runtime.domains import PrivateDomains, SharedDomains
 from grader.runtime.model.checkup import PROPERTIES, TIERS, Property, TierReport, missing
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.recording.codec import to_json
@@ -82,12 +82,13 @@ def why_not(contained: tuple[Property, ...]) -> str:
 def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[str, Any], str]:
     """Run the trial and return its answer, or an empty one with the reason."""
     submission = bait.folder / "submission"
+    domains = SharedDomains() if isolation.shares_network else PrivateDomains()
     request = {
         "isolation": isolation.name,
         "runtime": to_json(ros.runtime),
         "submission": str(submission),
         "staged": STAGED,
-        "domain": next(shared_domains() if isolation.shares_network else private_domains()),
+        "domain": domains.take(),
         "probe": asked_of_probe(bait),
     }
     module = "grader.runtime.sandbox.trial"
@@ -110,6 +111,7 @@ def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[
     except OSError as error:
         return {}, f"{Path(command.argv[0]).name} cannot be started: {error.strerror}"
     finally:
+        domains.close()
         for descriptor in command.opened_fds:
             os.close(descriptor)
     with contextlib.suppress(ValueError):

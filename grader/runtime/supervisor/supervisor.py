@@ -26,6 +26,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from grader.runtime.domains import Domains
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
@@ -130,7 +131,7 @@ class WorkerProcess(ABC):
 
     Args:
         line: The socket.
-        domains: Yields ROS domains that no other program uses.
+        domains: Lends ROS domains that no other program uses.
         limits: What it may use.
 
     Attributes:
@@ -140,9 +141,10 @@ class WorkerProcess(ABC):
         forked: Its forks.
     """
 
-    def __init__(self, line: socket.socket, domains: Iterator[int], limits: WorkerLimits) -> None:
+    def __init__(self, line: socket.socket, domains: Domains, limits: WorkerLimits) -> None:
         self._line = line
         self._domains = domains
+        self._domain: int | None = None
         self._limits = limits
         self._interfaces: tuple[str, ...] = ()
         self._received = bytearray()
@@ -164,12 +166,24 @@ class WorkerProcess(ABC):
         """Return whether there are forks of this worker, which would end with it."""
         return any(not fork.gone for fork in self.forked)
 
+    def _another_domain(self) -> int:
+        """Take a ROS domain for a scenario; what may be left of the last one keeps that until now."""
+        self.give_back_domain()
+        self._domain = self._domains.take()
+        return self._domain
+
+    def give_back_domain(self) -> None:
+        """Let others have the ROS domain of the last scenario, once nothing runs in it any more."""
+        domain, self._domain = self._domain, None
+        if domain is not None:
+            self._domains.give_back(domain)
+
     def run(self, plan: Plan, budget: RealTimeBudget) -> Trace:
         """Run one plan; raises HarnessError if the worker fails, WorkerLostError if it has ended or times out."""
         from grader.runtime.recording.packed import trace_from_json  # noqa: PLC0415 - takes as long as a start
 
         self._interfaces = plan.interfaces
-        own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
+        own = {"domain": self._another_domain(), "left_ns": budget.left_ns, "budget": budget.words}
         request = json.dumps({"plan": to_json(plan), **own}) + "\n"
         # Of the worker itself: a plan that takes longer gives it more to receive.
         own_s = self._limits.processor_s(plan.limits, plan.duration_ns + plan.wait_at_most_ns)
@@ -229,7 +243,7 @@ class WorkerProcess(ABC):
             self._await_start()
         except (OSError, EOFError) as error:
             raise WorkerLostError(f"worker: expected one that starts, found none (ended by {self._end()})") from error
-        self.exchange({"stepped": to_json(plan), "domain": next(self._domains)})
+        self.exchange({"stepped": to_json(plan), "domain": self._another_domain()})
 
     def exchange(self, told: Mapping[str, Any] | None) -> dict[str, Any]:
         """Tell a worker something in a stepped run, and return what it says next; None only listens.
@@ -328,7 +342,7 @@ class ExecutedWorker(WorkerProcess):
     Args:
         isolation: The tier that it runs in and starts student processes in.
         runtime: Interpreter and ROS.
-        domains: Yields ROS domains that no other program uses.
+        domains: Lends ROS domains that no other program uses.
         scratch: A folder for files that ROS writes, such as logs.
         forks: How many forks it makes; each costs less than another start.
         executes: Whether it executes each student's process, also in a tier in which they can be forked.
@@ -339,7 +353,7 @@ class ExecutedWorker(WorkerProcess):
         self,
         isolation: Isolation,
         runtime: PythonRuntime,
-        domains: Iterator[int],
+        domains: Domains,
         scratch: Path,
         *,
         forks: int,
@@ -410,6 +424,8 @@ class ExecutedWorker(WorkerProcess):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, 9)
         self._process.wait()
+        for worker in (self, *self.forked):
+            worker.give_back_domain()
         if self._group is not None:
             self._group.remove()
         self._line.close()  # last, so that a thread waiting for an answer is woken by the end of the worker
@@ -418,7 +434,7 @@ class ExecutedWorker(WorkerProcess):
 class ForkedWorker(WorkerProcess):
     """A fork of a worker in the same sandbox, made before that one has run anything."""
 
-    def __init__(self, line: socket.socket, domains: Iterator[int], limits: WorkerLimits) -> None:
+    def __init__(self, line: socket.socket, domains: Domains, limits: WorkerLimits) -> None:
         super().__init__(line, domains, limits)
         self.shares = True
         self._process: int | None = None  # a descriptor of the process, because its pid may be given to another one
@@ -454,6 +470,7 @@ class ForkedWorker(WorkerProcess):
             ended.poll(END_S * 1000)
             os.close(self._process)
             self._process = None
+        self.give_back_domain()
         with contextlib.suppress(OSError):
             self._line.shutdown(socket.SHUT_RDWR)  # wakes a thread that waits for an answer
         self._line.close()
@@ -475,7 +492,7 @@ class Recorder:
     Args:
         isolation: The sandbox tier.
         runtime: Interpreter and ROS.
-        domains: Yields ROS domains, a new one for every scenario.
+        domains: Lends ROS domains; one is taken for every scenario.
         scratch: A folder for files that ROS writes, and for everything that is recorded: a worker may see no other
             folder. The caller removes it.
         workers: How many scenarios to record at the same time.
@@ -491,7 +508,7 @@ class Recorder:
         self,
         isolation: Isolation,
         runtime: PythonRuntime,
-        domains: Iterator[int],
+        domains: Domains,
         *,
         scratch: Path,
         workers: int,
@@ -503,7 +520,7 @@ class Recorder:
         self._executes = executes
         self._limits = limits
         self._runtime = runtime
-        self._domains = _Shared(domains)
+        self._domains = domains
         self._idle: queue.LifoQueue[WorkerProcess | None] = queue.LifoQueue()  # a warm worker first
         self._alive: list[WorkerProcess] = []
         self._lock = threading.Lock()
@@ -713,21 +730,6 @@ class Recorder:
 def _length(job: Job) -> int:
     """Return an estimate of how long a recording takes, for comparison."""
     return job.plan.duration_ns * len(job.plan.processes)
-
-
-class _Shared:
-    """A thread-safe iterator."""
-
-    def __init__(self, numbers: Iterator[int]) -> None:
-        self._numbers = numbers
-        self._lock = threading.Lock()
-
-    def __iter__(self) -> _Shared:
-        return self
-
-    def __next__(self) -> int:
-        with self._lock:
-            return next(self._numbers)
 
 
 def _environment(runtime: PythonRuntime, scratch: Path) -> Mapping[str, str]:

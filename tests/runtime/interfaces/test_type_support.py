@@ -10,7 +10,7 @@ import pytest
 import test_msgs
 from samples import SHARE, installed_packages, share_without
 
-from grader.runtime.domains import shared_domains
+from grader.runtime.domains import SharedDomains
 from grader.runtime.interfaces.build import BuiltInterfaces, build
 from grader.runtime.interfaces.definitions import (
     DefinitionError,
@@ -21,6 +21,7 @@ from grader.runtime.interfaces.definitions import (
 )
 
 HERE = Path(__file__).parent
+DOMAINS = SharedDomains()
 PYTHON_PACKAGES = Path(test_msgs.__file__).parents[1]
 
 
@@ -49,7 +50,7 @@ def run(text: str, *built: BuiltInterfaces) -> str:
     """What a program prints; it has to end well."""
     done = subprocess.run(
         [sys.executable, "-c", text],
-        env=environment(next(shared_domains()), *built),
+        env=environment(DOMAINS.take(), *built),
         capture_output=True,
         text=True,
         timeout=600,
@@ -104,7 +105,7 @@ def test_shipped_packages_have_the_hashes_of_the_releases(tmp_path: Path) -> Non
 @pytest.mark.ros
 @pytest.mark.parametrize("both", [False, True])
 def test_exchanges_with_the_compiled_type_support(built: BuiltInterfaces, *, both: bool) -> None:
-    domain = next(shared_domains())
+    domain = DOMAINS.take()
     sides = (("ours", "theirs", [built]), ("theirs", "ours", [built] if both else []))
     processes = [
         subprocess.Popen(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import sys
 import threading
@@ -14,6 +13,7 @@ from typing import cast
 import pytest
 from waiting import wait_for
 
+from grader.runtime.domains import Domains, PrivateDomains
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import NS_PER_S
@@ -176,11 +176,11 @@ def make(tmp_path: Path) -> Iterator[Callable[..., tuple[Recorder, Stage]]]:
     def make_one(
         *behaviours: str,
         workers: int = 1,
-        domains: Iterator[int] | None = None,
+        domains: Domains | None = None,
         limits: WorkerLimits = OF_WORKERS,
     ) -> tuple[Recorder, Stage]:
         stage = Stage(tmp_path, list(behaviours))
-        domains = itertools.count(10) if domains is None else domains
+        domains = PrivateDomains() if domains is None else domains
         isolation = cast("Isolation", stage)
         recorder = Recorder(isolation, RUNTIME, domains, scratch=tmp_path, workers=workers, limits=limits)
         made.append(recorder)
@@ -388,31 +388,25 @@ def test_one_lost_scenario_does_not_cost_the_others(make: Callable[..., tuple[Re
 
 def test_any_other_problem_is_raised_and_nothing_hangs(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """A machine without a free domain is not the worker's failure; the recorder can be closed all the same."""
-
-    def none_free() -> Iterator[int]:
-        raise EnvironmentFault("ROS domains: expected a free one, found all in use")
-        yield
-
-    recorder, _ = make("answers", workers=2, domains=none_free())
+    recorder, _ = make("answers", workers=2, domains=Failing(1))
     with pytest.raises(EnvironmentFault):
         recorder.record(jobs("alone"), nothing)
     recorder.close()
 
 
-class Failing:
-    """Domains, of which every one but the last is not to be had."""
+class Failing(PrivateDomains):
+    """Domains, of which the first are not to be had."""
 
     def __init__(self, failures: int) -> None:
+        super().__init__()
         self._left = failures
 
-    def __iter__(self) -> Iterator[int]:
-        return self
-
-    def __next__(self) -> int:
+    def take(self) -> int:
+        """Return one, or raise."""
         self._left -= 1
         if self._left >= 0:
             raise EnvironmentFault("ROS domains: expected a free one, found all in use")
-        return 10
+        return super().take()
 
 
 def test_a_worker_is_not_lost_with_a_problem_of_another_kind(make: Callable[..., tuple[Recorder, Stage]]) -> None:
@@ -422,6 +416,16 @@ def test_a_worker_is_not_lost_with_a_problem_of_another_kind(make: Callable[...,
         with pytest.raises(EnvironmentFault):
             recorder.record(jobs("alone"), nothing)
     assert recorder.record(jobs("alone"), nothing)[0].harness_problem == ""
+
+
+def test_no_two_workers_have_one_domain(make: Callable[..., tuple[Recorder, Stage]]) -> None:
+    """However many scenarios the others record meanwhile; what ended workers had is given back."""
+    domains = PrivateDomains([range(10, 14)])
+    recorder, _ = make("answers", "answers", "dies", "answers", workers=3, domains=domains)
+    used = {note(trace).partition("domain ")[2] for trace in recorder.record(jobs(*map(str, range(30))), nothing)}
+    assert used <= {"10", "11", "12", "13"}
+    recorder.close()
+    assert sorted(domains.take() for _ in range(4)) == [10, 11, 12, 13]
 
 
 def test_closing_ends_every_worker(make: Callable[..., tuple[Recorder, Stage]]) -> None:
