@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import os
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -372,11 +373,19 @@ _grade.context_settings = {**app.context_settings, "allow_extra_args": True}
 def main() -> None:
     """Run the command line of this process, and exit."""
     gc.set_threshold(COLLECT_AFTER)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not for a job in the background of a shell
+        signal.signal(signal.SIGINT, _interrupt_once)
     # The collections at the exit would look at all that was imported, to free memory that the kernel frees anyway
     atexit.register(gc.freeze)
     from grader.cli.interactive import process_start
 
     app(prog_name="grade", obj=Invocation(process_start()))
+
+
+def _interrupt_once(*_: object) -> None:
+    """End the command at Ctrl-C; a second one would break off what tidies up after the first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    raise KeyboardInterrupt
 
 
 def _guarded(run: Callable[[], object]) -> int:

@@ -11,11 +11,14 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, SupportsIndex
 
+from . import originals
 from .clock import VirtualClock
 from .quick_imports import import_without_needless
 from .scheduler import Scheduler
 
 NS_PER_S = 1_000_000_000
+#: Python sleeps no longer than some 9.2e9 s, and says so.
+LONGEST_SLEEP_S = 1e10
 #: Top-level packages that look at clocks for themselves -> whether the program may pace itself by it.
 LIBRARIES = {"asyncio": True, "logging": False}
 #: Monotonic system clocks.
@@ -41,10 +44,11 @@ def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
     """Make `time.sleep` and the monotonic clocks of the standard library virtual."""
 
     def sleep(seconds: float | SupportsIndex, /) -> None:
-        if not isinstance(seconds, float):
+        if not isinstance(seconds, float) and hasattr(type(seconds), "__index__"):
             seconds = operator.index(seconds)
-        if seconds < 0:
-            raise ValueError("sleep length must be non-negative")
+        if not isinstance(seconds, (int, float)) or not 0 <= seconds <= LONGEST_SLEEP_S:
+            originals.sleep(seconds)  # raises, as this version of Python does
+            return
         end_ns = clock.end_of(round(seconds * NS_PER_S))
         if end_ns <= clock.now_ns:
             clock.idle_look(20)

@@ -39,6 +39,8 @@ UMASK = 0o022
 BACKEND = {"MPLBACKEND": "module://matplotlib.backends.backend_tkagg"}
 #: The variable that chooses the ROS domain of nodes that choose none themselves.
 DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
+#: The variables that change the format, the colours and the stream of logs.
+LOG_VARIABLES = ("RCUTILS_CONSOLE_OUTPUT_FORMAT", "RCUTILS_COLORIZED_OUTPUT", "RCUTILS_LOGGING_USE_STDOUT")
 _FOLDER = os.path.dirname(os.path.abspath(__file__))
 #: What `backend_NAME.py` begins with for those that open windows.
 _TOOLKITS = ("gtk", "macosx", "qt", "tk", "wx")
@@ -51,8 +53,12 @@ _WINDOW_FUNCTIONS = (
 _IGNORED_BY_PYTHON = frozenset({signal.SIGPIPE, signal.SIGXFSZ})
 
 
-def install() -> None:
-    """Replace the functions of the standard library through which a program asks about the machine."""
+def install(*, bare: bool = False) -> None:
+    """Replace the functions of the standard library through which a program asks about the machine.
+
+    Args:
+        bare: Whether nothing else of the grader is in this process, which then reads how logs look by itself.
+    """
     # A bare process has this module, by which Python has found this file; all others have one like it.
     sys.modules["sitecustomize"] = ModuleType("sitecustomize")
     even_inherited()
@@ -64,7 +70,10 @@ def install() -> None:
     own_domain = functools.partial(_with_own_domain, given=os.environ.get(DOMAIN_VARIABLE, ""))
     if "rclpy.context" in sys.modules:  # a fork of a process that has imported it
         own_domain(sys.modules["rclpy.context"])
-    sys.meta_path.insert(0, Changes({"cv2": _without_windows, "rclpy.context": own_domain}))
+    changes: dict[str, Callable[[Any], None]] = {"cv2": _without_windows, "rclpy.context": own_domain}
+    if bare:
+        changes["rclpy.impl.implementation_singleton"] = _with_usual_logs
+    sys.meta_path.insert(0, Changes(changes))
 
 
 def even_inherited() -> None:
@@ -302,6 +311,24 @@ def _with_own_domain(module: Any, given: str) -> None:
         return init(*arguments, **named)
 
     context.init = init_in_domain
+
+
+def _with_usual_logs(module: Any) -> None:
+    """Let the library that writes logs read its variables now, without those by which a program changes how logs look.
+
+    What it logs could not be told from what it prints otherwise. C code sees these variables again afterwards.
+
+    Args:
+        module: The module that holds rclpy's functions in C++.
+    """
+    chosen = {name: os.environ[name] for name in LOG_VARIABLES if name in os.environ}
+    for name in chosen:
+        os.unsetenv(name)
+    try:
+        module.rclpy_implementation.rclpy_logging_initialize()
+    finally:
+        for name, value in chosen.items():
+            os.putenv(name, value)
 
 
 def _with_own_fonts(work: Callable[[], None]) -> None:

@@ -1,0 +1,52 @@
+"""What a program logs is known by its place and level, however it makes its logs look, on each clock."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import LogRecord
+from grader.runtime.session import RecordingSession
+
+pytest.importorskip("rclpy")
+
+from hostile import record
+
+pytestmark = pytest.mark.ros
+
+CLOCKS: dict[str, dict[str, Any]] = {"virtual": {}, "wall": {"clock": "wall"}, "bare": {"clock": "wall", "bare": True}}
+LOOKS = {
+    "a format": "os.environ['RCUTILS_CONSOLE_OUTPUT_FORMAT'] = '{severity}: {message}'",
+    "colours": "os.environ['RCUTILS_COLORIZED_OUTPUT'] = '1'",
+    "the other stream": "os.environ['RCUTILS_LOGGING_USE_STDOUT'] = '1'",
+    "all of them": "os.environ.update(RCUTILS_CONSOLE_OUTPUT_FORMAT='{message}', RCUTILS_COLORIZED_OUTPUT='1')",
+}
+#: The variables are set before ROS is imported, or afterwards.
+TALKER = """
+import os
+{before}
+import rclpy
+{after}
+rclpy.init()
+node = rclpy.create_node("talker")
+node.create_timer(0.5, lambda: node.get_logger().warning("half a second"))
+rclpy.spin(node)
+"""
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize("look", LOOKS)
+@pytest.mark.parametrize("place", ["before", "after"])
+def test_a_log_is_a_log_whatever_it_looks_like(
+    session: RecordingSession, tmp_path: Path, place: str, look: str, clock: str
+) -> None:
+    """No line of it counts as printed."""
+    program = TALKER.format(**{"before": "", "after": "", place: LOOKS[look]})
+    tmp_path.chmod(0o755)
+    trace = record(session, tmp_path / "s", program, duration_ns=2 * NS_PER_S, **CLOCKS[clock])
+    logs = [each for each in trace.observations if isinstance(each, LogRecord)]
+    assert {(each.severity, each.logger, each.text) for each in logs} == {("WARN", "talker", "half a second")}
+    assert trace.lines() == ()
