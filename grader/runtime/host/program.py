@@ -238,7 +238,7 @@ def play(request: dict[str, Any], describer: Describer, link: Link, install_ros:
     except BaseException as error:  # whatever the student's code raises becomes a fault
         ending = {"code": 1, "fault": describer.exception(error)}
         # What the program prints about its own end is what it would print without the host.
-        error.__traceback__ = of_program(error.__traceback__)
+        BaseException.with_traceback(error, of_program(error.__traceback__))
         without_own_frames(error)
         sys.last_type, sys.last_value, sys.last_traceback = type(error), error, error.__traceback__
         sys.excepthook(type(error), error, error.__traceback__)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import sys
@@ -82,10 +83,11 @@ def without_own_frames(error: BaseException) -> BaseException:
         rest: TracebackType | None = None
         for step in reversed(shown):
             rest = TracebackType(rest, step.tb_frame, step.tb_lasti, step.tb_lineno)
-        one.__traceback__ = rest
-        pending += [one.__cause__, one.__context__]
-        if isinstance(one, BaseExceptionGroup):
-            pending += one.exceptions
+        BaseException.with_traceback(one, rest)  # an exception may refuse to have its attributes set
+        with contextlib.suppress(Exception):  # or to have them looked at
+            pending += [one.__cause__, one.__context__]
+            if isinstance(one, BaseExceptionGroup):
+                pending += one.exceptions
     return error
 
 

@@ -51,6 +51,13 @@ PROGRAMS = {
         "try:\n    time.sleep(None)\n"
         "except Exception as error:\n    raise ExceptionGroup('several', [error, ValueError()])"
     ),
+    "an exception that cannot be changed": (
+        "import dataclasses\n@dataclasses.dataclass(frozen=True)\nclass Bad(Exception):\n    code: int\nraise Bad(3)"
+    ),
+    "one in a thread": (
+        "import dataclasses\n@dataclasses.dataclass(frozen=True)\nclass Bad(Exception):\n    code: int\n"
+        "def work():\n    raise Bad(3)\nthread = threading.Thread(target=work)\nthread.start()\nthread.join()"
+    ),
     "print_exc": "try:\n    node.create_publisher(str, '/words', 10)\nexcept Exception:\n    traceback.print_exc()",
     "print_exc, the last two": "try:\n    time.sleep(None)\nexcept Exception:\n    traceback.print_exc(-2)",
     "logging": "try:\n    time.sleep(None)\nexcept Exception:\n    logging.exception('failed')",
