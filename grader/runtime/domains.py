@@ -46,6 +46,11 @@ class Domains(ABC):
         """Let others have a domain."""
 
 
+def domains_of(*, shared: bool) -> Domains:
+    """Return the domains of a network that others use as well, or of a private one."""
+    return SharedDomains() if shared else PrivateDomains()
+
+
 class PrivateDomains(Domains):
     """The domains of a private network: the one that was given back first is the next to be taken.
 

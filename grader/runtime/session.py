@@ -13,7 +13,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TypeVar
 
-from grader.runtime.domains import PrivateDomains, SharedDomains
+from grader.runtime.domains import domains_of
 from grader.runtime.model.checkup import Property
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.projects import Project
@@ -311,7 +311,7 @@ def open_session(  # noqa: PLR0913  what to open, and where progress goes
     workers = workers or workers_for(len(os.sched_getaffinity(0)))
     # Neither workers nor student processes write byte code, so their modules are compiled here, once.
     compile_own()
-    with SharedDomains() if tier.shares_network else PrivateDomains() as domains, scratch_folder() as folder:
+    with domains_of(shared=tier.shares_network) as domains, scratch_folder() as folder:
         folder.chmod(0o755)  # students' processes may run as another user and have to read the staged copy
         kept = Recorder(
             tier,

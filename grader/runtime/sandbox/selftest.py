@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from grader.runtime.domains import PrivateDomains, SharedDomains
+from grader.runtime.domains import domains_of
 from grader.runtime.model.checkup import PROPERTIES, TIERS, Property, TierReport, missing
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.recording.codec import to_json
@@ -82,7 +82,7 @@ def why_not(contained: tuple[Property, ...]) -> str:
 def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[str, Any], str]:
     """Run the trial and return its answer, or an empty one with the reason."""
     submission = bait.folder / "submission"
-    domains = SharedDomains() if isolation.shares_network else PrivateDomains()
+    domains = domains_of(shared=isolation.shares_network)
     request = {
         "isolation": isolation.name,
         "runtime": to_json(ros.runtime),

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from grader.runtime.domains import SharedDomains
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
 from hostile import record
+from sandboxes import DOMAIN
 
 pytestmark = pytest.mark.ros
 
@@ -29,7 +29,6 @@ from std_msgs.msg import String
 rclpy.init()
 node = Node("n")
 """
-DOMAINS = SharedDomains()
 #: Each ends at once, and writes what Python says to the standard error stream.
 PROGRAMS = {
     "a wrong class": "node.create_publisher(str, '/words', 10)",
@@ -89,7 +88,7 @@ def test_a_traceback_is_that_of_plain_python(session: RecordingSession, tmp_path
     plain.write_text(program, encoding="utf-8")
     environment = {
         **os.environ,
-        "ROS_DOMAIN_ID": str(DOMAINS.take()),
+        "ROS_DOMAIN_ID": DOMAIN,
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     }
     done = subprocess.run(

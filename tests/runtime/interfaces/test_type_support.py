@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 import test_msgs
 from samples import SHARE, installed_packages, share_without
+from sandboxes import DOMAIN
 
-from grader.runtime.domains import SharedDomains
 from grader.runtime.interfaces.build import BuiltInterfaces, build
 from grader.runtime.interfaces.definitions import (
     DefinitionError,
@@ -21,7 +21,6 @@ from grader.runtime.interfaces.definitions import (
 )
 
 HERE = Path(__file__).parent
-DOMAINS = SharedDomains()
 PYTHON_PACKAGES = Path(test_msgs.__file__).parents[1]
 
 
@@ -36,11 +35,11 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> BuiltInterfaces:
     return build(definitions_of("test_msgs"), folder / "cache", [share_without(folder / "share", "test_msgs")])
 
 
-def environment(domain: int, *built: BuiltInterfaces) -> dict[str, str]:
+def environment(*built: BuiltInterfaces) -> dict[str, str]:
     return {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(str(each.python) for each in built),
-        "ROS_DOMAIN_ID": str(domain),  # one that no other test and no other run of the tests uses
+        "ROS_DOMAIN_ID": DOMAIN,
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_PYTHON_CHECK_FIELDS": "1",
     }
@@ -50,7 +49,7 @@ def run(text: str, *built: BuiltInterfaces) -> str:
     """What a program prints; it has to end well."""
     done = subprocess.run(
         [sys.executable, "-c", text],
-        env=environment(DOMAINS.take(), *built),
+        env=environment(*built),
         capture_output=True,
         text=True,
         timeout=600,
@@ -105,12 +104,11 @@ def test_shipped_packages_have_the_hashes_of_the_releases(tmp_path: Path) -> Non
 @pytest.mark.ros
 @pytest.mark.parametrize("both", [False, True])
 def test_exchanges_with_the_compiled_type_support(built: BuiltInterfaces, *, both: bool) -> None:
-    domain = DOMAINS.take()
     sides = (("ours", "theirs", [built]), ("theirs", "ours", [built] if both else []))
     processes = [
         subprocess.Popen(
             [sys.executable, str(HERE / "exchange.py"), own, other],
-            env=environment(domain, *packages),
+            env=environment(*packages),
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
