@@ -12,6 +12,7 @@ import sys
 from types import FrameType
 from typing import Any
 
+from . import machine
 from .link import Link
 
 #: Prefixes of event names from https://docs.python.org/3/library/audit_events.html.
@@ -58,8 +59,13 @@ class Watch:
         self._matters: dict[str, bool] = {}
         self._places: dict[str, str] = {}
         self._told: set[str] = set()
-        # Where installed modules are: what the program could import before it ran.
-        self._installed = tuple(os.path.join(p, "") for p in sys.path if p and not p.startswith(self._root[:-1]))
+        # Where installed modules are: what the program could import before it ran. The host imports its own ones late
+        # where a module of the program hides one of Python.
+        own = os.path.dirname(os.path.abspath(__file__))
+        installed = (own, *(p for p in sys.path if p and not p.startswith(self._root[:-1])))
+        self._installed = tuple(os.path.join(p, "") for p in installed)
+        # In some tiers this folder is in /dev/shm.
+        self._temporary = os.path.join(os.environ.get("TMPDIR") or machine.TEMPORARY, "")
         self._inside = False
 
     def install(self) -> None:
@@ -73,7 +79,7 @@ class Watch:
         matters = self._matters.get(event)
         if matters is None:
             matters = _remembered(self._matters, event, event in LOOKS or event.startswith(EVENTS))
-        if not matters or (event in LOOKS and not _looks_around(arguments)):
+        if not matters or (event in LOOKS and not self._looks_around(arguments)):
             return
         self._inside = True
         try:
@@ -106,6 +112,14 @@ class Watch:
             return False
         return not (origin.startswith(self._root) and origin.endswith(".py") and os.path.isfile(origin))
 
+    def _looks_around(self, arguments: tuple[Any, ...]) -> bool:
+        """Return whether a file or folder that is opened tells about processes and the machine."""
+        place = arguments[0] if arguments else None
+        if type(place) is not str:
+            return False
+        place = os.path.normpath(place) if ".." in place else place
+        return place == "/" or (place.startswith(FOLDERS) and not place.startswith(self._temporary))
+
     def _by_student(self, frame: FrameType | None, event: str) -> bool:
         for _ in range(CALLERS):
             if frame is None:
@@ -123,17 +137,13 @@ class Watch:
         """Return where the code of a file belongs to."""
         if file.startswith(self._root) or (file.startswith("<") and not file.startswith("<frozen")):
             return STUDENT
+        if file == machine.__file__:
+            return LIBRARY  # a function of the standard library that the host has replaced
         if not file.startswith(("<frozen", self._library)) or file.startswith(self._packages):
             return ELSEWHERE
         if file.startswith("<frozen importlib"):
             return ELSEWHERE  # the event comes from importing a module
         return MAKER if file in self._makers else LIBRARY
-
-
-def _looks_around(arguments: tuple[Any, ...]) -> bool:
-    """Return whether a file or folder that is opened tells about processes and the machine."""
-    place = arguments[0] if arguments else None
-    return type(place) is str and (place == "/" or place.startswith(FOLDERS))
 
 
 def _remembered(known: dict[str, Any], name: str, found: Any) -> Any:

@@ -1,0 +1,71 @@
+"""What the host tells of a program that looks around: the same in every sandbox, and nothing of ordinary programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hostile import record, staging
+
+from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.sandbox.tiers import FLAT_NAME, LANDLOCK_NAME
+from grader.runtime.session import RecordingSession, open_session
+
+pytestmark = pytest.mark.ros
+
+#: What a program does, and what is told of it.
+DOES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "nothing": ("", ()),
+    "a file in its home": ("open(os.path.expanduser('~/notes.txt'), 'w').close()", ()),
+    "a file in /tmp": ("open('/tmp/notes.txt', 'w').close(); os.listdir('/tmp')", ()),
+    "temporary files": ("import tempfile; tempfile.mkdtemp(); open('notes.txt', 'w').close()", ()),
+    "a file about itself": ("open('/proc/self/environ')", ("open",)),
+    "other processes": ("os.listdir('/proc')", ("os.listdir",)),
+    "the memory that others share": ("os.scandir('/dev/shm/')", ("os.scandir",)),
+    "the same by way of its own folder": ("os.listdir('/tmp/../dev/shm')", ("os.listdir",)),
+}
+PROGRAM = """
+import os
+import rclpy
+
+rclpy.init()
+node = rclpy.create_node("looks")
+try:
+    {does}
+except PermissionError:
+    pass
+node.get_logger().info("done")
+"""
+
+
+@pytest.fixture(scope="module", params=["auto", FLAT_NAME, LANDLOCK_NAME])
+def in_tier(request: pytest.FixtureRequest) -> Iterator[RecordingSession]:
+    """A session in one of the sandboxes."""
+    try:
+        with open_session(request.param, 1) as session:
+            yield staging(session)
+    except EnvironmentFault as fault:
+        pytest.skip(fault.message)
+
+
+@pytest.mark.parametrize(("does", "told"), DOES.values(), ids=DOES)
+def test_what_is_told_of_a_program(in_tier: RecordingSession, tmp_path: Path, does: str, told: tuple[str, ...]) -> None:
+    """A program of which something is told is recorded again as a bare process."""
+    tmp_path.chmod(0o755)
+    folder = tmp_path / "s"
+    trace = record(in_tier, folder, PROGRAM.format(does=does or "pass"), duration_ns=NS_PER_S)
+    assert [log.text for log in trace.records()] == ["done"], trace.faults()
+    assert trace.reached == told
+
+
+def test_nothing_is_told_of_a_module_that_hides_one_of_python(in_tier: RecordingSession, tmp_path: Path) -> None:
+    """The host then imports what it needs later, from a folder of its own."""
+    folder = tmp_path / "s"
+    folder.mkdir()
+    tmp_path.chmod(0o755)
+    (folder / "random.py").write_text("def choice(values):\n    return values[0]\n")
+    trace = record(in_tier, folder, PROGRAM.format(does="import random; random.choice('a')"), duration_ns=NS_PER_S)
+    assert [log.text for log in trace.records()] == ["done"], trace.faults()
+    assert trace.reached == ()
