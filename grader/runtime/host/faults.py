@@ -149,7 +149,9 @@ class Describer:
         for folder in _machine_folders():
             if folder in text:
                 text = re.sub(rf"{re.escape(folder)}(?:/[^{_NO_PATH}]*)?", lambda f: os.path.basename(f[0]), text)
-        return text
+        # The tiers without a view of files of their own have another folder for temporary files.
+        temporary = os.environ.get("TMPDIR", "")
+        return text.replace(temporary, "/tmp") if temporary.count("/") > 1 else text  # noqa: S108
 
 
 #: The code of a fault that is the grader's own, and the folder of its modules.

@@ -1,4 +1,4 @@
-"""Gives up virtual time for programs that wait for something outside of it: alarms, other processes, the network.
+"""Gives up virtual time for programs that use something outside of it: alarms, processes, the network, kernel clocks.
 
 All of these take real time, and a virtual second takes only a small part of a real one.
 """
@@ -14,6 +14,8 @@ from typing import Any
 
 #: Audit events (https://docs.python.org/3/library/audit_events.html) of starting or becoming another process.
 PROCESSES = frozenset({"os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os.spawn", "subprocess.Popen"})
+#: Files in which the kernel tells its own time (proc_uptime(5), https://docs.kernel.org/admin-guide/rtc.html).
+KERNEL_CLOCKS = ("/proc/uptime", "/proc/driver/rtc", "/sys/class/rtc/rtc0/since_epoch", "/sys/class/rtc/rtc0/time")
 
 
 def install_alarms(give_up: Callable[[], None]) -> None:
@@ -52,6 +54,17 @@ def install_processes(give_up: Callable[[], None]) -> None:
 
     sys.addaudithook(hook)
     _posixsubprocess.fork_exec = guarded_fork_exec
+
+
+def install_kernel_clocks(give_up: Callable[[], None]) -> None:
+    """Call `give_up` before the program opens a file that tells real time."""
+    clocks = frozenset((*KERNEL_CLOCKS, *map(os.fsencode, KERNEL_CLOCKS)))
+
+    def hook(event: str, arguments: Any) -> None:
+        if event == "open" and isinstance(arguments[0], (str, bytes)) and arguments[0] in clocks:
+            give_up()
+
+    sys.addaudithook(hook)
 
 
 def any_outside(descriptors: Iterable[int]) -> bool:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from . import closures, entry, launch_files, machine, originals
 from .faults import Describer
 from .link import Link, Log
-from .outside import install_alarms, install_processes
+from .outside import install_alarms, install_kernel_clocks, install_processes
 from .quick_imports import import_without_needless
 from .replaced import guard_methods, hide_frames, rename_functions, without_own_frames
 from .shadows import ROS_PARTS, Around
@@ -79,7 +79,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
             hide one that it has imported.
     """
     prepared = host is not None
-    machine.install()
+    machine.install(in_place=request["in_place"])
     sys.path += request["interfaces"]  # installed packages come first
     host = host or Host(request["clock"])
     link, describer, time = host.link, host.describer, host.time
@@ -121,6 +121,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
         watchdog.start()
         install_alarms(functools.partial(watchdog.give_up_outside, "alarm"))
         install_processes(functools.partial(watchdog.give_up_outside, "process"))
+        install_kernel_clocks(functools.partial(watchdog.give_up_outside, "kernel_clock"))
         time.give_up_outside = watchdog.give_up_outside
         if not request["in_place"]:  # nobody deceives whoever tests a program of their own
             Watch(link, request["root"]).install()

@@ -30,6 +30,7 @@ _HUNG = {
     "blocked": f"waited {BLOCKED_S:g} s for something outside the ROS graph",
     "alarm": "sets an alarm that rings in real time",
     "events_executor": "makes an EventsExecutor, which waits in real time",
+    "kernel_clock": "reads a clock of the kernel, which shows real time",
     "process": "starts another process, which runs in real time",
     "waiting": "waits for something outside the ROS graph",
     "timed_event": "waits for a missed deadline or a lost liveliness, which the middleware times in real time",

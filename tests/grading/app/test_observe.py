@@ -386,6 +386,15 @@ EVENTS = "rclpy.experimental.events_executor.EventsExecutor()"
 OUTSIDE = {
     "subprocess.run([sys.executable, '-c', ''])": "node.py:11 starts another process, which runs in real time",
     "signal.alarm(5)": "node.py:11 sets an alarm that rings in real time",
+    **dict.fromkeys(
+        (
+            "open('/proc/uptime').close()",
+            "open(b'/proc/uptime').close()",
+            "os.close(os.open('/proc/uptime', os.O_RDONLY))",
+            "pathlib.Path('/proc/uptime').read_text()",
+        ),
+        "node.py:11 reads a clock of the kernel, which shows real time",
+    ),
     EVENTS: "node.py:11 makes an EventsExecutor, which waits in real time",
 }
 
@@ -395,7 +404,7 @@ OUTSIDE = {
 def test_the_note_on_the_wall_clock_names_the_line(tmp_path: Path, statement: str, said: str) -> None:
     """And what stands there."""
     text = (
-        "import os\nimport signal\nimport subprocess\nimport sys\nimport rclpy\n"
+        "import os\nimport pathlib\nimport signal, subprocess\nimport sys\nimport rclpy\n"
         "import rclpy.experimental.events_executor\n\n\ndef work():\n    rclpy.init()\n"
         f"    {statement}\n\n\nwork()\nrclpy.spin(rclpy.create_node('n'))\n"
     )

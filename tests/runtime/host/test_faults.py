@@ -70,6 +70,15 @@ def test_files_of_the_submission_are_relative_to_it(text_of: Callable[..., Any],
     assert text == "FileNotFoundError: [Errno 2] No such file or directory: 'config/speed.yaml'"
 
 
+def test_the_folder_for_temporary_files_is_named_as_everywhere(
+    text_of: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where another folder takes its place."""
+    monkeypatch.setenv("TMPDIR", "/dev/shm/grade-student-1")
+    error = FileNotFoundError(2, "No such file or directory", "/dev/shm/grade-student-1/a/odom.csv")
+    assert text_of(error) == "FileNotFoundError: [Errno 2] No such file or directory: '/tmp/a/odom.csv'"
+
+
 @pytest.mark.parametrize(
     "text",
     [

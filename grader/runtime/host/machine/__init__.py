@@ -6,11 +6,13 @@ bare process, which holds nothing else of the grader, runs it as well (`sitecust
 
 from __future__ import annotations
 
+import builtins
 import contextlib
 import functools
 import grp
 import importlib.machinery
 import importlib.util
+import io
 import os
 import platform
 import pwd
@@ -41,6 +43,17 @@ BACKEND = {"MPLBACKEND": "module://matplotlib.backends.backend_tkagg"}
 DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
 #: The variables that change the format, the colours and the stream of logs.
 LOG_VARIABLES = ("RCUTILS_CONSOLE_OUTPUT_FORMAT", "RCUTILS_COLORIZED_OUTPUT", "RCUTILS_LOGGING_USE_STDOUT")
+#: The folder for temporary files that programs name themselves.
+TEMPORARY = "/tmp"  # noqa: S108 - no file is created there
+#: Functions of `os` that take a path, or two, as their first arguments, and the names of these arguments.
+_WITH_PATHS = {
+    **dict.fromkeys(("open", "stat", "lstat", "access", "listdir", "scandir", "chdir", "mkdir", "rmdir"), 1),
+    **dict.fromkeys(("remove", "unlink", "chmod", "utime", "truncate", "readlink", "mkfifo", "statvfs"), 1),
+    **dict.fromkeys(("getxattr", "listxattr", "setxattr", "removexattr"), 1),
+    **dict.fromkeys(("rename", "replace", "link", "symlink"), 2),
+}
+_OF_A_FILE = frozenset({"chmod", "utime"})
+_PATHS = frozenset({"path", "src", "dst", "file", "database"})
 _FOLDER = os.path.dirname(os.path.abspath(__file__))
 #: What `backend_NAME.py` begins with for those that open windows.
 _TOOLKITS = ("gtk", "macosx", "qt", "tk", "wx")
@@ -53,11 +66,12 @@ _WINDOW_FUNCTIONS = (
 _IGNORED_BY_PYTHON = frozenset({signal.SIGPIPE, signal.SIGXFSZ})
 
 
-def install(*, bare: bool = False) -> None:
+def install(*, bare: bool = False, in_place: bool = False) -> None:
     """Replace the functions of the standard library through which a program asks about the machine.
 
     Args:
         bare: Whether nothing else of the grader is in this process, which then reads how logs look by itself.
+        in_place: Whether the program sees and changes the same files as whoever started it.
     """
     # A bare process has this module, by which Python has found this file; all others have one like it.
     sys.modules["sitecustomize"] = ModuleType("sitecustomize")
@@ -73,6 +87,9 @@ def install(*, bare: bool = False) -> None:
     changes: dict[str, Callable[[Any], None]] = {"cv2": _without_windows, "rclpy.context": own_domain}
     if bare:
         changes["rclpy.impl.implementation_singleton"] = _with_usual_logs
+    temporary = os.environ.get("TMPDIR", TEMPORARY)
+    if temporary != TEMPORARY and not in_place:
+        changes["sqlite3"] = _install_temporary_folder(temporary)
     sys.meta_path.insert(0, Changes(changes))
 
 
@@ -247,8 +264,67 @@ def _install_folders() -> None:
     os.listdir, os.scandir = sorted_listdir, sorted_scandir
 
 
+def _install_temporary_folder(folder: str) -> Callable[[Any], None]:
+    """Let /tmp be another folder for Python's functions, and return what makes it so for the module `sqlite3`.
+
+    Where a process has no view of files of its own, it may write to that folder only.
+    """
+
+    def moved(path: Any) -> Any:
+        plain = os.fspath(path) if hasattr(path, "__fspath__") else path
+        if isinstance(plain, bytes):
+            return os.fsencode(moved(os.fsdecode(plain)))
+        if isinstance(plain, str) and ".." in plain:
+            plain = os.path.normpath(plain)
+        if not isinstance(plain, str) or not (plain + "/").startswith(TEMPORARY + "/"):
+            return path
+        within = plain[len(TEMPORARY) :].lstrip("/")
+        # Python, ROS or the submission may themselves be there.
+        first = os.path.join(TEMPORARY, within.partition("/")[0], "")
+        installed = (folder, sys.prefix, sys.base_prefix, *sys.path, *sys.argv[:1])
+        is_installed = any(os.path.join(place, "").startswith(first) for place in installed if type(place) is str)
+        return path if within and is_installed else os.path.join(folder, within)
+
+    def with_moved(function: Any, paths: int) -> Any:
+        @functools.wraps(function)
+        def call(*arguments: Any, **named: Any) -> Any:
+            first = [moved(argument) for argument in arguments[:paths]]
+            named = {name: moved(value) if name in _PATHS else value for name, value in named.items()}
+            return function(*first, *arguments[paths:], **named)
+
+        return call
+
+    def tolerant(function: Any) -> Any:
+        @functools.wraps(function)
+        def call(path: Any, *arguments: Any, **named: Any) -> None:
+            try:
+                function(path, *arguments, **named)
+            except PermissionError:
+                # The sandbox allows no change of what belongs to a file, of its own files neither.
+                if type(path) is int or not os.path.realpath(os.fsdecode(path)).startswith(folder):
+                    raise
+                stat(path)
+
+        return call
+
+    stat = os.stat
+    for name, paths in _WITH_PATHS.items():
+        original = getattr(os, name)
+        replaced = with_moved(tolerant(original) if name in _OF_A_FILE else original, paths)
+        setattr(os, name, replaced)
+        for kind in (os.supports_dir_fd, os.supports_fd, os.supports_follow_symlinks, os.supports_effective_ids):
+            if original in kind:
+                kind.add(replaced)
+    builtins.open = io.open = with_moved(open, 1)
+
+    def move_databases(sqlite3: Any) -> None:
+        sqlite3.connect = with_moved(sqlite3.connect, 1)
+
+    return move_databases
+
+
 class Changes:
-    """Finds the modules that ask for the screen, the fonts or the ROS domain of the machine, and changes them.
+    """Finds the modules that ask for the screen, fonts, /tmp or the ROS domain of the machine, and changes them.
 
     Args:
         changes: What is done to modules after their import, by their name.
@@ -351,7 +427,10 @@ def _with_own_fonts(work: Callable[[], None]) -> None:
 
 
 def _without_windows(cv2: Any) -> None:
-    """Let OpenCV open windows that nobody sees, in which nobody types: its build for servers has none, and raises."""
+    """Let OpenCV open windows that nobody sees, in which nobody types: its build for servers has none, and raises.
+
+    Its clock becomes that of `time.monotonic`.
+    """
     import time
 
     def wait_key(delay: int = 0) -> int:
@@ -360,6 +439,9 @@ def _without_windows(cv2: Any) -> None:
         time.sleep(delay / 1000)
         return -1
 
+    def ticks() -> int:
+        return time.monotonic_ns()
+
     def nothing(*arguments: Any, **named: Any) -> None:
         pass
 
@@ -367,5 +449,6 @@ def _without_windows(cv2: Any) -> None:
         setattr(cv2, name, nothing)
     cv2.waitKey = cv2.waitKeyEx = wait_key
     cv2.pollKey = lambda: -1
+    cv2.getTickCount, cv2.getTickFrequency = ticks, lambda: 1e9
     cv2.startWindowThread = cv2.getTrackbarPos = lambda *arguments: 0
     cv2.getWindowProperty = lambda *arguments: 1.0

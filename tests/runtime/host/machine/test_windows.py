@@ -94,6 +94,15 @@ LOOKING = {
         + "cv2.destroyAllWindows()\nrclpy.spin(node)",
         ["0.5", "1.0", "1.5"],
     ),
+    "a loop that counts ticks": (
+        HEAD
+        + "import cv2\nrclpy.init()\nnode = rclpy.create_node('looks')\ndue = start = cv2.getTickCount()\n"
+        + "for n in range(3):\n    due += 0.5 * cv2.getTickFrequency()\n"
+        + "    while cv2.getTickCount() < due:\n        time.sleep(0.01)\n"
+        + "    node.get_logger().info(f'{(cv2.getTickCount() - start) / cv2.getTickFrequency():.1f}')\n"
+        + "rclpy.spin(node)",
+        ["0.5", "1.0", "1.5"],
+    ),
     "a wait for a key": (
         HEAD
         + "import cv2\nrclpy.init()\nnode = rclpy.create_node('looks')\ncv2.namedWindow('camera')\n"

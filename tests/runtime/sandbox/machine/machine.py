@@ -6,6 +6,7 @@ import getpass
 import glob
 import grp
 import locale
+import logging
 import multiprocessing
 import os
 import pathlib
@@ -17,6 +18,7 @@ import secrets
 import shutil
 import signal
 import socket
+import sqlite3
 import sys
 import tempfile
 import threading
@@ -40,6 +42,31 @@ def folders():
         found.append([entry.name for entry in entries])
     found.append([os.path.basename(path) for path in glob.glob(os.path.join(place, "*"))])
     return found
+
+
+def temporary_files():
+    place = pathlib.Path("/tmp/notes")
+    place.mkdir()
+    (place / "a.txt").write_text("a")
+    with open(b"/tmp/notes/b.txt", "w") as file:
+        file.write("bb")
+    os.chmod("/tmp/notes/a.txt", 0o600)
+    shutil.copy("/tmp/notes/a.txt", "/tmp/../tmp/notes/c.txt")
+    os.rename("/tmp/notes/b.txt", place / "d.txt")
+    (place / "c.txt").touch()
+    logging.FileHandler("/tmp/notes/e.log").close()
+    sqlite3.connect("/tmp/notes/f.db").execute("create table t (x)").connection.close()
+    found = [
+        sorted(os.listdir("/tmp/notes")), [str(path) for path in place.iterdir()], list(os.walk("/tmp/notes")),
+        os.stat("/tmp/notes/d.txt").st_size, os.path.exists("/tmp/notes/b.txt"), glob.glob("/tmp/notes/*.txt"),
+        os.access("/tmp", os.W_OK), "notes" in os.listdir("/tmp"),
+    ]
+    shutil.rmtree("/tmp/notes")
+    try:
+        os.chmod("/tmp/none", 0o600)
+    except OSError as error:
+        found.append(str(error))
+    return found, place.exists()
 
 
 def chosen():
@@ -116,6 +143,7 @@ ROWS = {
         random.random(), secrets.token_hex(8), os.urandom(8), os.getrandom(8), uuid.uuid4(), random.SystemRandom().random(),
     ),
     "temporary names": lambda: (tempfile.gettempdir(), tempfile.mkdtemp(), os.path.basename(tempfile.mktemp())),
+    "files in /tmp": temporary_files,
     "order of folders": folders,
     "Python flags": lambda: (
         sys.flags, [os.path.basename(a) for a in (*sys.argv, *sys.orig_argv[1:])], sys._xoptions, sys.getrecursionlimit(),
