@@ -39,6 +39,21 @@ def one_worker() -> Iterator[RecordingSession]:
         yield staging(session)
 
 
+@pytest.fixture(scope="module", params=["auto", "bubblewrap-flat", "landlock"])
+def session_in_tier(request: pytest.FixtureRequest) -> Iterator[RecordingSession]:
+    """A sandbox with one worker: with a view of files of its own for each process, and without."""
+    from hostile import staging
+
+    from grader.runtime.model.errors import EnvironmentFault
+    from grader.runtime.session import open_session
+
+    try:
+        with open_session(request.param, 1) as session:
+            yield staging(session)
+    except EnvironmentFault as fault:
+        pytest.skip(fault.message)
+
+
 @pytest.fixture
 def submission() -> Iterator[Path]:
     """A folder that students' processes may see."""

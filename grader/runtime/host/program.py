@@ -79,7 +79,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
             hide one that it has imported.
     """
     prepared = host is not None
-    machine.install(in_place=request["in_place"])
+    machine.install(request["root"], in_place=request["in_place"])
     sys.path += request["interfaces"]  # installed packages come first
     host = host or Host(request["clock"])
     link, describer, time = host.link, host.describer, host.time
@@ -173,7 +173,7 @@ def evaluate(request: dict[str, Any]) -> None:
         request: As for `run`, with `launch`: its `arguments`, the `provided` files of the rubric, name and folder of
             the submission's `packages`, outermost first, and how much is described at `most`; see `describe`.
     """
-    machine.install()
+    machine.install(request["root"])
     link, describer = Link(), Describer()
     link.open(request["fd"])
     describer.set_root(request["root"])

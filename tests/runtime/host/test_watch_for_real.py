@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hostile import record, staging
+from hostile import record
 
-from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.sandbox.tiers import FLAT_NAME, LANDLOCK_NAME
-from grader.runtime.session import RecordingSession, open_session
+from grader.runtime.session import RecordingSession
 
 pytestmark = pytest.mark.ros
 
@@ -40,32 +37,28 @@ node.get_logger().info("done")
 """
 
 
-@pytest.fixture(scope="module", params=["auto", FLAT_NAME, LANDLOCK_NAME])
-def in_tier(request: pytest.FixtureRequest) -> Iterator[RecordingSession]:
-    """A session in one of the sandboxes."""
-    try:
-        with open_session(request.param, 1) as session:
-            yield staging(session)
-    except EnvironmentFault as fault:
-        pytest.skip(fault.message)
-
-
 @pytest.mark.parametrize(("does", "told"), DOES.values(), ids=DOES)
-def test_what_is_told_of_a_program(in_tier: RecordingSession, tmp_path: Path, does: str, told: tuple[str, ...]) -> None:
+def test_what_is_told_of_a_program(
+    session_in_tier: RecordingSession, tmp_path: Path, does: str, told: tuple[str, ...]
+) -> None:
     """A program of which something is told is recorded again as a bare process."""
     tmp_path.chmod(0o755)
     folder = tmp_path / "s"
-    trace = record(in_tier, folder, PROGRAM.format(does=does or "pass"), duration_ns=NS_PER_S)
+    trace = record(session_in_tier, folder, PROGRAM.format(does=does or "pass"), duration_ns=NS_PER_S)
     assert [log.text for log in trace.records()] == ["done"], trace.faults()
     assert trace.reached == told
 
 
-def test_nothing_is_told_of_a_module_that_hides_one_of_python(in_tier: RecordingSession, tmp_path: Path) -> None:
+def test_nothing_is_told_of_a_module_that_hides_one_of_python(
+    session_in_tier: RecordingSession, tmp_path: Path
+) -> None:
     """The host then imports what it needs later, from a folder of its own."""
     folder = tmp_path / "s"
     folder.mkdir()
     tmp_path.chmod(0o755)
     (folder / "random.py").write_text("def choice(values):\n    return values[0]\n")
-    trace = record(in_tier, folder, PROGRAM.format(does="import random; random.choice('a')"), duration_ns=NS_PER_S)
+    trace = record(
+        session_in_tier, folder, PROGRAM.format(does="import random; random.choice('a')"), duration_ns=NS_PER_S
+    )
     assert [log.text for log in trace.records()] == ["done"], trace.faults()
     assert trace.reached == ()

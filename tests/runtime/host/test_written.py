@@ -5,21 +5,20 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hostile import hostile, printed, record, staging
+from hostile import hostile, printed, record
 from mcap.reader import make_reader
 
 from grader.runtime.host.written import ALL_BYTES, FILE_BYTES, FILES
-from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB
 from grader.runtime.model.trace import ClockKind, Trace, WrittenFile
 from grader.runtime.recording.recording_file import recording_bytes, trace_of
-from grader.runtime.session import RecordingSession, open_session
+from grader.runtime.session import RecordingSession
 from grader.runtime.worker.beside import MOST_OF_SUBMISSION, whole_submission
 from grader.runtime.worker.student_process import written_files
 
@@ -41,22 +40,12 @@ print("after", sorted(path.name for path in here.iterdir()), os.getcwd() == str(
 """
 
 
-@pytest.fixture(scope="module", params=["auto", "bubblewrap-flat", "landlock"])
-def session(request: pytest.FixtureRequest) -> Iterator[RecordingSession]:
-    """A sandbox with one worker: with a view of files of its own for each process, and without."""
-    try:
-        with open_session(request.param, 1) as session:
-            yield staging(session)
-    except EnvironmentFault as fault:
-        pytest.skip(fault.message)
-
-
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Run:
+def run(session_in_tier: RecordingSession, tmp_path: Path) -> Run:
     def run_one(*programs: str, **fields: Any) -> Trace:
         (tmp_path / "s").mkdir(exist_ok=True)
         (tmp_path / "s" / "table.txt").write_text("as handed in", encoding="utf-8")
-        return record(session, tmp_path / "s", *programs, **{"duration_ns": S, **fields})
+        return record(session_in_tier, tmp_path / "s", *programs, **{"duration_ns": S, **fields})
 
     tmp_path.chmod(0o755)
     return run_one
@@ -151,7 +140,7 @@ def test_a_large_submission_is_only_read(run: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.ros
-def test_a_program_of_a_package_works_in_an_empty_folder(session: RecordingSession, tmp_path: Path) -> None:
+def test_a_program_of_a_package_works_in_an_empty_folder(session_in_tier: RecordingSession, tmp_path: Path) -> None:
     """As under `ros2 run`, from anywhere; it may write beside its module all the same."""
     tmp_path.chmod(0o755)
     package = tmp_path / "s" / "drive" / "drive"
@@ -160,7 +149,7 @@ def test_a_program_of_a_package_works_in_an_empty_folder(session: RecordingSessi
     (package / "__init__.py").write_text("", encoding="utf-8")
     before = 'import os, pathlib\nprint(os.listdir("."), pathlib.Path(__file__).with_name("x.txt").write_text("1"))\n'
     (package / "node.py").write_text(hostile(before=before), encoding="utf-8")
-    trace = record(session, tmp_path / "s", processes=(("node.py", "drive/drive/node.py"),), duration_ns=S)
+    trace = record(session_in_tier, tmp_path / "s", processes=(("node.py", "drive/drive/node.py"),), duration_ns=S)
     assert printed(trace) == ["[] 1"]
     assert kept(trace) == {("node.py", "drive/drive/x.txt"): b"1"}
 

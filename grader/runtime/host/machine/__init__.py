@@ -66,10 +66,11 @@ _WINDOW_FUNCTIONS = (
 _IGNORED_BY_PYTHON = frozenset({signal.SIGPIPE, signal.SIGXFSZ})
 
 
-def install(*, bare: bool = False, in_place: bool = False) -> None:
+def install(root: str = "", *, bare: bool = False, in_place: bool = False) -> None:
     """Replace the functions of the standard library through which a program asks about the machine.
 
     Args:
+        root: The folder of the submission; without one, it is where the program is.
         bare: Whether nothing else of the grader is in this process, which then reads how logs look by itself.
         in_place: Whether the program sees and changes the same files as whoever started it.
     """
@@ -89,7 +90,7 @@ def install(*, bare: bool = False, in_place: bool = False) -> None:
         changes["rclpy.impl.implementation_singleton"] = _with_usual_logs
     temporary = os.environ.get("TMPDIR", TEMPORARY)
     if temporary != TEMPORARY and not in_place:
-        changes["sqlite3"] = _install_temporary_folder(temporary)
+        changes["sqlite3"] = _install_temporary_folder(temporary, root)
     sys.meta_path.insert(0, Changes(changes))
 
 
@@ -264,10 +265,11 @@ def _install_folders() -> None:
     os.listdir, os.scandir = sorted_listdir, sorted_scandir
 
 
-def _install_temporary_folder(folder: str) -> Callable[[Any], None]:
+def _install_temporary_folder(folder: str, root: str) -> Callable[[Any], None]:
     """Let /tmp be another folder for Python's functions, and return what makes it so for the module `sqlite3`.
 
-    Where a process has no view of files of its own, it may write to that folder only.
+    Where a process has no view of files of its own, it may write to that folder only. Python, ROS and the submission,
+    in the folder `root`, stay where they are.
     """
 
     def moved(path: Any) -> Any:
@@ -279,9 +281,8 @@ def _install_temporary_folder(folder: str) -> Callable[[Any], None]:
         if not isinstance(plain, str) or not (plain + "/").startswith(TEMPORARY + "/"):
             return path
         within = plain[len(TEMPORARY) :].lstrip("/")
-        # Python, ROS or the submission may themselves be there.
         first = os.path.join(TEMPORARY, within.partition("/")[0], "")
-        installed = (folder, sys.prefix, sys.base_prefix, *sys.path, *sys.argv[:1])
+        installed = (folder, root, sys.prefix, sys.base_prefix, *sys.path, *sys.argv[:1])
         is_installed = any(os.path.join(place, "").startswith(first) for place in installed if type(place) is str)
         return path if within and is_installed else os.path.join(folder, within)
 
