@@ -263,6 +263,7 @@ def _install_folders() -> None:
         return _Sorted(scandir(path))
 
     os.listdir, os.scandir = sorted_listdir, sorted_scandir
+    os.supports_fd.update((sorted_listdir, sorted_scandir))
 
 
 def _install_temporary_folder(folder: str, root: str) -> Callable[[Any], None]:
