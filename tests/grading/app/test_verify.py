@@ -49,8 +49,8 @@ DIFFERING = {
         program(imports="import time", each='self.get_logger().info(f"{time.process_time():.9f}")'),
         "processor_time",
     ),
-    "uptime_of_the_kernel": (
-        program(each='self.get_logger().info(open("/proc/uptime").read())'),
+    "count_of_the_kernel": (
+        program(each='self.get_logger().info(open("/proc/self/schedstat").read())'),
         "kernel",
     ),
     "file_time": (
