@@ -35,36 +35,31 @@ def install_alarms(give_up: Callable[[], None]) -> None:
     signal.setitimer, signal.alarm = guarded_setitimer, guarded_alarm
 
 
-def install_processes(give_up: Callable[[], None]) -> None:
-    """Call `give_up` before the program starts another process or replaces itself by one.
+def install_events(give_up: Callable[[str], None]) -> None:
+    """Call `give_up` before the program starts another process, replaces itself by one, or reads a clock of the kernel.
 
     `multiprocessing` starts processes by a function that does not call audit hooks, unless it forks.
+
+    Args:
+        give_up: Takes the code of the reason, `process` or `kernel_clock`.
     """
     import _posixsubprocess
 
     fork_exec = _posixsubprocess.fork_exec
+    clocks = frozenset((*KERNEL_CLOCKS, *map(os.fsencode, KERNEL_CLOCKS)))
 
     def hook(event: str, arguments: Any) -> None:
         if event in PROCESSES:
-            give_up()
+            give_up("process")
+        elif event == "open" and isinstance(arguments[0], (str, bytes)) and arguments[0] in clocks:
+            give_up("kernel_clock")
 
     def guarded_fork_exec(*arguments: Any) -> int:
-        give_up()
+        give_up("process")
         return int(fork_exec(*arguments))
 
     sys.addaudithook(hook)
     _posixsubprocess.fork_exec = guarded_fork_exec
-
-
-def install_kernel_clocks(give_up: Callable[[], None]) -> None:
-    """Call `give_up` before the program opens a file that tells real time."""
-    clocks = frozenset((*KERNEL_CLOCKS, *map(os.fsencode, KERNEL_CLOCKS)))
-
-    def hook(event: str, arguments: Any) -> None:
-        if event == "open" and isinstance(arguments[0], (str, bytes)) and arguments[0] in clocks:
-            give_up()
-
-    sys.addaudithook(hook)
 
 
 def any_outside(descriptors: Iterable[int]) -> bool:

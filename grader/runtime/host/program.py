@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from . import closures, entry, launch_files, machine, originals
 from .faults import Describer
 from .link import Link, Log
-from .outside import install_alarms, install_kernel_clocks, install_processes
+from .outside import install_alarms, install_events
 from .quick_imports import import_without_needless
 from .replaced import guard_methods, hide_frames, rename_functions, without_own_frames
 from .shadows import ROS_PARTS, Around
@@ -120,8 +120,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     if isinstance(time, VirtualTime) and watchdog is not None:
         watchdog.start()
         install_alarms(functools.partial(watchdog.give_up_outside, "alarm"))
-        install_processes(functools.partial(watchdog.give_up_outside, "process"))
-        install_kernel_clocks(functools.partial(watchdog.give_up_outside, "kernel_clock"))
+        install_events(watchdog.give_up_outside)
         time.give_up_outside = watchdog.give_up_outside
         if not request["in_place"]:  # nobody deceives whoever tests a program of their own
             Watch(link, request["root"]).install()

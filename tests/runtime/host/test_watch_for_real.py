@@ -21,7 +21,7 @@ DOES: dict[str, tuple[str, tuple[str, ...]]] = {
     "a file about itself": ("open('/proc/self/environ')", ("open",)),
     "other processes": ("os.listdir('/proc')", ("os.listdir",)),
     "the memory that others share": ("os.scandir('/dev/shm/')", ("os.scandir",)),
-    "the same by way of its own folder": ("os.listdir('/tmp/../dev/shm')", ("os.listdir",)),
+    "the same by another way": ("os.listdir('/tmp/../dev/shm')", ("os.listdir",)),
 }
 PROGRAM = """
 import os

@@ -45,15 +45,17 @@ DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
 LOG_VARIABLES = ("RCUTILS_CONSOLE_OUTPUT_FORMAT", "RCUTILS_COLORIZED_OUTPUT", "RCUTILS_LOGGING_USE_STDOUT")
 #: The folder for temporary files that programs name themselves.
 TEMPORARY = "/tmp"  # noqa: S108 - no file is created there
-#: Functions of `os` that take a path, or two, as their first arguments, and the names of these arguments.
+#: Functions of `os` whose first arguments are paths, and how many of them.
 _WITH_PATHS = {
     **dict.fromkeys(("open", "stat", "lstat", "access", "listdir", "scandir", "chdir", "mkdir", "rmdir"), 1),
     **dict.fromkeys(("remove", "unlink", "chmod", "utime", "truncate", "readlink", "mkfifo", "statvfs"), 1),
     **dict.fromkeys(("getxattr", "listxattr", "setxattr", "removexattr"), 1),
     **dict.fromkeys(("rename", "replace", "link", "symlink"), 2),
 }
-_OF_A_FILE = frozenset({"chmod", "utime"})
-_PATHS = frozenset({"path", "src", "dst", "file", "database"})
+#: Those of them that the sandboxes without a view of files of their own forbid, also for the program's own files.
+_FORBIDDEN = frozenset({"chmod", "utime"})
+#: The names of these arguments, in `os`, `open` and `sqlite3.connect`.
+_PATH_ARGUMENTS = frozenset({"path", "src", "dst", "file", "database"})
 _FOLDER = os.path.dirname(os.path.abspath(__file__))
 #: What `backend_NAME.py` begins with for those that open windows.
 _TOOLKITS = ("gtk", "macosx", "qt", "tk", "wx")
@@ -291,7 +293,7 @@ def _install_temporary_folder(folder: str, root: str) -> Callable[[Any], None]:
         @functools.wraps(function)
         def call(*arguments: Any, **named: Any) -> Any:
             first = [moved(argument) for argument in arguments[:paths]]
-            named = {name: moved(value) if name in _PATHS else value for name, value in named.items()}
+            named = {name: moved(value) if name in _PATH_ARGUMENTS else value for name, value in named.items()}
             return function(*first, *arguments[paths:], **named)
 
         return call
@@ -302,7 +304,6 @@ def _install_temporary_folder(folder: str, root: str) -> Callable[[Any], None]:
             try:
                 function(path, *arguments, **named)
             except PermissionError:
-                # The sandbox allows no change of what belongs to a file, of its own files neither.
                 if type(path) is int or not os.path.realpath(os.fsdecode(path)).startswith(folder):
                     raise
                 stat(path)
@@ -312,7 +313,7 @@ def _install_temporary_folder(folder: str, root: str) -> Callable[[Any], None]:
     stat = os.stat
     for name, paths in _WITH_PATHS.items():
         original = getattr(os, name)
-        replaced = with_moved(tolerant(original) if name in _OF_A_FILE else original, paths)
+        replaced = with_moved(tolerant(original) if name in _FORBIDDEN else original, paths)
         setattr(os, name, replaced)
         for kind in (os.supports_dir_fd, os.supports_fd, os.supports_follow_symlinks, os.supports_effective_ids):
             if original in kind:
