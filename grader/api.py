@@ -126,6 +126,7 @@ if TYPE_CHECKING:
     from grader.grading.judging.texts import Printed as Printed
     from grader.grading.judging.texts import clean as clean
     from grader.grading.judging.texts import printed_numbers as printed_numbers
+    from grader.grading.judging.texts import readings as readings
     from grader.grading.judging.texts import segments as segments
     from grader.grading.judging.texts import template_of as template_of
     from grader.grading.judging.texts import with_decimal_points as with_decimal_points
@@ -277,7 +278,9 @@ CONTENTS: dict[str, dict[str, str]] = {
             "JITTER_NS"
         ),
         "grader.grading.judging.logs.outputs": "student_records printed_lines written shape_of number_told",
-        "grader.grading.judging.texts": "Printed printed_numbers clean with_decimal_points segments template_of",
+        "grader.grading.judging.texts": (
+            "Printed printed_numbers clean readings with_decimal_points segments template_of"
+        ),
         "grader.grading.judging.logs.matching": "chance",
         "grader.grading.judging.series": "lag_ns steps_behind",
         "grader.grading.judging.service_calls": "Call calls_of",

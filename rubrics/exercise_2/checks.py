@@ -60,6 +60,7 @@ from grader.api import (
     printed_lines,
     printed_numbers,
     quote,
+    readings,
     seconds,
     segments,
     series,
@@ -67,7 +68,6 @@ from grader.api import (
     student_records,
     template_of,
     time_chart,
-    with_decimal_points,
     within,
     written,
 )
@@ -541,12 +541,17 @@ def blocks(outputs: Iterable[LogRecord | OutputLine], clock: ClockKind) -> list[
     return [Text(t_ns, clean("\n".join(texts))) for t_ns, texts in joined]
 
 
-def grouped(texts: Iterable[Text], *, decimal_comma: bool = False) -> list[Group]:
-    """Return texts that hold a number, grouped by template in order of appearance."""
+def grouped(texts: Iterable[Text], reading: int = 0) -> list[Group]:
+    """Return texts that hold a number, grouped by template in order of appearance.
+
+    Args:
+        texts: The texts.
+        reading: Which of their readings to take; of a text that does not have it, the plainest.
+    """
     pairs: dict[str, tuple[Pair, ...]] = {}
     members: dict[str, list[Entry]] = {}
     for text in texts:
-        body = (with_decimal_points(text.text) or text.text) if decimal_comma else text.text
+        body = readings(text.text)[reading] or text.text
         numbers = printed_numbers(body)
         if not numbers:
             continue
@@ -651,24 +656,23 @@ def printed_positions(trace: Trace, process: str, track: Track) -> Analysis:
 
 
 def _analysed(outputs: Sequence[LogRecord | OutputLine], track: Track, clock: ClockKind) -> Analysis:
-    """Return the best interpretation: text by text or block by block, with decimal points or decimal commas."""
+    """Return the best interpretation: text by text or block by block, in each reading that some text has."""
     during = [o for o in outputs if o.t_ns >= track.times_ns[0]]
     best = Analysis(needed=_needed(track))
     singly, together = [Text(o.t_ns, clean(o.text)) for o in during], blocks(during, clock)
     for texts in (singly, together) if len(together) < len(singly) else (singly,):
-        for decimal_comma in (False, True):
-            found = _judged(texts, track, decimal_comma=decimal_comma)
+        bodies = zip(*(readings(t.text) for t in texts), strict=True)
+        for reading in [k for k, some in enumerate(bodies) if any(some)] or [0]:
+            found = _judged(texts, track, reading)
             if found.met:
                 return found
             if (len(found.right), len(found.groups)) > (len(best.right), len(best.groups)) or not best.groups:
                 best = found
-            if not any("," in t.text for t in texts):
-                break
     return best
 
 
-def _judged(texts: Sequence[Text], track: Track, *, decimal_comma: bool) -> Analysis:
-    groups = tuple(matched(g, track) for g in grouped(texts, decimal_comma=decimal_comma))
+def _judged(texts: Sequence[Text], track: Track, reading: int) -> Analysis:
+    groups = tuple(matched(g, track) for g in grouped(texts, reading))
     chosen = [g for g in groups if g.right and g.share >= _POSITION_SHARE]
     if (
         chosen

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Sequence
+from functools import lru_cache
 
 from grader.runtime.model.dataclass import dataclass
 
@@ -18,17 +19,28 @@ _ANSI = re.compile(r"\x1b\[[0-9;?]*[ -/]*[@-~]")
 _MINUS = dict.fromkeys((0x2212, 0x2010, 0x2011, 0x2012, 0x2013, 0xFE63, 0xFF0D), "-")
 _NUMBER = re.compile(
     r"(?P<hex>0[xX][0-9a-fA-F]+)"
-    r"|(?:(?<![0-9.])(?P<sign>[+-]))?"
-    r"(?:(?P<whole>[0-9]+)(?:\.(?P<part>[0-9]*))?|\.(?P<only>[0-9]+))(?:[eE](?P<power>[+-]?[0-9]{1,3})(?![0-9]))?"
+    # No sign: the one between the two numbers of a range; a complex number has no such range.
+    r"|(?:(?:(?<![0-9])(?<![0-9]\.)|(?=[+-][0-9.e+-]{1,40}j))(?P<sign>[+-]))?"
+    # No decimal point: the last one of `speed...5`.
+    r"(?:(?P<whole>[0-9]+)(?:\.(?P<part>[0-9]*))?|(?<!\.)\.(?P<only>[0-9]+))"
+    r"(?:[eE](?P<power>[+-]?[0-9]{1,3})(?![0-9]))?"
     r"|(?<![A-Za-z0-9_])[+-]?(?P<odd>nan|inf|infinity)(?![A-Za-z0-9_])",
     re.IGNORECASE,
 )
-_DECIMAL_COMMA = re.compile(r"(?<![0-9.,])([0-9]+),([0-9]+)(?![0-9]*[.,][0-9])")
+_DECIMAL_COMMA = re.compile(r"(?<![0-9,])(?<![0-9]\.)([0-9]+),([0-9]+)(?![0-9]*[.,][0-9])")
+#: The end of a word, which is not the power of a number.
+_WORD_END = r"(?<![0-9.])([A-Za-z_À-ɏ])"
+_JOINED = re.compile(rf"{_WORD_END}(?=[0-9])")
+_DASHED = re.compile(rf"{_WORD_END}-(?=-?[0-9.])")
 _NAME_BEFORE = re.compile(r"[A-Za-z_À-ɏ]+$")
 #: Characters before most numbers that cannot end a name, so the text before them needs no further check.
 _NO_NAME = frozenset(" =:,([")
-_UNIT_AFTER = re.compile(r"\s?(cm|mm)(?![A-Za-z0-9])")
-_PER_METRE = {"cm": 0.01, "mm": 0.001}
+_UNIT_AFTER = re.compile(
+    r"\s?(?:(?P<short>[kdcm])m|(?P<long>kil[oó]|d[eé][cz][ií]|[cz]ent[ií]|mill?[ií])m[eèé]t[a-z]*)(?![A-Za-z0-9]|/h)",
+    re.IGNORECASE,
+)
+#: By the first letter of the prefix; German writes Zentimeter.
+_METRES = {"k": 1000.0, "d": 0.1, "c": 0.01, "z": 0.01, "m": 0.001}
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +80,31 @@ def with_decimal_points(text: str) -> str | None:
     return changed if changed != text else None
 
 
+def with_numbers_apart(text: str) -> str | None:
+    """Return the text with `fan37` read as `fan 37`, or None if it has no such number."""
+    return _spaced(_JOINED, text)
+
+
+def with_dashes(text: str) -> str | None:
+    """Return the text with `x-1.5` read as `x 1.5` and `x--1.5` as `x -1.5`, or None if it has no such number."""
+    return _spaced(_DASHED, text)
+
+
+def _spaced(ends: re.Pattern[str], text: str) -> str | None:
+    changed = ends.sub(r"\1 ", text)
+    return changed if changed != text else None
+
+
+@lru_cache(maxsize=4096)
+def readings(text: str) -> tuple[str | None, ...]:
+    """Return a cleaned text in every way in which it may be meant, the plainest first.
+
+    There are as many for each text, in the same order; None where one does not differ from the plainest. All texts of a
+    statement must be read in the same way: otherwise a number without its sign is right with one of them.
+    """
+    return text, with_decimal_points(text), with_numbers_apart(text), with_dashes(text)
+
+
 def printed_numbers(text: str) -> tuple[Printed, ...]:
     """Return the numbers of a cleaned text in order; digits in a name such as `robot1` are not numbers."""
     found: list[Printed] = []
@@ -94,7 +131,7 @@ def _read(text: str, match: re.Match[str]) -> Printed | None:
     scale = 1.0
     unit = _UNIT_AFTER.match(text, match.end())
     if unit:
-        scale = _PER_METRE[unit[1]]
+        scale = _METRES[(unit["short"] or unit["long"])[0].lower()]
     return Printed(float(match[0]) * scale, step * scale, match.start(), match.end())
 
 

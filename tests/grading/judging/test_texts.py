@@ -8,7 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.grading.judging.texts import clean, printed_numbers, template_of, with_decimal_points
+from grader.grading.judging.texts import (
+    clean,
+    printed_numbers,
+    readings,
+    template_of,
+    with_dashes,
+    with_decimal_points,
+    with_numbers_apart,
+)
 
 
 def values(text: str) -> list[float]:
@@ -37,6 +45,11 @@ def values(text: str) -> list[float]:
         ("\x1b[32m1.5\x1b[0m", [1.5]),
         ("\uff11\uff12\uff0e\uff15", [12.5]),
         ("2024-05-01", [2024, 5, 1]),
+        ("speed...5 speed…0.5 speed....25", [5, 0.5, 25]),
+        ("x........1.50 y.......-1.50", [1.5, -1.5]),
+        ("0.5..0.7 [0..10] 10.-20. v1.2.3", [0.5, 0.7, 0, 10, 10, 20, 1.2, 0.3]),
+        ("(1.5-2.5j) (-1e-05+3j) 1-2 jobs", [1.5, -2.5, -0.00001, 3, 1, 2]),
+        ("5 dm 0.005km 5 km/h 120 centimetres 15 Zentimeter 150 milímetros", [0.5, 5, 5, 1.2, 0.15, 0.15]),
         ("info nano infinite", []),
         ("1e3m 0e9 1e-999", [1000, 0, 0]),
         ("", []),
@@ -81,6 +94,45 @@ def test_a_cut_off_number_shows_its_value(value: float, digits: int) -> None:
     cut = math.trunc(value * 10**digits) / 10**digits
     (number,) = printed_numbers(f"{cut:.{digits}f}")
     assert number.shows(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("fan37 fan_speed_4 x-5", [37, 4, -5]),
+        ("Größe12 x-.5", [12, -0.5]),
+        ("robot1 at 1.5e-3 and 0x7f12", [1, 0.0015]),
+        ("x=-1.5 is - 2", None),
+        ("", None),
+    ],
+)
+def test_numbers_are_read_apart_from_words(text: str, found: list[float] | None) -> None:
+    """A space that is missing before a number gives a reading of its own."""
+    apart = with_numbers_apart(clean(text))
+    assert (apart and values(apart)) == (found and pytest.approx(found))
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("x-1.72 y--0.89", [1.72, -0.89]),
+        ("fan-37 x-.5 z=-2", [37, 0.5, -2]),
+        ("1.5e-3 x=-1.5 is - 2", None),
+        ("", None),
+    ],
+)
+def test_dashes_are_no_signs_after_words(text: str, found: list[float] | None) -> None:
+    """A dash between a word and its number gives a reading of its own."""
+    dashed = with_dashes(clean(text))
+    assert (dashed and values(dashed)) == (found and pytest.approx(found))
+
+
+@given(st.text(max_size=40))
+def test_every_text_has_as_many_readings(text: str) -> None:
+    """The first reading is the text; the others differ from it or are None."""
+    first, *others = readings(text)
+    assert (first, len(others)) == (text, 3)
+    assert text not in others
 
 
 @given(st.floats(-50, 50, allow_nan=False), st.floats(-50, 50, allow_nan=False))

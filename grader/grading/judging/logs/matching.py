@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field
 from functools import lru_cache
 
 from grader.grading.judging.logs.outputs import Output, numbers_in
-from grader.grading.judging.texts import Printed, clean, printed_numbers, with_decimal_points
+from grader.grading.judging.texts import Printed, clean, printed_numbers, readings
 from grader.grading.judging.values import as_number
 from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
@@ -119,7 +119,11 @@ class _Record:
 
 def followed(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[int]:
     """Return the indices in `sought`, ordered by time, of values that are logged, not only among many other numbers."""
-    places = _places(outputs, sought)
+    found = (_followed(_places(outputs, sought, reading), sought) for reading in _ways(outputs))
+    return max(found, key=len, default=frozenset())
+
+
+def _followed(places: Mapping[_Place, _Record], sought: Sequence[Sought]) -> frozenset[int]:
     # each number is indexed from the start and from the end, and counted once
     tried = [p for (_, index), p in places.items() if p.near and index >= 0]
     beside = [0] * len(sought)
@@ -137,17 +141,27 @@ def followed(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[i
 
 def standing(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[int]:
     """Return the indices in `sought` of values that occur anywhere in the output of their time."""
+    return max((_standing(outputs, sought, reading) for reading in _ways(outputs)), key=len, default=frozenset())
+
+
+def _standing(outputs: Sequence[Output], sought: Sequence[Sought], reading: int) -> frozenset[int]:
     found: set[int] = set()
     for output, active in _active(outputs, sought):
-        numbers = [n for _, ns in _readings(output.text) for n in ns]
+        _, numbers = _shaped(output.text, reading)
         found.update(k for k in active if k not in found and any(sought[k].shows(n) for n in numbers))
     return frozenset(found)
+
+
+def _ways(outputs: Sequence[Output]) -> list[int]:
+    """Return the readings that some text has: all texts are read in the same way."""
+    texts = (readings(clean(o.text)) for o in outputs)
+    return [reading for reading, bodies in enumerate(zip(*texts, strict=True)) if any(b is not None for b in bodies)]
 
 
 def surroundings(outputs: Sequence[Output], one: Sought) -> str:
     """Return a clause about the other numbers in the texts that show a value."""
     texts = [o.text for o, _ in _active(outputs, [one])]
-    count = sum(len(_readings(text)[0][1]) for text in texts)
+    count = sum(len(printed_numbers(clean(text))) for text in texts)
     longest = max(texts, key=len, default="")
     return f"among {counted(count, 'number')} written meanwhile, as in {quote(longest, 60)!r}"
 
@@ -166,23 +180,23 @@ def _knows(place: _Record, tried: int, beside: int, *, several: bool) -> bool:
     return luck <= _LUCK
 
 
-def _places(outputs: Sequence[Output], sought: Sequence[Sought]) -> dict[_Place, _Record]:
+def _places(outputs: Sequence[Output], sought: Sequence[Sought], reading: int) -> dict[_Place, _Record]:
     places: dict[_Place, _Record] = {}
     for output, active in _active(outputs, sought):
         where = (output.file, output.line) if isinstance(output, LogRecord) else ("", 0)
-        for shape, numbers in _readings(output.text):
-            for index, printed in enumerate(numbers):
-                shown = [k for k in active if sought[k].shows(printed)]
-                near = any(abs(printed.value) <= 1.1 * sought[k].scale for k in active)
-                chances = {sought[k].value: _chance(printed, sought[k]) for k in shown}
-                for place in (index, index - len(numbers)):
-                    record = places.setdefault(((*where, *shape), place), _Record())
-                    record.texts += 1
-                    record.right += bool(shown)
-                    record.near |= near
-                    record.active.update(active)
-                    record.shown.update(shown)
-                    record.chances |= chances
+        shape, numbers = _shaped(output.text, reading)
+        for index, printed in enumerate(numbers):
+            shown = [k for k in active if sought[k].shows(printed)]
+            near = any(abs(printed.value) <= 1.1 * sought[k].scale for k in active)
+            chances = {sought[k].value: _chance(printed, sought[k]) for k in shown}
+            for place in (index, index - len(numbers)):
+                record = places.setdefault(((*where, *shape), place), _Record())
+                record.texts += 1
+                record.right += bool(shown)
+                record.near |= near
+                record.active.update(active)
+                record.shown.update(shown)
+                record.chances |= chances
     return places
 
 
@@ -202,11 +216,12 @@ def _active(outputs: Sequence[Output], sought: Sequence[Sought]) -> Iterator[tup
 
 
 @lru_cache(maxsize=4096)
-def _readings(text: str) -> tuple[tuple[tuple[str, frozenset[str], str], tuple[Printed, ...]], ...]:
-    """Return the numbers of a text with its shape, and a second reading with decimal commas if it may have some."""
-    body = clean(text)
-    other = with_decimal_points(body)
-    return tuple((_wording(b, ns), ns) for b in (body, other) if b is not None for ns in (printed_numbers(b),))
+def _shaped(text: str, reading: int) -> tuple[tuple[str, frozenset[str], str], tuple[Printed, ...]]:
+    """Return a reading of a text, or the plainest if it does not have it: its shape and its numbers."""
+    plain = clean(text)
+    body = readings(plain)[reading] or plain
+    numbers = printed_numbers(body)
+    return _wording(body, numbers), numbers
 
 
 def _wording(text: str, numbers: Sequence[Printed]) -> tuple[str, frozenset[str], str]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 
 from grader.grading.judging.findings import AT_ONCE_NS, first_fault
-from grader.grading.judging.texts import Printed, clean, printed_numbers, template_of, with_decimal_points
+from grader.grading.judging.texts import Printed, clean, printed_numbers, readings, template_of
 from grader.grading.judging.values import number_at, per_trace, text_at
 from grader.runtime.model.trace import LogRecord, OutputLine, Trace
 
@@ -97,10 +97,8 @@ Output = LogRecord | OutputLine
 
 @lru_cache(maxsize=4096)
 def numbers_in(text: str) -> tuple[Printed, ...]:
-    """Return the numbers of a text; decimal commas are read both ways."""
-    body = clean(text)
-    other = with_decimal_points(body)
-    return printed_numbers(body) + (printed_numbers(other) if other else ())
+    """Return the numbers of a text in every way in which it may be meant."""
+    return tuple(n for body in readings(clean(text)) if body is not None for n in printed_numbers(body))
 
 
 def after(text: str, printed: Printed) -> str:

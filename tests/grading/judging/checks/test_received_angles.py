@@ -57,6 +57,9 @@ RIGHT: dict[str, Callable[[float], str]] = {
     "decimal comma": lambda a: f"{a:.3f} rad ({math.degrees(a):.1f} Grad)".replace(".", ","),
     "with a count": lambda a: f"message 17: {a:.3f} rad, {math.degrees(a):.1f}°",
     "as a dictionary": lambda a: str({"rad": a, "deg": math.degrees(a)}),
+    "dots": lambda a: f"rad...{a:.3f} deg...{math.degrees(a):.1f}",
+    "filled with dots": lambda a: f"{a:.>10.3f} rad {math.degrees(a):.>10.1f} deg",
+    "dashes": lambda a: f"rad-{a:.3f} deg-{math.degrees(a):.1f}",
     "wrapped beside": lambda a: f"{a:.3f} rad = {math.degrees(a):.1f} deg = {math.degrees(a) % 360:.1f} deg",
 }
 
@@ -90,6 +93,8 @@ WRONG: dict[str, tuple[Callable[[float], str], str]] = {
     "ten times": (lambda a: f"{a:.3f} rad ({math.degrees(a) * 10:.1f})", "instead there is 572.9"),
     "whole radians": (lambda a: f"{int(a)} rad ({math.degrees(a):.1f})", "whole number"),
     "absolute": (lambda a: f"{abs(a):.3f} rad ({abs(math.degrees(a)):.1f})", "sign is lost"),
+    "negative, glued": (lambda a: f"rad{-a:.3f} deg{-math.degrees(a):.1f}", "its sign is inverted"),
+    "absolute, after dashes": (lambda a: f"rad-{abs(a):.3f} deg-{abs(math.degrees(a)):.1f}", "expected"),
     "negative": (lambda a: f"{-a:.3f} rad ({-math.degrees(a):.1f})", "its sign is inverted"),
     "wrapped": (lambda a: f"{a:.3f} rad ({math.degrees(a) % 360:.1f})", "expected -1 and -57.2958"),
     "constant": (lambda a: "got 0.5 rad (28.6)", "expected"),

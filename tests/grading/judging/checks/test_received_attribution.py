@@ -80,6 +80,11 @@ RIGHT: dict[str, Write] = {
     "two records": lambda k, v: [f"message {k} came", f"its speed is {v}"],
     "the same call for both": lambda _k, v: [f"{TEMPERATURES.uniform(20, 30):.1f}", f"{v:.1f}"],
     "only when it changes": lambda k, v: [f"fan {v:.0f}"] if k % 10 == 0 else [f"it is {20 + k % 7} degrees"],
+    "no space before it": lambda _k, v: [f"the fan speed is{v:.0f}"],
+    "an underscore before it": lambda _k, v: [f"fan_speed_{v:.0f}"],
+    "a dash before it": lambda _k, v: [f"fan-{v:.1f}"],
+    "dots before it": lambda _k, v: [f"fan speed...{v:.0f}"],
+    "beside other names": lambda k, v: [f"fan1 of robot2 on port3 runs at speed{v:.0f}, message{k}"],
     "from and to": lambda k, v: [f"fan {SPEEDS[max(0, k // 10 - 1)]:.0f} -> {v:.0f}"],
 }
 WRONG: dict[str, Write] = {
@@ -90,6 +95,8 @@ WRONG: dict[str, Write] = {
     "never the same words": lambda k, _v: [f"{letters(k)}: " + " ".join(map(str, range(101)))],
     "never the same record": lambda k, _v: [f"{letters(101 * k + n)}: {n}" for n in range(101)],
     "ten a message": lambda k, _v: [f"{letters(k)}: 0 100 " + " ".join(str(n) for n in range(k % 10, 101, 10))],
+    "all numbers, each after a word": lambda _k, _v: [" ".join(f"fan{n}" for n in range(101))],
+    "a record for each, after a word": lambda _k, _v: [f"fan{n}" for n in range(101)],
     "counting": lambda k, _v: [f"fan speed: {(7 * k + n) % 101}" for n in range(7)],
 }
 
