@@ -217,11 +217,16 @@ def _isolation(name: str, *, as_user: bool) -> Isolation:
     return FlatBubblewrap(outer) if name == "bubblewrap-flat" else outer
 
 
-def user_start(ros: RosInstallation) -> tuple[str, ...]:
-    """Return what starts a program as an ordinary user, who sees the interpreter even where root's home holds it."""
+def user_start(ros: RosInstallation, *further: str) -> tuple[str, ...]:
+    """Return what starts a program as an ordinary user, who sees the interpreter even where root's home holds it.
+
+    Args:
+        ros: The installation with the interpreter.
+        further: More options for `unshare`.
+    """
     # Through env, since setpriv itself still finds programs with root's eyes.
     start = ("setpriv", f"--reuid={USER}", f"--regid={USER}", "--clear-groups", "env")
-    return (*opened_start(ros), *start)
+    return (*opened_start(ros, *further), *start)
 
 
 def opened_start(ros: RosInstallation, *further: str) -> tuple[str, ...]:

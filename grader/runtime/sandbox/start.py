@@ -177,7 +177,31 @@ def limit(which: int, value: int, beyond: int = 0) -> None:
 
 
 def running() -> int:
-    """Return how many processes and threads this user has, which the kernel counts together."""
+    """Return how many processes and threads this user has, which the kernel counts together.
+
+    In a container the kernel also counts those that the user's number has outside, and /proc does not show them: then
+    more than there are.
+    """
+    count, (_, most) = visible(), resource.getrlimit(resource.RLIMIT_NPROC)
+    while (most == resource.RLIM_INFINITY or count + SPARE < most) and not may_start(count + SPARE, most):
+        count = 2 * (count + SPARE)
+    return count
+
+
+def may_start(most_processes: int, hard: int) -> bool:
+    """Return whether this process may start another one under this soft limit."""
+    resource.setrlimit(resource.RLIMIT_NPROC, (most_processes, hard))
+    try:
+        os.posix_spawn("", ["no program"], {})
+    except BlockingIOError:
+        return False
+    except FileNotFoundError:  # the process was started, and then found no program
+        return True
+    raise OSError(errno.EINVAL, "a process without a program was started")
+
+
+def visible() -> int:
+    """Return how many processes and threads of this user /proc shows."""
     count, user = 0, os.getuid()
     for process in filter(str.isdigit, os.listdir("/proc")):
         with contextlib.suppress(OSError):

@@ -5,12 +5,14 @@ import os
 import secrets
 import signal
 import socket
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from sandboxes import HOST, Sandbox, close, find_sandbox, said, sandbox_or_skip, start
+from sandboxes import HOST, Sandbox, close, find_sandbox, said, sandbox_or_skip, start, user_start
 
 import grader
 from grader.runtime.model.errors import HarnessError
@@ -288,6 +290,37 @@ print(count)
     # An ordinary user's limit counts what else the user runs, such as the same test beside this one, which may end
     # between the count and the start. That happens in one run, but not in every one.
     assert any(0 < started() < allowed + 40 for _ in range(5))
+
+
+def test_processes_outside_of_a_container_take_no_room(sandbox: Sandbox, ros: RosInstallation) -> None:
+    """The kernel counts those of the same user in and outside of a container together; /proc shows those inside."""
+    if not sandbox.start_as:
+        pytest.skip("only root can hide a user's processes")
+    limits = Limits(processes=64)
+    others = f"""
+import threading
+for _ in range({limits.processes + SPARE + 100}):
+    threading.Thread(target=threading.Event().wait, daemon=True).start()
+print("ready", flush=True)
+input()
+"""
+    code = """
+import threading
+done = threading.Event()
+threads = [threading.Thread(target=done.wait) for _ in range(40)]
+for thread in threads:
+    thread.start()
+print("started")
+done.set()
+"""
+    outside = [*sandbox.start_as, sys.executable, "-I", "-S", "-c", others]
+    inside = replace(sandbox, start_as=user_start(ros, "--pid", "--fork", "--kill-child", "--mount-proc"))
+    with subprocess.Popen(outside, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        done = inside.run(code, limits=limits)
+        process.kill()
+    assert done.stdout == "started\n", done.stderr
 
 
 def test_a_student_has_no_privilege_over_files_that_it_needs_none_for(sandbox: Sandbox) -> None:
