@@ -472,7 +472,10 @@ class Ledger:
         ]
 
     def _surplus(self, expected: dict[str, dict[str, list[int]]]) -> dict[tuple[str, str], int]:
-        """Count the counterparts, by kind and topic, that neither the grader expects nor an earlier wait has found."""
+        """Count the counterparts, by kind and name, that neither the grader expects nor an earlier wait has found.
+
+        A server that still sees a client that has left sends its response, which wakes all other clients.
+        """
         over: Counter[tuple[str, str]] = Counter()
         for kind in ENDS_OF_TOPICS:
             for endpoint in self.alive(kind):
@@ -480,7 +483,16 @@ class Ledger:
                     over[kind, endpoint.topic_name] += _matches(kind, endpoint) or 0
         for kind, name in over:
             over[kind, name] -= sum(expected.get(kind, {}).get(name, ()))
+        services = expected.get("service", {})
+        for name in self._served():
+            over["service", name] = (self._clients_of(name) or 0) - max(services.get(name, ()), default=0)
         return {key: count for key, count in over.items() if count > self._strangers.get(key, 0)}
+
+    def _served(self) -> set[str]:
+        """Return the services of the program's servers, without those that every node has."""
+        servers = [s for s in self.alive("service") if not _is_background(s) and not self.is_elsewhere(s.handle)]
+        of_actions = (name for end in self._actions if end.kind == "service" for name in end.services())
+        return {*map(service_name, servers), *of_actions}
 
     def await_absence(self, services: list[str], wait_s: float) -> None:
         """Wait, in real time, until clients see that the servers of some services are gone."""

@@ -1,4 +1,4 @@
-"""What a host tells of messages that were announced and did not come."""
+"""What a host tells of messages that were announced and did not come, and waits for before it goes on."""
 
 from __future__ import annotations
 
@@ -51,6 +51,16 @@ class Subscription:
         self.topic_name = topic
         self.qos_profile = type("Qos", (), {"depth": 1})()
         self.handle = Handle([*coming])
+
+
+class Server:
+    """As much of a service as the ledger asks for."""
+
+    srv_type = Trigger
+
+    def __init__(self, name: str) -> None:
+        self.handle = Handle([])
+        self.handle.service_name = name  # type: ignore[attr-defined]
 
 
 class Context:
@@ -145,3 +155,17 @@ def test_the_newest_of_more_requests_than_a_queue_holds_may_arrive_first(ledger:
     ledger.took(server)
     ledger.expect({"request /work": 1})
     assert len(waits) == 1
+
+
+@pytest.mark.parametrize(("seen", "expected"), [([2, 2, 2, 1], {"service": {"/q": [1]}}), ([1, 1, 0], {})])
+def test_a_server_sees_no_client_that_has_left(
+    ledger: Any, monkeypatch: pytest.MonkeyPatch, seen: list[int], expected: dict[str, Any]
+) -> None:
+    """It would send it a response, which wakes the other clients."""
+    monkeypatch.setattr(importlib.import_module("_grader_host.ledger"), "DEPARTURE_S", 600)
+    server = Server("/q")
+    ledger.add("service", server)
+    last = seen[-1]
+    monkeypatch.setattr(ledger, "_clients_of", lambda _: seen.pop(0) if seen else last)
+    assert ledger.await_matches(expected, 600) == []
+    assert seen == []
