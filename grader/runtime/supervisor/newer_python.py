@@ -41,8 +41,8 @@ NEW_NAMES: Mapping[Version, Mapping[str, str]] = {
         "contextlib": "chdir",
         "datetime": "UTC",
         "enum": "CONFORM CONTINUOUS EJECT EnumCheck EnumType FlagBoundary KEEP NAMED_FLAGS ReprEnum STRICT StrEnum "
-        "UNIQUE bin global_enum global_enum_repr global_flag_repr global_str member nonmember pickle_by_enum_name "
-        "pickle_by_global_name property show_flag_values verify",
+        "UNIQUE bin global_enum global_enum_repr global_flag_repr global_str member nonmember property "
+        "show_flag_values verify",
         "hashlib": "file_digest",
         "inspect": "getmembers_static ismethodwrapper",
         "io": "text_encoding",
@@ -59,6 +59,7 @@ NEW_NAMES: Mapping[Version, Mapping[str, str]] = {
         "asyncio": "create_eager_task_factory eager_task_factory",
         "calendar": "APRIL AUGUST DECEMBER Day FEBRUARY JANUARY JULY JUNE MARCH MAY Month NOVEMBER OCTOBER SEPTEMBER",
         "csv": "QUOTE_NOTNULL QUOTE_STRINGS",
+        "enum": "pickle_by_enum_name pickle_by_global_name",  # and late releases of 3.11
         "inspect": "AGEN_CLOSED AGEN_CREATED AGEN_RUNNING AGEN_SUSPENDED BufferFlags getasyncgenlocals "
         "getasyncgenstate markcoroutinefunction",
         "int": "is_integer",
