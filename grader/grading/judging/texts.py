@@ -99,8 +99,8 @@ def _spaced(ends: re.Pattern[str], text: str) -> str | None:
 def readings(text: str) -> tuple[str | None, ...]:
     """Return a cleaned text in every way in which it may be meant, the plainest first.
 
-    There are as many for each text, in the same order; None where one does not differ from the plainest. All texts of a
-    statement must be read in the same way: otherwise a number without its sign is right with one of them.
+    There are as many for each text, in the same order; None where one does not differ from the plainest. Read all texts
+    of a program in the same way: with two ways at once, `x-1.5` would be right for 1.5 and for -1.5.
     """
     return text, with_decimal_points(text), with_numbers_apart(text), with_dashes(text)
 

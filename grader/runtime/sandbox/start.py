@@ -67,6 +67,8 @@ KNOWN_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 1
 OWN_PROCESS = 0x7FFFFF01
 #: A user's other programs may start so many threads meanwhile, before a student's process feels it.
 SPARE = 256
+#: Linux never has more threads: PID_MAX_LIMIT of include/linux/threads.h.
+MOST_THREADS = 1 << 22
 #: Ends a process whose scratch folder outgrew its size: a signal that nobody else sends, and that Python leaves alone.
 OUTGROWN = signal.SIGPWR
 #: Seconds between two looks at the size of a scratch folder, and how many files a look counts at most.
@@ -179,11 +181,12 @@ def limit(which: int, value: int, beyond: int = 0) -> None:
 def running() -> int:
     """Return how many processes and threads this user has, which the kernel counts together.
 
-    In a container the kernel also counts those that the user's number has outside, and /proc does not show them: then
-    more than there are.
+    In a container the kernel also counts those that the same user has outside, and /proc does not show them. Then the
+    result is too high, by a factor of two at most and the room to spare.
     """
-    count, (_, most) = visible(), resource.getrlimit(resource.RLIMIT_NPROC)
-    while (most == resource.RLIM_INFINITY or count + SPARE < most) and not may_start(count + SPARE, most):
+    count, (_, hard) = visible(), resource.getrlimit(resource.RLIMIT_NPROC)
+    most = MOST_THREADS if hard == resource.RLIM_INFINITY else min(hard, MOST_THREADS)
+    while count + SPARE < most and not may_start(count + SPARE, hard):
         count = 2 * (count + SPARE)
     return count
 

@@ -153,7 +153,7 @@ def _standing(outputs: Sequence[Output], sought: Sequence[Sought], reading: int)
 
 
 def _ways(outputs: Sequence[Output]) -> list[int]:
-    """Return the readings that some text has: all texts are read in the same way."""
+    """Return which of the `readings` some text has."""
     texts = (readings(clean(o.text)) for o in outputs)
     return [reading for reading, bodies in enumerate(zip(*texts, strict=True)) if any(b is not None for b in bodies)]
 
