@@ -30,6 +30,7 @@ import shutil
 import signal
 import struct
 import sys
+from bisect import bisect_left
 from collections.abc import Iterator
 from select import select  # the real one: in a starter, the host replaces that of the module later
 from typing import Any
@@ -181,18 +182,19 @@ def limit(which: int, value: int, beyond: int = 0) -> None:
 def running() -> int:
     """Return how many processes and threads this user has, which the kernel counts together.
 
-    In a container the kernel also counts those that the same user has outside, and /proc does not show them. Then the
-    result is too high, by a factor of two at most and the room to spare.
+    In a container the kernel also counts those that the same user has outside, and /proc does not show them: then it is
+    asked.
     """
     count, (_, hard) = visible(), resource.getrlimit(resource.RLIMIT_NPROC)
     most = MOST_THREADS if hard == resource.RLIM_INFINITY else min(hard, MOST_THREADS)
-    while count + SPARE < most and not may_start(count + SPARE, hard):
-        count = 2 * (count + SPARE)
-    return count
+    if count + SPARE >= most or may_start(count + SPARE):
+        return count
+    return bisect_left(range(most), x=True, lo=count + SPARE, key=may_start) - 1
 
 
-def may_start(most_processes: int, hard: int) -> bool:
-    """Return whether this process may start another one under this soft limit."""
+def may_start(most_processes: int) -> bool:
+    """Set the soft limit of processes, and return whether this process may start another one under it."""
+    _, hard = resource.getrlimit(resource.RLIMIT_NPROC)
     resource.setrlimit(resource.RLIMIT_NPROC, (most_processes, hard))
     try:
         os.posix_spawn("", ["no program"], {})
