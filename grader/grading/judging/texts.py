@@ -76,22 +76,21 @@ def with_decimal_points(text: str) -> str | None:
     """Return the text with `1,25` read as `1.25`, or None if it has no such number."""
     if "," not in text:
         return None
-    changed = _DECIMAL_COMMA.sub(r"\1.\2", text)
-    return changed if changed != text else None
+    return _changed(_DECIMAL_COMMA, r"\1.\2", text)
 
 
 def with_numbers_apart(text: str) -> str | None:
     """Return the text with `fan37` read as `fan 37`, or None if it has no such number."""
-    return _spaced(_JOINED, text)
+    return _changed(_JOINED, r"\1 ", text)
 
 
 def with_dashes(text: str) -> str | None:
     """Return the text with `x-1.5` read as `x 1.5` and `x--1.5` as `x -1.5`, or None if it has no such number."""
-    return _spaced(_DASHED, text)
+    return _changed(_DASHED, r"\1 ", text)
 
 
-def _spaced(ends: re.Pattern[str], text: str) -> str | None:
-    changed = ends.sub(r"\1 ", text)
+def _changed(pattern: re.Pattern[str], replacement: str, text: str) -> str | None:
+    changed = pattern.sub(replacement, text)
     return changed if changed != text else None
 
 

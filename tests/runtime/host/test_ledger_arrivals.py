@@ -53,16 +53,6 @@ class Subscription:
         self.handle = Handle([*coming])
 
 
-class Server:
-    """As much of a service as the ledger asks for."""
-
-    srv_type = Trigger
-
-    def __init__(self, name: str) -> None:
-        self.handle = Handle([])
-        self.handle.service_name = name  # type: ignore[attr-defined]
-
-
 class Context:
     """As much of a context as the ledger asks for."""
 
@@ -163,7 +153,7 @@ def test_a_server_sees_no_client_that_has_left(
 ) -> None:
     """It would send it a response, which wakes the other clients."""
     monkeypatch.setattr(importlib.import_module("_grader_host.ledger"), "DEPARTURE_S", 600)
-    server = Server("/q")
+    server = Service("/q")
     ledger.add("service", server)
     last = seen[-1]
     monkeypatch.setattr(ledger, "_clients_of", lambda _: seen.pop(0) if seen else last)
