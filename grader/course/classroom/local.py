@@ -11,9 +11,10 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Protocol
 
 import msgspec
@@ -84,107 +85,80 @@ _END_S = 60.0
 WORKER = (sys.executable, "-s", "-m", "grader.course.classroom.worker")
 
 
-class LocalScheduler:
-    """Grades on this machine; relative paths start at the folder, or at the current one if it is None.
+@dataclass(frozen=True, slots=True)
+class Grading:
+    """A submission to grade in a process, and who hears of it."""
 
-    A submission that is recorded on the wall clock because virtual time does not suffice spends its time waiting.
-    Another one is begun beside it, and up to `WAITING_PER_JOB` wait for each of the jobs. That many of those that are
-    drawn for a spot check are graded at a time, from the beginning, so that the class does not end with them. While
-    there are more of them, the processes that this needs are kept, because each takes a second to start.
+    task: Task
+    on_step: OnStep  # what it raises ends the process and comes out
+    folder: Path  # where relative paths of the task start
+    class_: str = ""  # identifies the class; a process remembers files by their relative paths, so it serves only one
+    on_wall_clock: Callable[[], None] = lambda: None  # a recording begins that leaves the processors to others
+    keep: Callable[[], bool] = lambda: True  # whether the process waits for another submission at the end
+
+
+class GradingProcesses:
+    """Processes that grade one submission after the other, each for one class.
+
+    One that waits for a submission ends after `idle_s` real seconds; None for when it is closed.
     """
 
-    def __init__(
-        self,
-        jobs: int,
-        command: Sequence[str] = WORKER,
-        *,
-        folder: Path | None = None,
-        sandbox: Callable[[str], TierChoice] = sandbox_here,
-    ) -> None:
-        self._jobs = jobs
-        self._on_wall_clock = WAITING_PER_JOB * jobs
+    def __init__(self, command: Sequence[str] = WORKER, *, idle_s: float | None = None) -> None:
         self._command = command
-        self._folder = folder
-        self._sandbox = sandbox
+        self._idle_s = idle_s
         self._lock = threading.Lock()
         self._running: set[subprocess.Popen[bytes]] = set()
-        self._idle: list[subprocess.Popen[bytes]] = []
-        self._checks = 0  # submissions that are being graded and are drawn for a spot check
+        self._idle: list[_Idle] = []
         self._closed = False
+        self._starter: _Starter | None = None
 
-    def prepare(self, isolation: str) -> Sequence[str]:
-        """Find ROS and test the sandbox; see `ClassScheduler`."""
-        choice = self._sandbox(isolation)
-        name = choice.isolation.name
-        warnings = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
-        if choice.isolation.shares_network and name != NO_SANDBOX:
-            if self._jobs > 1:
-                warnings.append(f"sandbox {name}: submissions share the network, so they are graded one at a time")
-            self._jobs, self._on_wall_clock = 1, 0
-        return warnings
-
-    def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
-        """Yield an attempt for each task; see `ClassScheduler`."""
-        # The kernel kills a worker when the thread that started it ends, so the threads live until all tasks are done.
-        pool = ThreadPoolExecutor(self._jobs + self._on_wall_clock, thread_name_prefix="batch")
-        places, waiting = threading.Semaphore(self._jobs), _Waiting(tasks)
+    def grade(self, grading: Grading) -> Attempt:
+        """Grade a submission in a process of its class; if one that was kept fails, in a new one."""
+        process = self._idle_one(grading.class_)
+        if process is not None:
+            attempt = self._attempt(process, grading)
+            if attempt.status.state is not State.FAILED:
+                return attempt
+            # What a process keeps for the next submission costs no submission its result.
+            shutil.rmtree(grading.task.into, ignore_errors=True)
         try:
-            for future in as_completed([pool.submit(self._next, waiting, on_step, places) for _ in tasks]):
-                yield future.result()
-        finally:
-            self._close()
-            pool.shutdown(wait=True, cancel_futures=True)
+            process = self._start()
+        except OSError as error:
+            return failed_attempt(grading.task, f"the grader cannot be started: {error.strerror}")
+        return self._attempt(process, grading)
 
-    def _next(self, waiting: _Waiting, on_step: OnStep, places: threading.Semaphore) -> Attempt:
-        with _Place(places) as place, self._next_task(waiting) as task:
-            on_step(task.name, "starting")
-            process = self._idle_one()
-            if process is not None:
-                attempt = self._attempt(process, task, on_step, place, waiting)
-                if attempt.status.state is not State.FAILED:
-                    return attempt
-                # What a process keeps for the next submission costs no submission its result.
-                shutil.rmtree(task.into, ignore_errors=True)
-            try:
-                process = self._start()
-            except OSError as error:
-                return failed_attempt(task, f"the grader cannot be started: {error.strerror}")
-            return self._attempt(process, task, on_step, place, waiting)
-
-    @contextmanager
-    def _next_task(self, waiting: _Waiting) -> Iterator[Task]:
-        """Take the task that is graded next, and count it while it is graded."""
+    def close(self) -> None:
+        """Kill the processes that grade, and end those that wait."""
         with self._lock:
-            task = waiting.take(drawn=self._checks < max(1, self._on_wall_clock))
-            self._checks += task.spot_check
-        try:
-            yield task
-        finally:
-            with self._lock:
-                self._checks -= task.spot_check
+            self._closed = True
+            idle, self._idle = self._idle, []
+            grading = self._running.difference(waits.process for waits in idle)
+        for process in grading:
+            _kill(process)
+        for waits in idle:
+            waits.timer.cancel()
+            self._end(waits.process)
+        if self._starter is not None:
+            self._starter.close()
 
-    def _attempt(
-        self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place, waiting: _Waiting
-    ) -> Attempt:
-        """Grade in a process, and keep it for the next submission unless it failed, or others have taken its place."""
+    def _attempt(self, process: subprocess.Popen[bytes], grading: Grading) -> Attempt:
+        task = grading.task
         overdue, status = threading.Event(), None
 
         def give_up() -> None:
             overdue.set()
             _kill(process)
 
-        timer = threading.Timer(task.deadline_s, give_up)
-        timer.daemon = True
+        timer = _timer(task.deadline_s, give_up)
         timer.start()
         try:
-            status = self._listen(process, task, on_step, place)
+            status = self._listen(process, grading)
+        except BaseException:
+            _kill(process)  # nobody wants its result
+            raise
         finally:
             timer.cancel()
-            with self._lock:
-                kept = place.taken or bool(waiting.drawn)
-                if kept := kept and status is not None and status.state is not State.FAILED:
-                    self._idle.append(process)
-            if not kept:
+            if status is None or status.state is State.FAILED or not self._kept(process, grading):
                 self._end(process)
         if status is not None:
             return Attempt(task, status)
@@ -192,9 +166,33 @@ class LocalScheduler:
             return failed_attempt(task, f"the grader was not done after {task.deadline_s:.0f} s")
         return failed_attempt(task, f"the grader ended without a result (exit code {process.returncode})")
 
-    def _idle_one(self) -> subprocess.Popen[bytes] | None:
+    def _idle_one(self, class_: str) -> subprocess.Popen[bytes] | None:
         with self._lock:
-            return self._idle.pop() if self._idle and not self._closed else None
+            waits = next((waits for waits in reversed(self._idle) if waits.class_ == class_), None)
+            if waits is None:
+                return None
+            self._idle.remove(waits)
+        waits.timer.cancel()
+        return waits.process
+
+    def _kept(self, process: subprocess.Popen[bytes], grading: Grading) -> bool:
+        """Keep a process for the next submission, and return whether it is kept."""
+        with self._lock:
+            if self._closed or not grading.keep():
+                return False
+            waits = _Idle(process, grading.class_, _timer(self._idle_s or 0.0, lambda: self._end_idle(process)))
+            self._idle.append(waits)
+        if self._idle_s is not None:
+            waits.timer.start()
+        return True
+
+    def _end_idle(self, process: subprocess.Popen[bytes]) -> None:
+        """End a process that has waited in vain."""
+        with self._lock:
+            left = [waits for waits in self._idle if waits.process is not process]
+            taken, self._idle = len(left) == len(self._idle), left
+        if not taken:
+            self._end(process)
 
     def _start(self) -> subprocess.Popen[bytes]:
         root = str(Path(__file__).resolve().parents[3])
@@ -202,26 +200,28 @@ class LocalScheduler:
         with self._lock:
             if self._closed:
                 raise InterruptedError(0, "interrupted")
-            process = subprocess.Popen(
-                self._command,
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=None if os.environ.get("GRADER_DEBUG") == "1" else subprocess.DEVNULL,
-                cwd="/",  # Python imports from here first, and the user's directory may contain a student's `json.py`
-                start_new_session=True,
+            self._starter = self._starter or _Starter()
+            process = self._starter.start(
+                lambda: subprocess.Popen(
+                    self._command,
+                    env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=None if os.environ.get("GRADER_DEBUG") == "1" else subprocess.DEVNULL,
+                    # Python imports from here first, and the user's directory may contain a student's `json.py`.
+                    cwd="/",
+                    start_new_session=True,
+                )
             )
             self._running.add(process)
         return process
 
-    def _listen(
-        self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep, place: _Place
-    ) -> ResultStatus | None:
+    def _listen(self, process: subprocess.Popen[bytes], grading: Grading) -> ResultStatus | None:
         """Read messages from a process until it reports its result; None if it ends without one."""
         assert process.stdin is not None
         assert process.stdout is not None
-        folder = self._folder or Path.cwd()
-        request = {"task": msgspec.to_builtins(task, enc_hook=str), "folder": str(folder), "parent": os.getpid()}
+        task = msgspec.to_builtins(grading.task, enc_hook=str)
+        request = {"task": task, "folder": str(grading.folder), "parent": os.getpid()}
         with suppress(OSError):
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.flush()
@@ -230,10 +230,9 @@ class LocalScheduler:
             if "done" in message:
                 return kept.load(json.dumps(message["done"]).encode())
             if "step" in message:
-                on_step(task.name, str(message["step"]))
-            # With `--clock wall`, all would be recorded
-            if "wall_clock" in message and task.conditions.options.clock != WALL:
-                place.leave()
+                grading.on_step(grading.task.name, str(message["step"]))
+            if "wall_clock" in message:
+                grading.on_wall_clock()
         return None
 
     def _end(self, process: subprocess.Popen[bytes]) -> None:
@@ -249,15 +248,110 @@ class LocalScheduler:
         with self._lock:
             self._running.discard(process)
 
-    def _close(self) -> None:
+
+@dataclass(frozen=True, slots=True)
+class _Idle:
+    """A process that waits for a submission of its class."""
+
+    process: subprocess.Popen[bytes]
+    class_: str
+    timer: threading.Timer  # ends it; not started if it may wait as long as it takes
+
+
+class _Starter:
+    """A thread that starts processes and lasts: the kernel kills them when the thread ends that started them."""
+
+    def __init__(self) -> None:
+        self._wanted: SimpleQueue[tuple[Callable[[], subprocess.Popen[bytes]], Future[subprocess.Popen[bytes]]] | None]
+        self._wanted = SimpleQueue()
+        threading.Thread(target=self._serve, name="starter", daemon=True).start()
+
+    def start(self, process: Callable[[], subprocess.Popen[bytes]]) -> subprocess.Popen[bytes]:
+        """Return the process that the function starts; raises what it raises."""
+        started: Future[subprocess.Popen[bytes]] = Future()
+        self._wanted.put((process, started))
+        return started.result()
+
+    def close(self) -> None:
+        """End the thread, and with it what it started."""
+        self._wanted.put(None)
+
+    def _serve(self) -> None:
+        while (wanted := self._wanted.get()) is not None:
+            process, started = wanted
+            try:
+                started.set_result(process())
+            except BaseException as error:  # raised where it is waited for
+                started.set_exception(error)
+
+
+class LocalScheduler:
+    """Grades on this machine.
+
+    A submission that is recorded on the wall clock because virtual time does not suffice spends its time waiting.
+    Another one is begun beside it, and up to `WAITING_PER_JOB` wait for each of the jobs. That many of those that are
+    drawn for a spot check are graded at a time, from the beginning, so that the class does not end with them. While
+    there are more of them, the processes that this needs are kept, because each takes a second to start.
+    """
+
+    def __init__(
+        self, jobs: int, command: Sequence[str] = WORKER, *, sandbox: Callable[[str], TierChoice] = sandbox_here
+    ) -> None:
+        self._jobs = jobs
+        self._on_wall_clock = WAITING_PER_JOB * jobs
+        self._processes = GradingProcesses(command)
+        self._sandbox = sandbox
+        self._lock = threading.Lock()
+        self._checks = 0  # submissions that are being graded and are drawn for a spot check
+
+    def prepare(self, isolation: str) -> Sequence[str]:
+        """Find ROS and test the sandbox; see `ClassScheduler`."""
+        choice = self._sandbox(isolation)
+        name = choice.isolation.name
+        warnings = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
+        if choice.isolation.shares_network and name != NO_SANDBOX:
+            if self._jobs > 1:
+                warnings.append(f"sandbox {name}: submissions share the network, so they are graded one at a time")
+            self._jobs, self._on_wall_clock = 1, 0
+        return warnings
+
+    def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
+        """Yield an attempt for each task; see `ClassScheduler`."""
+        pool = ThreadPoolExecutor(self._jobs + self._on_wall_clock, thread_name_prefix="batch")
+        places, waiting = threading.Semaphore(self._jobs), _Waiting(tasks)
+        try:
+            for future in as_completed([pool.submit(self._next, waiting, on_step, places) for _ in tasks]):
+                yield future.result()
+        finally:
+            self._processes.close()
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    def _next(self, waiting: _Waiting, on_step: OnStep, places: threading.Semaphore) -> Attempt:
+        with _Place(places) as place, self._next_task(waiting) as task:
+            on_step(task.name, "starting")
+            on_wall_clock = task.conditions.options.clock == WALL
+            grading = Grading(
+                task,
+                on_step,
+                Path.cwd(),
+                # With `--clock wall`, all would be recorded beside each other.
+                on_wall_clock=(lambda: None) if on_wall_clock else place.leave,
+                # Unless others have taken its place.
+                keep=lambda: place.taken or bool(waiting.drawn),
+            )
+            return self._processes.grade(grading)
+
+    @contextmanager
+    def _next_task(self, waiting: _Waiting) -> Iterator[Task]:
+        """Take the task that is graded next, and count it while it is graded."""
         with self._lock:
-            self._closed = True
-            idle = list(self._idle)
-            grading = self._running.difference(idle)
-        for process in grading:
-            _kill(process)
-        for process in idle:
-            self._end(process)
+            task = waiting.take(drawn=self._checks < max(1, self._on_wall_clock))
+            self._checks += task.spot_check
+        try:
+            yield task
+        finally:
+            with self._lock:
+                self._checks -= task.spot_check
 
 
 class _Waiting:
@@ -293,6 +387,12 @@ class _Place:
         if self.taken:
             self.taken = False
             self._places.release()
+
+
+def _timer(seconds: float, function: Callable[[], None]) -> threading.Timer:
+    timer = threading.Timer(seconds, function)
+    timer.daemon = True
+    return timer
 
 
 def _message(line: bytes) -> dict[str, object]:

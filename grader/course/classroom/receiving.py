@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import atexit
 import fcntl
+import hashlib
 import os
 import socket
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import grader
 from grader.course.classroom import store as kept
-from grader.course.classroom.local import AGAIN, Attempt, LocalScheduler, Task
+from grader.course.classroom.local import AGAIN, Attempt, Grading, GradingProcesses, Task
 from grader.course.classroom.messages import (
     MAX_ANSWER_BYTES,
     Fitness,
@@ -31,6 +33,12 @@ from grader.runtime.model.checkup import NO_SANDBOX, missing
 from grader.runtime.model.errors import EnvironmentFault, GraderError, HarnessError
 from grader.runtime.session import TierChoice, sandbox_here
 from grader.runtime.temp_dirs import scratch_folder
+
+#: Real seconds for which a process waits for the next submission of its class. A worker of a busy cluster gets one
+#: within a second; one that gets none should not keep the memory, about 100 MiB, for long.
+_IDLE_S = 30.0
+_PROCESSES = GradingProcesses(idle_s=_IDLE_S)
+atexit.register(_PROCESSES.close)
 
 
 def fitness(isolation: str, machine: str) -> Fitness:
@@ -65,9 +73,9 @@ def grade_job(terms: Terms, job: GradingJob, machine: str, on_step: Callable[[st
 
 def _graded(terms: Terms, job: GradingJob, scratch: Path, machine: str, on_step: Callable[[str], None]) -> JobResult:
     task = write_task(terms, job, scratch)
-    here = LocalScheduler(1, folder=_start(terms, scratch))
-    with closing(here.run([task], lambda _, step: on_step(step))) as attempts:
-        attempt = next(attempts)
+    on_step("starting")
+    class_ = hashlib.sha256(pack(terms)).hexdigest()
+    attempt = _PROCESSES.grade(Grading(task, lambda _, step: on_step(step), _start(terms, scratch), class_))
     files = files_below(task.into) if task.into.is_dir() else ()
     if sum(len(content) for _, content in files) > MAX_ANSWER_BYTES:
         return failure(machine, f"the result holds more than {MAX_ANSWER_BYTES >> 20} MiB")

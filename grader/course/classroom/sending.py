@@ -42,7 +42,8 @@ _PARTS = frozenset(PARTS)
 def terms_of(task: Task) -> Terms:
     """Collect what the class of a task is graded with; raises GraderError if a file cannot be read."""
     return Terms(
-        conditions=replace(task.conditions, options=_travelling(task.conditions.options)),
+        # Seed and variants of a submission travel with its job.
+        conditions=replace(task.conditions, options=_travelling(task.conditions.options), variants=None),
         files=tuple(_files(task.conditions.options)),
         standalone=task.standalone,
         deadline_s=task.deadline_s,
@@ -50,7 +51,7 @@ def terms_of(task: Task) -> Terms:
 
 
 def _travelling(options: GradingOptions) -> GradingOptions:
-    """Return the options as another machine reads them; each job has its own seed."""
+    """Return the options as another machine reads them, without a seed."""
     return replace(with_paths(options, lambda path: Path(os.fsdecode(travelling_name(path)))), seed=None)
 
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import os
 import sys
+from contextlib import closing
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from added_packages import files_of, grade, installed, made_importable, register
@@ -17,13 +20,15 @@ from sample_folders import folder_of
 
 from grader.api import grade_packed, pack_task, store_answer
 from grader.cli.main import app
-from grader.course.classroom.local import Attempt
+from grader.course.classroom import receiving
+from grader.course.classroom.local import Attempt, GradingProcesses
 from grader.course.classroom.messages import Parcel, pack
 from grader.course.classroom.schedulers import DASK, named
-from grader.course.classroom.store import State
+from grader.course.classroom.store import ResultStatus, State, dump
 from grader.grading.app.doctor import _added
 from grader.grading.model.entry_points import SCHEDULERS as GROUP
 from grader.grading.model.entry_points import load
+from grader.grading.model.exercise import Drawn
 
 #: A scheduler that does as the fake one of this folder's tests, but for a method.
 MODULE = """
@@ -193,6 +198,34 @@ def test_a_parcel_of_another_version_is_not_graded(tmp_path: Path) -> None:
         assert store_answer(one, grade_packed(sent), "lab").status.state is State.FAILED
     for answer in (None, b"", b"\x93", 7, "text"):
         assert store_answer(one, answer, "lab").status.problem == "lab: expected a result, found something else"
+
+
+DONE = json.loads(dump(ResultStatus(State.GRADED, "k", "d", "l", score=1.0, max_score=2.0)))
+#: What stands in for the process that grades: tells its number as a step.
+PROCESS = f"""
+import json, os, sys
+for line in sys.stdin:
+    print(json.dumps({{"step": str(os.getpid())}}), flush=True)
+    print(json.dumps({{"done": {DONE!r}}}), flush=True)
+"""
+
+
+def test_parcels_of_a_class_are_graded_by_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It waits for the next one of the same class; another class gets another process."""
+    choice = SimpleNamespace(isolation=SimpleNamespace(name="bubblewrap", shares_network=False))
+    monkeypatch.setattr(receiving, "sandbox_here", lambda wanted: choice)
+    with closing(GradingProcesses((sys.executable, "-c", PROCESS))) as processes:
+        monkeypatch.setattr(receiving, "_PROCESSES", processes)
+        steps: list[str] = []
+        for seed, (name, deadline_s) in enumerate((("ada", 60.0), ("bob", 60.0), ("cleo", 90.0), ("dan", 60.0))):
+            one = task(tmp_path, name, options={"seed": seed}, deadline_s=deadline_s)
+            drawn = Drawn(name, {"velocity_publisher": {"rate": str(seed)}})
+            sent = pack_task(replace(one, conditions=replace(one.conditions, variants=drawn)))
+            assert isinstance(sent, bytes)
+            grade_packed(sent, steps.append)
+    assert steps[::2] == ["starting"] * 4
+    ada, bob, cleo, dan = steps[1::2]
+    assert ada == bob == dan != cleo
 
 
 def test_what_cannot_be_used_is_not_sent(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -14,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from grader.course.classroom.local import WAITING_PER_JOB, LocalScheduler, Task
+from grader.course.classroom.local import WAITING_PER_JOB, Grading, GradingProcesses, LocalScheduler, Task
 from grader.course.classroom.store import Conditions, ResultStatus, State, dump
 from grader.grading.model.grading_options import GradingOptions
 
@@ -103,6 +104,59 @@ def test_a_process_is_kept_for_the_next_submission(tmp_path: Path) -> None:
     order = {pid: number for number, pid in enumerate(dict.fromkeys(pids))}
     assert [order[pid] for pid in pids] == [0, 0, 0, 1, 2, 2, 2, 3, 4]
     assert [pid for pid in pids if Path(f"/proc/{pid}").exists()] == []
+
+
+def pid_of(processes: GradingProcesses, one: Task, class_: str) -> str:
+    """Grade a submission, and return the process that did."""
+    heard: list[str] = []
+    attempt = processes.grade(Grading(one, lambda _, step: heard.append(step), one.submission, class_))
+    assert attempt.status.state is State.GRADED
+    return heard[-1]
+
+
+def test_a_process_serves_one_class(tmp_path: Path) -> None:
+    """It remembers files by their paths, which may be others in another class; two classes may take turns."""
+    processes = GradingProcesses((sys.executable, "-c", LASTING))
+    one = task(tmp_path, "a")
+    pids = [pid_of(processes, one, class_) for class_ in ("x", "y", "x", "y")]
+    assert pids[:2] == pids[2:]
+    assert len(set(pids)) == 2
+    processes.close()
+    assert [pid for pid in pids if Path(f"/proc/{pid}").exists()] == []
+
+
+def test_a_process_outlives_the_thread_that_asked_for_it(tmp_path: Path) -> None:
+    """It asks the kernel to be killed together with the thread that started it, so that one has to last."""
+    processes = GradingProcesses((sys.executable, "-c", f"import ctypes; ctypes.CDLL(None).prctl(1, 9)\n{LASTING}"))
+    pids = []
+    for _ in range(2):
+        asking = threading.Thread(target=lambda: pids.append(pid_of(processes, task(tmp_path, "a"), "x")))
+        asking.start()
+        asking.join()
+    processes.close()
+    assert pids[0] == pids[1]
+
+
+def test_a_process_that_waits_in_vain_ends(tmp_path: Path) -> None:
+    """The next submission gets another one."""
+    processes = GradingProcesses((sys.executable, "-c", LASTING), idle_s=0.05)
+    first = pid_of(processes, task(tmp_path, "a"), "x")
+    while Path(f"/proc/{first}").exists():
+        time.sleep(0.01)
+    assert pid_of(processes, task(tmp_path, "a"), "x") != first
+    processes.close()
+
+
+def test_a_result_that_nobody_wants_is_not_waited_for(tmp_path: Path) -> None:
+    """What a listener raises comes out, and nothing is left of the process."""
+    processes = GradingProcesses((sys.executable, "-c", PROGRAM))
+
+    def unwanted(name: str, step: str) -> None:
+        raise LookupError
+
+    with pytest.raises(LookupError):
+        processes.grade(Grading(task(tmp_path, "hangs"), unwanted, tmp_path))
+    assert not processes._running
 
 
 #: Says that it records on the wall clock, if its label says so, and ends once every submission has been begun.
@@ -207,7 +261,7 @@ def test_giving_up_leaves_no_process(tmp_path: Path) -> None:
     with closing(running):
         next(running)
         assert started.wait(60)
-        pids = [process.pid for process in here._running]
+        pids = [process.pid for process in here._processes._running]
     assert pids
     assert [pid for pid in pids if Path(f"/proc/{pid}").exists()] == []
 
@@ -244,6 +298,6 @@ def test_submissions_that_could_reach_each_other_go_one_at_a_time(
     warnings = here.prepare(tier)
     together = []
     tasks = [task(tmp_path, f"fine {n}") for n in range(6)]
-    assert len(list(here.run(tasks, lambda name, step: together.append(len(here._running))))) == 6
+    assert len(list(here.run(tasks, lambda name, step: together.append(len(here._processes._running))))) == 6
     assert [len(warnings), here._jobs] == [int(most == 1), most]
     assert max(together) <= most
