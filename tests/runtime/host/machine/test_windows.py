@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,8 @@ node = rclpy.create_node('plots')
 log = node.get_logger().info
 """
 SPIN = "threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()\n"
+#: The time at which a program logs, in seconds since its start.
+TIME = re.compile(r"\d+\.\d$")
 #: Program -> what it logs in two seconds.
 PLOTTING = {
     "a window stays open": (
@@ -120,6 +123,18 @@ def watched(tmp_path: Path, text: str, clock: str, duration_s: int = 2) -> Summa
     return observe(ObserveRequest((file,), duration_s * NS_PER_S, clock=clock), lambda _: None)
 
 
+def says(texts: list[str], logged: list[str], clock: str) -> bool:
+    """Return whether a program logged what it should; on the wall clock, a busy machine may make it late, never early.
+
+    There it also runs for longer, and logs more.
+    """
+    if clock == "auto":
+        return texts == logged
+    pairs = [(TIME.search(text), TIME.search(wanted)) for text, wanted in zip(texts, logged, strict=False)]
+    late_enough = all(float(found[0]) >= float(wanted[0]) for found, wanted in pairs if found and wanted)
+    return late_enough and [TIME.sub("", t) for t in texts[: len(logged)]] == [TIME.sub("", t) for t in logged]
+
+
 @pytest.mark.parametrize("clock", ["auto", pytest.param("wall", marks=pytest.mark.long)])
 @pytest.mark.parametrize(("text", "logged"), PLOTTING.values(), ids=PLOTTING)
 def test_a_program_that_plots(text: str, logged: list[str], clock: str, tmp_path: Path) -> None:
@@ -130,8 +145,10 @@ def test_a_program_that_plots(text: str, logged: list[str], clock: str, tmp_path
         assert (summary.clock, summary.clock_reason) == (ClockKind.VIRTUAL, "")
     texts = [record.text for record in summary.records]
     several = "toolkit" in text or logged == ["qt5agg", "qtagg"]
-    assert texts in ([one] for one in logged) if several else texts[: len(logged)] == logged, (texts, summary.lines)
-    assert clock == "wall" or several or texts == logged
+    if several:
+        assert texts in ([one] for one in logged), summary.lines
+    else:
+        assert says(texts, logged, clock), (texts, summary.lines)
     assert [fault.text for fault in summary.faults] == []
     assert not any("font" in line.text.lower() for line in summary.lines), summary.lines
 
@@ -143,7 +160,7 @@ def test_a_program_that_shows_images(text: str, logged: list[str], clock: str, t
     pytest.importorskip("cv2")
     summary = watched(tmp_path, text, clock, 2 if clock == "auto" else 12)
     texts = [record.text for record in summary.records]
-    assert (texts == logged) if clock == "auto" else (texts[: len(logged)] == logged), (texts, summary.faults)
+    assert says(texts, logged, clock), (texts, summary.faults)
     assert [fault.text for fault in summary.faults] == []
 
 
