@@ -92,7 +92,7 @@ class Grading:
     task: Task
     on_step: OnStep  # what it raises ends the process and comes out
     folder: Path  # where relative paths of the task start
-    class_: str = ""  # identifies the class; a process remembers files by their relative paths, so it serves only one
+    class_: object = None  # equal for one class; a process remembers files by their relative paths, and serves only one
     on_wall_clock: Callable[[], None] = lambda: None  # a recording begins that leaves the processors to others
     keep: Callable[[], bool] = lambda: True  # whether the process waits for another submission at the end
 
@@ -100,10 +100,10 @@ class Grading:
 class GradingProcesses:
     """Processes that grade one submission after the other, each for one class.
 
-    One that waits for a submission ends after `idle_s` real seconds; None for when it is closed.
+    One that waits for a submission ends after `idle_s` real seconds, and at the latest when it is closed.
     """
 
-    def __init__(self, command: Sequence[str] = WORKER, *, idle_s: float | None = None) -> None:
+    def __init__(self, command: Sequence[str] = WORKER, *, idle_s: float = threading.TIMEOUT_MAX) -> None:
         self._command = command
         self._idle_s = idle_s
         self._lock = threading.Lock()
@@ -114,6 +114,7 @@ class GradingProcesses:
 
     def grade(self, grading: Grading) -> Attempt:
         """Grade a submission in a process of its class; if one that was kept fails, in a new one."""
+        grading.on_step(grading.task.name, "starting")
         process = self._idle_one(grading.class_)
         if process is not None:
             attempt = self._attempt(process, grading)
@@ -149,8 +150,7 @@ class GradingProcesses:
             overdue.set()
             _kill(process)
 
-        timer = _timer(task.deadline_s, give_up)
-        timer.start()
+        timer = _started_timer(task.deadline_s, give_up)
         try:
             status = self._listen(process, grading)
         except BaseException:
@@ -166,7 +166,7 @@ class GradingProcesses:
             return failed_attempt(task, f"the grader was not done after {task.deadline_s:.0f} s")
         return failed_attempt(task, f"the grader ended without a result (exit code {process.returncode})")
 
-    def _idle_one(self, class_: str) -> subprocess.Popen[bytes] | None:
+    def _idle_one(self, class_: object) -> subprocess.Popen[bytes] | None:
         with self._lock:
             waits = next((waits for waits in reversed(self._idle) if waits.class_ == class_), None)
             if waits is None:
@@ -180,10 +180,8 @@ class GradingProcesses:
         with self._lock:
             if self._closed or not grading.keep():
                 return False
-            waits = _Idle(process, grading.class_, _timer(self._idle_s or 0.0, lambda: self._end_idle(process)))
-            self._idle.append(waits)
-        if self._idle_s is not None:
-            waits.timer.start()
+            timer = _started_timer(self._idle_s, lambda: self._end_idle(process))
+            self._idle.append(_Idle(process, grading.class_, timer))
         return True
 
     def _end_idle(self, process: subprocess.Popen[bytes]) -> None:
@@ -254,8 +252,8 @@ class _Idle:
     """A process that waits for a submission of its class."""
 
     process: subprocess.Popen[bytes]
-    class_: str
-    timer: threading.Timer  # ends it; not started if it may wait as long as it takes
+    class_: object
+    timer: threading.Timer  # ends it
 
 
 class _Starter:
@@ -328,14 +326,13 @@ class LocalScheduler:
 
     def _next(self, waiting: _Waiting, on_step: OnStep, places: threading.Semaphore) -> Attempt:
         with _Place(places) as place, self._next_task(waiting) as task:
-            on_step(task.name, "starting")
-            on_wall_clock = task.conditions.options.clock == WALL
+            # With `--clock wall`, all would be recorded beside each other.
+            keeps_place = task.conditions.options.clock == WALL
             grading = Grading(
                 task,
                 on_step,
                 Path.cwd(),
-                # With `--clock wall`, all would be recorded beside each other.
-                on_wall_clock=(lambda: None) if on_wall_clock else place.leave,
+                on_wall_clock=(lambda: None) if keeps_place else place.leave,
                 # Unless others have taken its place.
                 keep=lambda: place.taken or bool(waiting.drawn),
             )
@@ -389,9 +386,10 @@ class _Place:
             self._places.release()
 
 
-def _timer(seconds: float, function: Callable[[], None]) -> threading.Timer:
+def _started_timer(seconds: float, function: Callable[[], None]) -> threading.Timer:
     timer = threading.Timer(seconds, function)
     timer.daemon = True
+    timer.start()
     return timer
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import fcntl
-import hashlib
 import os
 import socket
 import tempfile
@@ -73,9 +72,7 @@ def grade_job(terms: Terms, job: GradingJob, machine: str, on_step: Callable[[st
 
 def _graded(terms: Terms, job: GradingJob, scratch: Path, machine: str, on_step: Callable[[str], None]) -> JobResult:
     task = write_task(terms, job, scratch)
-    on_step("starting")
-    class_ = hashlib.sha256(pack(terms)).hexdigest()
-    attempt = _PROCESSES.grade(Grading(task, lambda _, step: on_step(step), _start(terms, scratch), class_))
+    attempt = _PROCESSES.grade(Grading(task, lambda _, step: on_step(step), _start(terms, scratch), class_=terms))
     files = files_below(task.into) if task.into.is_dir() else ()
     if sum(len(content) for _, content in files) > MAX_ANSWER_BYTES:
         return failure(machine, f"the result holds more than {MAX_ANSWER_BYTES >> 20} MiB")

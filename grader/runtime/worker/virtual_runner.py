@@ -191,9 +191,9 @@ class VirtualRunner(Runner):
             if len(endpoints) > CLAIMS:
                 why = f"more than {CLAIMS:,} endpoints and parameters of {student.name}"
                 self._recorder.stop(self._core.now_ns, why)
-                # Nothing is recorded after this, and to wait until each of them is seen takes half a minute.
+                # Nothing is recorded after this, and waiting until all of them are seen takes half a minute.
                 return
-            self._core.has(student, [c for c in endpoints[:CLAIMS] if is_claim(c)])
+            self._core.has(student, [c for c in endpoints if is_claim(c)])
             student.sees_graph = report.get("sees_graph") is True
             self._note_offers(student)
             self._discovery.match(self._core.now_ns)

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 
 import pytest
 from added_packages import files_of, grade, installed, made_importable, register
-from class_samples import hand_in
+from class_samples import LASTING, hand_in
 from click.testing import CliRunner, Result
 from dask_samples import task
 from sample_folders import folder_of
@@ -24,7 +24,7 @@ from grader.course.classroom import receiving
 from grader.course.classroom.local import Attempt, GradingProcesses
 from grader.course.classroom.messages import Parcel, pack
 from grader.course.classroom.schedulers import DASK, named
-from grader.course.classroom.store import ResultStatus, State, dump
+from grader.course.classroom.store import State
 from grader.grading.app.doctor import _added
 from grader.grading.model.entry_points import SCHEDULERS as GROUP
 from grader.grading.model.entry_points import load
@@ -200,21 +200,11 @@ def test_a_parcel_of_another_version_is_not_graded(tmp_path: Path) -> None:
         assert store_answer(one, answer, "lab").status.problem == "lab: expected a result, found something else"
 
 
-DONE = json.loads(dump(ResultStatus(State.GRADED, "k", "d", "l", score=1.0, max_score=2.0)))
-#: What stands in for the process that grades: tells its number as a step.
-PROCESS = f"""
-import json, os, sys
-for line in sys.stdin:
-    print(json.dumps({{"step": str(os.getpid())}}), flush=True)
-    print(json.dumps({{"done": {DONE!r}}}), flush=True)
-"""
-
-
 def test_parcels_of_a_class_are_graded_by_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It waits for the next one of the same class; another class gets another process."""
     choice = SimpleNamespace(isolation=SimpleNamespace(name="bubblewrap", shares_network=False))
     monkeypatch.setattr(receiving, "sandbox_here", lambda wanted: choice)
-    with closing(GradingProcesses((sys.executable, "-c", PROCESS))) as processes:
+    with closing(GradingProcesses((sys.executable, "-c", LASTING))) as processes:
         monkeypatch.setattr(receiving, "_PROCESSES", processes)
         steps: list[str] = []
         for seed, (name, deadline_s) in enumerate((("ada", 60.0), ("bob", 60.0), ("cleo", 90.0), ("dan", 60.0))):
