@@ -10,7 +10,7 @@ from typing import Any
 from grader.runtime.model.trace import GraphSnapshot
 from grader.runtime.patience import SETTLE_S, Patience, Wait
 from grader.runtime.stimuli.calls import PlannedCalls
-from grader.runtime.worker.claims import CHANNELS, answers, meets, serves
+from grader.runtime.worker.claims import CHANNELS, answers, serves
 from grader.runtime.worker.core import Core
 from grader.runtime.worker.matching import Match, Matching
 from grader.runtime.worker.observer import Observer
@@ -64,6 +64,9 @@ class Discovery:
         self._mark_dead = mark_dead
         self.patience = Patience(SETTLE_S, wait)
         self._departures = Patience(DEPARTURE_S, wait)
+        #: The graph when it was last looked up, and how many endpoints of those ever claimed were in it.
+        self._graph = GraphSnapshot(0, (), ())
+        self._found: Counter[Key] = Counter()
         self._known: set[Key] = set()
         self._strangers: Counter[Key] = Counter()
 
@@ -74,17 +77,24 @@ class Discovery:
         staying = [c for s in self._staying() for c in s.claims]
         if not self.patience.wait(lambda: self._holds(now_ns, staying), pause_s=GRAPH_PAUSE_S):
             self._recorder.note("an endpoint that a node created was not seen in the graph")
-        if not self._departures.wait(lambda: not self._surplus(now_ns, claims), pause_s=GRAPH_PAUSE_S):
+            self._query(now_ns)
+
+        def gone() -> bool:
+            self._query(now_ns)
+            return not self._surplus(claims)
+
+        # Usually nothing is to leave, and the query that found everything there is the only one.
+        if self._surplus(claims) and not self._departures.wait(gone, pause_s=GRAPH_PAUSE_S):
             # What stays in the graph without anybody's claim is left by a process that died, and counts as known from
             # now on.
-            self._strangers = self._strangers + self._surplus(now_ns, claims)
-        self.look(now_ns)
+            self._strangers = self._strangers + self._surplus(claims)
+        self._record()
         unknown = self._observer.watch(self._recorder.graph.endpoints)
         if self._observer.crowded:
             self._recorder.stop(now_ns, self._observer.crowded)
         self._recorder.note(*(f"the type of {name} is not known on this machine" for name in unknown))
-        writers = [c for c in claims if c["kind"] == "publisher"]
-        self.patience.wait(lambda: all(self._watched(c, writers) for c in writers))
+        writers = Counter((c["name"], c["type"]) for c in claims if c["kind"] == "publisher")
+        self.patience.wait(lambda: all(self._watched(*writer) for writer in writers.items()))
         self.patience.wait(lambda: all(map(self.is_heard, self.matching.streams)))
         self.matching.announce_kept()
         self.tell_all()
@@ -148,9 +158,9 @@ class Discovery:
         names = {c["name"] for c in claims if c["kind"] == "node"}
         if not names <= {*self._observer.students_nodes(names)}:
             return False  # before anything that takes longer to query: this is asked most often
-        graph = self._graph_at(now_ns)
-        found = self._found(graph)
-        offered = {(e.kind, e.service, e.type) for e in graph.services}
+        self._query(now_ns)
+        found = self._found
+        offered = {(e.kind, e.service, e.type) for e in self._graph.services}
         # The end of an action outlives its node, and is then in the list of none.
         nodes = [s.claims for s in self._staying() if any(c["kind"] == "node" for c in s.claims)]
         exchanging = {
@@ -161,25 +171,26 @@ class Discovery:
         namesakes = any(kind == "node" and count > 1 for (kind, _, _), count in found.items())
         return (namesakes or exchanging <= offered) and all(found[key] >= count for key, count in wanted.items())
 
-    def _surplus(self, now_ns: int, claims: list[dict[str, Any]]) -> Counter[Key]:
+    def _surplus(self, claims: list[dict[str, Any]]) -> Counter[Key]:
         """Count the removed endpoints that are still in the graph, except known strangers."""
-        wanted, found = _wanted(claims), self._found(self._graph_at(now_ns))
-        return +Counter({key: found[key] - wanted[key] - self._strangers[key] for key in self._known})
+        wanted = _wanted(claims)
+        return +Counter({key: self._found[key] - wanted[key] - self._strangers[key] for key in self._known})
 
-    def _found(self, graph: GraphSnapshot) -> Counter[Key]:
-        """Count, in the graph, the endpoints that any process has ever claimed."""
-        found = Counter((e.kind, e.topic, e.type) for e in graph.endpoints)
-        found.update(("node", name, "") for name in self._observer.students_nodes(self._nodes()))
+    def _query(self, now_ns: int) -> None:
+        """Look the graph up, and count in it the endpoints that any process has ever claimed.
+
+        It includes services if any process has reported one.
+        """
+        services = any(c["kind"] in ("service", "client") for s in self._students for c in s.claims)
+        services = services or bool(self._recorder.graph.services)
+        nodes = self._nodes()
+        self._graph = self._observer.graph(now_ns, services=services, existing=nodes)
+        found = Counter((e.kind, e.topic, e.type) for e in self._graph.endpoints)
+        found.update(("node", name, "") for name in self._observer.students_nodes(nodes))
         for kind, name, _ in self._known:
             if kind in ("service", "client"):
                 found[kind, name, ""] = self._observer.ends_of(kind, name) - self._services.ends_of(kind, name)
-        return found
-
-    def _graph_at(self, now_ns: int) -> GraphSnapshot:
-        """Return the live graph, including services if any process has reported one."""
-        services = any(c["kind"] in ("service", "client") for s in self._students for c in s.claims)
-        services = services or bool(self._recorder.graph.services)
-        return self._observer.graph(now_ns, services=services, existing=self._nodes())
+        self._found = found
 
     def _nodes(self) -> set[str]:
         return {c["name"] for c in self.matching.claims() if c["kind"] == "node"}
@@ -196,17 +207,22 @@ class Discovery:
         self._recorder.note(f"{service[:NAME_CHARACTERS]} was not matched in time")
         return False
 
-    def _watched(self, claim: dict[str, Any], writers: list[dict[str, Any]]) -> bool:
+    def _watched(self, written: tuple[str, str], writers: int) -> bool:
         """Return whether the observer's subscription is matched with exactly the publishers of a topic and type."""
-        if not self._observer.reads(claim["name"]):
+        topic, interface = written
+        if not self._observer.reads(topic):
             return True
-        same = sum(meets(writer, claim) for writer in writers)
-        matched = self._observer.publishers_matched(claim["name"], claim["type"])
-        return same <= matched <= same + self._strangers[_key(claim)] + self._observer.publishes(claim["name"])
+        strangers = self._strangers["publisher", topic, interface]
+        matched = self._observer.publishers_matched(topic, interface)
+        return writers <= matched <= writers + strangers + self._observer.publishes(topic)
 
     def look(self, now_ns: int) -> None:
         """Record the graph if it has changed."""
-        self._recorder.look(self._observer.with_qos(self._graph_at(now_ns)), self._observer.participants())
+        self._query(now_ns)
+        self._record()
+
+    def _record(self) -> None:
+        self._recorder.look(self._observer.with_qos(self._graph), self._observer.participants())
 
 
 def _listed(value: Any) -> list[Any]:

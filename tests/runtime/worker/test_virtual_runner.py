@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, cast
 
 import pytest
@@ -548,6 +549,33 @@ def test_what_a_latched_publisher_of_another_process_keeps_is_announced_once() -
         if a.get("arrivals")
     ]
     assert heard == [(300, {"topic /x": 1})]
+
+
+@pytest.mark.rule(14)
+def test_the_graph_is_queried_once_for_each_change() -> None:
+    """A query takes the longer the more endpoints there are: who makes many, one by one, would run into a limit."""
+
+    class Counting(ScriptedObserver):
+        queries = 0
+
+        def graph(self, t_ns: int, *, services: bool = False, existing: Collection[str] | None = None) -> GraphSnapshot:
+            Counting.queries += 1
+            return super().graph(t_ns, services=services, existing=existing)
+
+    def changing(times: int) -> Behaviour:
+        def program(me: ScriptedStudent, world: World) -> Program:
+            for n in range(times):
+                yield from wait(100 * n, endpoints=world.have(me.name, claim("publisher", f"/x{n}")))
+            yield from wait()
+
+        return program
+
+    queries = []
+    for times in (3, 8):
+        Counting.queries = 0
+        Run(changing(times), observes=Counting)
+        queries.append(Counting.queries)
+    assert queries[1] - queries[0] == 8 - 3
 
 
 @pytest.mark.parametrize("whose", ["gone.py", "a.py"])
