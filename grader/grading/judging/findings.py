@@ -165,6 +165,12 @@ def explain_fault(
     return None if fault is None else faulted(fault, effect, evidence, last=last)
 
 
+def observed(trace: Trace) -> str:
+    """Return for how long the nodes were observed, and the limit that ended it, if one did."""
+    limits = trace.marks("limit")
+    return f"{span(trace.stop_ns)}{f' ({quote(limits[0].detail)})' if limits else ''}"
+
+
 def fault_sentence(fault: Fault) -> str:
     """Return a fault as `file:line: text`, or as `file exited after 5.0 s with code 0`."""
     if fault.kind is FaultKind.EXITED:
@@ -266,10 +272,10 @@ def _explain_service(trace: Trace, kind: str, service: str, type_: str | None) -
         return found
     if mine and kind == "client":
         client = f"{service} [{quote(mine[0].type)}]: the client of {quote(mine[0].node)}"
-        reason = f"{client} sends no request in {span(trace.stop_ns)}"
+        reason = f"{client} sends no request in {observed(trace)}"
         return not_met(reason, {"service": service, "node": mine[0].node}, problem=ProblemKind.SILENT)
     seen = list(dict.fromkeys(f"{e.service} [{e.type}]" for e in ends))
-    reason = f"{service}: not in the ROS graph in {span(trace.stop_ns)}{f'; seen: {listed(seen)}' if seen else ''}"
+    reason = f"{service}: not in the ROS graph in {observed(trace)}{f'; seen: {listed(seen)}' if seen else ''}"
     return not_met(reason, {"service": service, "seen": seen[:20]}, problem=ProblemKind.ABSENT)
 
 
@@ -368,11 +374,11 @@ def _silent_publisher(trace: Trace, topic: str, type_: str | None) -> Finding | 
     if not on_topic:
         return None
     found = next((e for e in on_topic if e.type == type_), on_topic[0])
-    reason = f"{quote(found.topic)}: no message in {span(trace.stop_ns)}, though {quote(found.node)} has a publisher"
+    reason = f"{quote(found.topic)}: no message in {observed(trace)}, though {quote(found.node)} has a publisher"
     reason += f" of type {quote(found.type)}"
     wrong = found.topic != topic or (type_ is not None and found.type != type_)
     reason += f"; expected {type_ + ' on ' if type_ else ''}{topic}" if wrong else ""
-    hint = "publish from a timer that runs from the start, and spin the node"
+    hint = limit_hint(trace) or "publish from a timer that runs from the start, and spin the node"
     return not_met(
         reason, {"topic": found.topic, "type": found.type, "messages": 0}, hint=hint, problem=ProblemKind.SILENT
     )
@@ -380,6 +386,12 @@ def _silent_publisher(trace: Trace, topic: str, type_: str | None) -> Finding | 
 
 def _nothing(trace: Trace, topic: str, kind: str) -> Finding:
     others = dict.fromkeys(f"{e.topic} [{e.type}]" for e in student_endpoints(trace, kind))
-    reason = f"{topic}: no {kind} in {span(trace.stop_ns)}"
+    reason = f"{topic}: no {kind} in {observed(trace)}"
     reason += f"; {kind}s seen: {listed(list(others))}" if others else ""
-    return not_met(reason, {"topic": topic, "seen": list(others)[:20]}, problem=ProblemKind.ABSENT)
+    evidence = {"topic": topic, "seen": list(others)[:20]}
+    return not_met(reason, evidence, hint=limit_hint(trace), problem=ProblemKind.ABSENT)
+
+
+def limit_hint(trace: Trace) -> str:
+    """Return the hint for what is missing in a recording that a limit ended; empty if none did."""
+    return "stay below the limit: what comes after it is not recorded" if trace.marks("limit") else ""

@@ -9,7 +9,15 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 from grader.grading.judging.charts import Lanes, drawn_case, series
-from grader.grading.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
+from grader.grading.judging.findings import (
+    explain_fault,
+    explain_no_message,
+    faulted,
+    first_fault,
+    met,
+    not_met,
+    observed,
+)
 from grader.grading.judging.plots import Drawing
 from grader.grading.judging.service_calls import LATENESS_NS, Call, calls_of, calls_of_node, status_of
 from grader.grading.judging.values import (
@@ -258,7 +266,7 @@ def explain_no_action(trace: Trace, action: str) -> Finding:
     near = nearest(action, seen) or (seen[0] if len(seen) == 1 else None)
     found = f"; seen: {listed(seen)}" if seen else ""
     hint = f"name the action {action} instead of {quote(near)}" if near else ""
-    reason = f"{action}: no action server in {span(trace.stop_ns)}{found}"
+    reason = f"{action}: no action server in {observed(trace)}{found}"
     problem = ProblemKind.OTHER_NAME if seen else ProblemKind.ABSENT
     return not_met(reason, {"seen": seen[:20]}, hint=hint, problem=problem)
 

@@ -17,8 +17,10 @@ from grader.grading.judging.findings import (
     fault_sentence,
     faulted,
     first_fault,
+    limit_hint,
     met,
     not_met,
+    observed,
     only_printed,
     waiting_for,
 )
@@ -27,7 +29,7 @@ from grader.grading.judging.plots import Drawing, Plot
 from grader.grading.judging.values import JITTER_NS, LONGEST_MATCHED, number_at, published
 from grader.grading.model.chart import Band, Level, Look, Panel, Tone
 from grader.grading.model.exercise import Finding, Location, ProblemKind, Roles
-from grader.grading.model.wording import listed, moment, number, quote, span
+from grader.grading.model.wording import listed, moment, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import DurationNs, FieldOf, Pattern, counted, seconds, within
 from grader.runtime.model.trace import LogRecord, Message, Trace
@@ -35,7 +37,7 @@ from grader.runtime.model.trace import LogRecord, Message, Trace
 
 def no_node(trace: Trace, process: str, evidence: dict[str, object]) -> Finding:
     """Return no credit for output of a process without a node."""
-    reason = f"{process}: no node in the ROS graph in {span(trace.stop_ns)}; output without a node does not count"
+    reason = f"{process}: no node in the ROS graph in {observed(trace)}; output without a node does not count"
     fault = first_fault(trace, process)
     if fault is not None:
         reason = f"{fault_sentence(fault)}; {reason}"
@@ -86,9 +88,9 @@ class UsesLogger:
             reason = f"{self.process}: {counted(len(lines), 'line')} printed, none through the logger"
             return only_printed(reason, evidence | {"first": quote(lines[0].text)})
         return explain_fault(trace, "nothing was logged", evidence, process=self.process) or not_met(
-            f"{self.process}: no log record in {span(trace.stop_ns)}",
+            f"{self.process}: no log record in {observed(trace)}",
             evidence,
-            hint=LOGGER_HINT,
+            hint=limit_hint(trace) or LOGGER_HINT,
             problem=ProblemKind.NOT_LOGGED,
         )
 

@@ -574,7 +574,9 @@ def _may_be_unused(source: Source, function: Function) -> bool:
 
 @hint_rule(given=_unseen, priority=8240)
 def _late_timer(unseen: _Unseen) -> Clue | None:
-    """The timer's period is longer than the observation."""
+    """The timer's period is longer than the observation, which no limit cut short."""
+    if unseen.case.trace.marks("limit"):
+        return None
     source, latest_s = unseen.source, seconds(unseen.case.trace.stop_ns) - 1
     for item in made(source, "timer"):
         worth = constant(source, item.period)

@@ -43,6 +43,10 @@ def test_one_message_is_enough() -> None:
         (Recording().endpoint("publisher", "/cmdvel", TWIST), ["/cmdvel: no message", "expected"]),
         (Recording().endpoint("publisher", "/chatter", FLOAT32), ["no publisher in 10.0 s", "/chatter"]),
         (Recording(), ["/cmd_vel: no publisher in 10.0 s"]),
+        (
+            Recording(0.0).mark(0.0, "limit", "more than 5 nodes"),
+            ["/cmd_vel: no publisher in 0.0 s (more than 5 nodes)"],
+        ),
         (Recording().crashed(0.1, "NameError: name 'Twist' is not defined", 9), ["node.py:9: NameError"]),
         (Recording().exited(0.0, 1), ["node.py exited after 0.0 s with code 1"]),
         (Recording().fault(4.0, FaultKind.HUNG, "tick() did not return", 24), ["node.py:24: tick() did not return"]),
@@ -56,6 +60,16 @@ def test_the_nearest_thing_is_named_when_nothing_was_published(rec: Recording, s
     assert all(part in finding.reason for part in said), finding.reason
     assert "rosout" not in finding.reason
     assert "cmd_vel" in finding.reason
+
+
+@pytest.mark.parametrize("topic", ["/cmd_vel", "/chatter"])
+def test_who_reached_a_limit_is_told_to_stay_below_it(topic: str) -> None:
+    """What came after it was not recorded, so that the program may well publish."""
+    finding = PUBLISHES.judge(
+        Recording(0.1).endpoint("publisher", topic, TWIST).mark(0.1, "limit", "more than 5 nodes").trace()
+    )
+    assert "in 0.1 s (more than 5 nodes)" in finding.reason
+    assert "stay below the limit" in finding.hint
 
 
 def test_a_node_that_only_ends_is_told_to_spin() -> None:

@@ -132,6 +132,18 @@ def test_an_empty_file_is_called_empty() -> None:
     )
 
 
+@pytest.mark.parametrize("limited", [True, False])
+def test_a_period_is_not_too_long_for_what_a_limit_cut_short(limited: bool) -> None:
+    """A timer of any period may have no turn in it."""
+    rec = silent(0.1 if limited else 1.0)
+    if limited:
+        rec.mark(0.1, "limit", "more than 500 nodes, publishers or subscriptions at once: the rest was ignored")
+    text = spoilt(FILE, [["create_timer(0.05", "create_timer(5.0"]])
+    verdict = report(FILE, {"alone": rec.trace("alone")}, {FILE: text}).verdicts[0]
+    assert ("before the first call" in verdict.hint) is not limited
+    assert ("stay below the limit" in verdict.hint) is limited
+
+
 # --- numbers --------------------------------------------------------------------------------------------------------
 
 
