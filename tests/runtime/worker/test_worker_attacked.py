@@ -377,8 +377,12 @@ def test_endpoints_that_do_not_exist_are_soon_waited_for_only_briefly(run: Calla
     assert len(trace.messages("/cmd_vel")) == 79
 
 
-def workers_of(pid: int, *, sandboxes: bool = True) -> list[int]:
-    """Return the worker processes below a process, innermost last, with the `bwrap` that start them or without.
+#: What names a worker in its command, and further on in the commands that start it, such as `prlimit` and `bwrap`.
+WORKER = b"-m", b"grader.runtime.worker.worker_main"
+
+
+def workers_of(pid: int, *, starting: bool = True) -> list[int]:
+    """Return the worker processes below a process, innermost last, with those that start them or without.
 
     Who kills workers kills those without: a `bwrap` that ends while it starts a worker leaves it without a parent, and
     then nobody finds it here.
@@ -389,7 +393,8 @@ def workers_of(pid: int, *, sandboxes: bool = True) -> list[int]:
             words = (path / "cmdline").read_bytes().split(b"\0")
         except OSError:  # it has ended, before or after its file was opened
             continue
-        if b"grader.runtime.worker.worker_main" in words and (sandboxes or not words[0].endswith(b"bwrap")):
+        at = words.index(WORKER[1]) if WORKER[1] in words else 0
+        if at and (starting or (b"python" in words[0] and words.index(WORKER[0]) == at - 1)):
             found.append(int(path.name))
     return [p for p in found if pid in ancestors(p)]
 
@@ -415,7 +420,7 @@ def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path: Path) -> None:
 
         def kill() -> None:
             while not killed.wait(0.05):
-                if (tmp_path / "s" / "a.py").exists() and (workers := workers_of(os.getpid(), sandboxes=False)):
+                if (tmp_path / "s" / "a.py").exists() and (workers := workers_of(os.getpid(), starting=False)):
                     killed.set()
                     os.killpg(os.getpgid(workers[0]), signal.SIGKILL)
 
@@ -437,7 +442,7 @@ def test_a_worker_that_is_always_killed_decides_nothing(tmp_path: Path) -> None:
 
         def kill() -> None:
             while not done.wait(0.02):
-                for worker in workers_of(os.getpid(), sandboxes=False):
+                for worker in workers_of(os.getpid(), starting=False):
                     with contextlib.suppress(ProcessLookupError):  # the group: no child that was just made outlives it
                         os.killpg(os.getpgid(worker), signal.SIGKILL)
 
