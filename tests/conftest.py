@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
+import sys
 from collections.abc import Iterator
 
 import pytest
@@ -20,6 +22,11 @@ NOT_FAST = ("ros", "browser", "sandbox", "slow", "long", "nightly")
 
 settings.register_profile("default", deadline=None, suppress_health_check=[HealthCheck.too_slow], max_examples=30)
 settings.register_profile("nightly", settings.get_profile("default"), max_examples=200)
+
+# Rewriting the assertions of all tests takes twelve seconds of a processor: it is kept, also where Python should keep
+# nothing, as in many containers.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # What a shell runs in the background ignores interrupts, and so would every program that is interrupted here.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -45,7 +52,7 @@ def strict_log(request: pytest.FixtureRequest) -> Iterator[None]:
     logging.getLogger("grader").removeHandler(handler)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def ros() -> RosInstallation:
     """The ROS of this machine."""
     try:
@@ -73,6 +80,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     compute come last and fill what is left.
     """
     for item in items:
+        tier = getattr(item, "callspec", None) and item.callspec.params.get("session_in_tier")
+        if tier:
+            item.add_marker(pytest.mark.xdist_group(f"tier {tier}"))  # one process opens it, once
         if not any(item.get_closest_marker(kind) for kind in NOT_FAST):
             item.add_marker("fast")
     everything, long = config.getoption("--everything"), config.getoption("--long")

@@ -13,7 +13,7 @@ from archive import outcomes
 from click.testing import CliRunner
 from decided import grade_until_decided
 from places import ROOT
-from ruamel.yaml import YAML
+from tables import read_table
 
 from grader.cli import main
 from grader.grading.app.request import GradeRequest
@@ -34,7 +34,7 @@ def rubric(name: str) -> Path:
 @cache
 def listed(name: str) -> dict[str, dict[str, Any]]:
     """Return what is expected of each wrong submission of an example, as its file has it."""
-    found: Any = YAML(typ="safe").load((ROOT / "examples" / name / "expected.yaml").read_text(encoding="utf-8"))
+    found: Any = read_table(ROOT / "examples" / name / "expected.yaml")
     return dict(found)
 
 

@@ -13,8 +13,8 @@ from archive import judged, recordings
 from click.testing import CliRunner
 from parsed_commands import parsed
 from places import ROOT
-from ruamel.yaml import YAML
 from sample_folders import expected
+from tables import read_table
 
 from grader.cli.main import app
 from grader.grading.model.report import Report
@@ -91,7 +91,7 @@ def test_the_task_that_watches_says_when_it_begins_and_ends() -> None:
 
 def commands() -> list[str]:
     """Return every command of the grader that the workplace names."""
-    hooks = YAML(typ="safe").load((ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))
+    hooks = read_table(ROOT / ".pre-commit-hooks.yaml")
     cells = json.loads((ROOT / "docs" / "how-to" / "notebook.ipynb").read_text(encoding="utf-8"))["cells"]
     lines = [line for cell in cells if cell["cell_type"] == "code" for line in "".join(cell["source"]).splitlines()]
     return [

@@ -14,7 +14,7 @@ from arena import Arena, Ran
 from attack_rubric import controller_rubric, publisher_rubric
 from attack_verdicts import criteria_of, objections
 from places import ROOT
-from ruamel.yaml import YAML
+from tables import read_table
 
 from grader.grading.reporting.formats import FORMATS
 
@@ -56,7 +56,7 @@ class Attack:
 
 def read_attacks() -> list[Attack]:
     """Return the table."""
-    table = YAML(typ="safe").load((HERE / "attacks.yaml").read_text(encoding="utf-8"))
+    table = read_table(HERE / "attacks.yaml")
     return [Attack(**entry) for entry in table["attacks"]]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from archive import builtin_exercises
+from archive import exercises_by_id
 from sample_folders import GROUPS, SHAPES, collection_of, collections, expected, expected_in, folder_of
 
 from grader.grading.model.exercise import Outcome
@@ -24,8 +24,8 @@ MISSPELT = {"broken/misspelt_file", "broken/controller_missing", "broken/noteboo
 LACKING = {"broken/ros_package_missing"}
 
 #: By exercise: the files that students write, the ids of the criteria, and the name of its folder.
-FILES = {id_: set(exercise.files) for id_, exercise in builtin_exercises().items()}
-CRITERIA = {id_: {criterion.id for criterion in exercise.criteria} for id_, exercise in builtin_exercises().items()}
+FILES = {id_: set(exercise.files) for id_, exercise in exercises_by_id().items()}
+CRITERIA = {id_: {criterion.id for criterion in exercise.criteria} for id_, exercise in exercises_by_id().items()}
 HOMES = {id_: path.parent.name for id_, path in builtin_rubrics().items()}
 
 

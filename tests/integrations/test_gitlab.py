@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 from places import ROOT
-from ruamel.yaml import YAML
+from tables import read_table
 
 pytestmark = pytest.mark.slow
 
-JOB = YAML(typ="safe").load((ROOT / "integrations" / "gitlab" / "grade.yml").read_text(encoding="utf-8"))["grade"]
+JOB = read_table(ROOT / "integrations" / "gitlab" / "grade.yml")["grade"]
 #: Sets a program up that notes its words and the files it was given, and ends with 3.
 PREPARE = """mkdir -p "$1/bin"
 cat > "$1/bin/grade" <<'EOF'

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from places import ROOT
-from ruamel.yaml import YAML
+from tables import read_table
 
 import grader
 from grader.course.packaging import workflow
@@ -89,7 +89,7 @@ def test_scripts_pass_shellcheck(name: str) -> None:
 
 def test_the_steps_of_the_action_pass_shellcheck(tmp_path: Path) -> None:
     """They are scripts too, which a runner starts with `-e`."""
-    steps = YAML(typ="safe").load(ACTION.read_text(encoding="utf-8"))["runs"]["steps"]
+    steps = read_table(ACTION)["runs"]["steps"]
     for number, step in enumerate(step for step in steps if "run" in step):
         (tmp_path / f"{number}.sh").write_text(f"set -e\n{step['run']}")
     assert complaints("shellcheck", "--shell=bash", *map(str, sorted(tmp_path.glob("*.sh")))) == ""
@@ -101,7 +101,7 @@ def test_the_documentation_names_every_input_and_output(part: str) -> None:
     text = (ROOT / "docs" / "how-to" / "github-actions.md").read_text(encoding="utf-8")
     table = text.partition(f"\n| {part[:-1]} |")[2].partition("\n\n")[0]
     told = [name for row in table.splitlines()[2:] for name in re.findall(r"`([a-z-]+)`", row.split("|")[1])]
-    assert told == list(YAML(typ="safe").load(ACTION.read_text(encoding="utf-8"))[part])
+    assert told == list(read_table(ACTION)[part])
 
 
 def test_students_start_from_the_workflow_that_is_exported() -> None:
@@ -168,4 +168,4 @@ def test_what_is_not_ready_is_not_released(release: Path, name: str, old: str, n
 
 def test_the_citation_names_this_version() -> None:
     """It is cited between releases, too."""
-    assert YAML(typ="safe").load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))["version"] == grader.__version__
+    assert read_table(ROOT / "CITATION.cff")["version"] == grader.__version__

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 
-from archive import Recorded, builtin_exercises, recordings
+from archive import Recorded, exercises_by_id, recordings
 from sample_folders import expected
 
 from grader.grading.evidence import manifest as kept
@@ -25,7 +25,7 @@ LATE_NS, LOST_NS = 25 * NS_PER_MS, 300 * NS_PER_MS
 def scenarios(recorded: Recorded) -> Iterator[tuple[str, BeginningJudge, Trace, str]]:
     """Yield what was recorded in virtual time: its name, its judge, the trace, and the topic that it begins with."""
     manifest = kept.parse(recorded.manifest)
-    exercises = [builtin_exercises()[exercise.id] for exercise in manifest.exercises]
+    exercises = [exercises_by_id()[exercise.id] for exercise in manifest.exercises]
     traces = {
         (exercise.id, recording.scenario): unpack(recorded.traces[f"{exercise.id}.{recording.scenario}"])
         for exercise in manifest.exercises

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from grader.grading.evidence.manifest import scenario_digest
 from grader.grading.model.grading_options import ODOMETRY
-from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.builtin import builtin_exercises
 from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.scenario import (
     AnyOrder,
@@ -42,7 +42,7 @@ from grader.runtime.stimuli.server import PlannedServer
 
 MS, S = 1_000_000, 1_000_000_000
 SEEDS = st.integers(0, 2**48 - 1)
-EXERCISES = {id_: read_rubric(path) for id_, path in builtin_rubrics().items()}
+EXERCISES = {exercise.id: exercise for exercise in builtin_exercises()}
 DRIVE = Recording("/odom", ODOMETRY, tuple(TimedMessage(n * 100 * MS, b"cdr%d" % n, {"n": n}) for n in range(600)))
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from decided import grade_until_decided
-from ruamel.yaml import YAML
+from tables import read_table
 
 from grader.course.classroom.intake import take_in
 from grader.grading.app.request import GradeRequest
@@ -23,7 +23,7 @@ from grader.grading.submissions.archives import collect_archive
 from grader.runtime.model.errors import SubmissionError
 
 HERE = Path(__file__).parent / "trust"
-PROGRAMS = YAML(typ="safe").load((HERE / "programs.yaml").read_text(encoding="utf-8"))["programs"]
+PROGRAMS = read_table(HERE / "programs.yaml")["programs"]
 KEY = SeedKey(b"a key that no submission holds, of thirty-two bytes or more")
 
 

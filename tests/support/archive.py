@@ -19,8 +19,7 @@ from grader.grading.judging.judge_run import judge_run
 from grader.grading.model.chart import Chart, Panel, Series
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.report import Report
-from grader.grading.rubrics.builtin import builtin_rubrics
-from grader.grading.rubrics.loader import read_rubric
+from grader.grading.rubrics.builtin import builtin_exercises
 from grader.runtime.recording.packed import unpack
 from grader.runtime.recording.recording_file import packed_trace
 
@@ -98,15 +97,14 @@ def write_archive(recorded: Mapping[str, Recorded], path: Path) -> None:
             archive.addfile(member, io.BytesIO(data))
 
 
-@cache
-def builtin_exercises() -> dict[str, Exercise]:
-    """Return the exercises of the built-in rubrics by id."""
-    return {id_: read_rubric(path) for id_, path in builtin_rubrics().items()}
+def exercises_by_id() -> dict[str, Exercise]:
+    """Return the built-in exercises by id."""
+    return {exercise.id: exercise for exercise in builtin_exercises()}
 
 
 def outdated(recorded: Recorded) -> list[str]:
     """Return the scenarios that the rubrics describe otherwise than when they were recorded."""
-    exercises = builtin_exercises()
+    exercises = exercises_by_id()
     return [
         f"{exercise.id}.{recording.scenario}"
         for exercise in kept.parse(recorded.manifest).exercises
@@ -119,7 +117,7 @@ def outdated(recorded: Recorded) -> list[str]:
 def judged(recorded: Recorded, known: Mapping[str, Exercise] | None = None) -> Report:
     """Judge a recording as `grade rejudge` does, by the built-in exercises or by others, by id."""
     manifest = kept.parse(recorded.manifest)
-    exercises = [(known or builtin_exercises())[exercise.id] for exercise in manifest.exercises]
+    exercises = [(known or exercises_by_id())[exercise.id] for exercise in manifest.exercises]
     traces = {
         (exercise.id, recording.scenario): unpack(recorded.traces[f"{exercise.id}.{recording.scenario}"])
         for exercise in manifest.exercises

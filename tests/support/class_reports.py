@@ -13,8 +13,7 @@ from report_samples import report
 
 from grader.grading.model.exercise import Criterion, Exercise, Location, Outcome
 from grader.grading.model.report import ExerciseReport, Report, ReportedFault, Verdict
-from grader.grading.rubrics.builtin import builtin_rubrics
-from grader.grading.rubrics.loader import read_rubric
+from grader.grading.rubrics.builtin import builtin_exercises
 
 #: Criterion -> (likelihood in percent, diagnosis, reason, hint); {a} and {b} are drawn.
 MISTAKES = {
@@ -73,7 +72,7 @@ MISTAKES = {
 }  # fmt: skip
 FOLLOWS = {"runs_together": ("fan_on_above_25", "fan_off_at_or_below_25", "temperature_range")}
 CHAPTER = ("velocity_publisher", "odom_subscriber", "two_node_communication")
-EXERCISES = [read_rubric(builtin_rubrics()[id_]) for id_ in CHAPTER]
+EXERCISES = [exercise for id_ in CHAPTER for exercise in builtin_exercises() if exercise.id == id_]
 WORDS = ("timer_callback", "tick", "publish_velocity", "on_timer", "cb", "step")
 
 

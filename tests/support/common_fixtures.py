@@ -12,14 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from tiers import more
 
 if TYPE_CHECKING:
     from grader.runtime.session import RecordingSession
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def session() -> Iterator[RecordingSession]:
-    """The strongest sandbox of this machine, with warm workers."""
+    """The strongest sandbox of this machine, with warm workers, for all tests of this process."""
     from hostile import staging
 
     from grader.runtime.session import open_session
@@ -28,9 +29,9 @@ def session() -> Iterator[RecordingSession]:
         yield staging(session)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def one_worker() -> Iterator[RecordingSession]:
-    """The strongest sandbox of this machine, with one worker."""
+    """The strongest sandbox of this machine, with one worker, for all tests of this process."""
     from hostile import staging
 
     from grader.runtime.session import open_session
@@ -39,7 +40,7 @@ def one_worker() -> Iterator[RecordingSession]:
         yield staging(session)
 
 
-@pytest.fixture(scope="module", params=["auto", "bubblewrap-flat", "landlock"])
+@pytest.fixture(scope="session", params=["auto", *more(["bubblewrap-flat", "landlock"])])
 def session_in_tier(request: pytest.FixtureRequest) -> Iterator[RecordingSession]:
     """A sandbox with one worker: with a view of files of its own for each process, and without."""
     from hostile import staging

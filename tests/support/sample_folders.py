@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from places import TESTS
-from ruamel.yaml import YAML
+from tables import read_table
 
 #: One folder for each exercise, and a collection of programs that crash, or are no programs, whatever the exercise.
 EXERCISES, SHAPES = TESTS / "exercises", TESTS / "shapes"
@@ -81,4 +81,4 @@ def _together(name: str) -> dict[str, Any]:
 
 def table(path: Path) -> dict[str, Any]:
     """Return what a YAML file of a collection maps names to."""
-    return dict(YAML(typ="safe").load(path.read_text(encoding="utf-8")) or {})
+    return dict(read_table(path) or {})

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
+from tables import read_table
 
 EXPRESSION = re.compile(r"\$\{\{(.*?)\}\}", re.DOTALL)
 TOKEN = re.compile(r"\s*(?:(?P<string>'(?:[^']|'')*')|(?P<sign>==|!=|&&|\|\||[()!])|(?P<name>[a-z_][\w.-]*(?:\(\))?))")
@@ -51,7 +51,7 @@ def run_action(action: Path, workspace: Path, folder: Path, environment: Mapping
         environment: The job's environment.
         inputs: What the workflow gives, with `_` for `-`.
     """
-    described = YAML(typ="safe").load((action / "action.yml").read_text(encoding="utf-8"))
+    described = read_table(action / "action.yml")
     given = {name: str(value.get("default", "")) for name, value in described["inputs"].items()}
     for name, value in inputs.items():
         assert name.replace("_", "-") in given, name

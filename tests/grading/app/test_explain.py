@@ -19,12 +19,12 @@ from grader.grading.app.request import GradeRequest
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.diagnosis import RULES
 from grader.grading.model.report import CheckExplanation, CriterionExplanation
-from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.builtin import builtin_exercises, builtin_rubrics
 from grader.grading.rubrics.check_parameters import manual_of
 from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.errors import GraderError
 
-CRITERIA = [(e.id, c.id) for path in builtin_rubrics().values() for e in [read_rubric(path)] for c in e.criteria]
+CRITERIA = [(e.id, c.id) for e in builtin_exercises() for c in e.criteria]
 
 
 def grade(*words: str) -> Result:

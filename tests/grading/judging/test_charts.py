@@ -29,14 +29,12 @@ from grader.grading.judging.judge_run import judge_exercise
 from grader.grading.judging.recorded_values import MOST_SAMPLES, recorded_values
 from grader.grading.model.chart import Chart, Figure, GraphFigure, Look, Playback, Tone
 from grader.grading.model.exercise import Criterion, Exercise
-from grader.grading.rubrics.builtin import builtin_rubrics
+from grader.grading.rubrics.builtin import builtin_exercises
 from grader.grading.rubrics.exercise_checks import known_checks
-from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.submission import StudentFile, Submission
 from grader.runtime.model.trace import FaultKind, Mark, Request, Response, Trace
 
-EXERCISES = {path.parent.name: read_rubric(path) for path in builtin_rubrics().values()}
-ONE, TWO, THREE = (EXERCISES[f"exercise_{n}"] for n in (1, 2, 3))
+ONE, TWO, THREE = builtin_exercises()[:3]
 
 
 def submission_of(exercise: Exercise, tmp_path: Path) -> Submission:

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ruamel.yaml import YAML
 from stand_in_checks import CHECKS, Everything, FieldValues, Point, Publishes, TopicRate, UsesLogger
+from tables import read_table
 
 from grader.grading.model.exercise import Criterion, Exercise
 from grader.grading.model.grading_options import ODOMETRY
@@ -175,7 +175,7 @@ def test_what_is_left_out_keeps_the_checks_default(rubric: Callable[..., Any]) -
     assert criterion.check == Everything("a", 3, False, "above", (1.0, "b"))
 
 
-BAD = YAML(typ="safe", pure=True).load(Path(__file__).with_name("bad_rubrics.yaml").read_text(encoding="utf-8"))
+BAD = read_table(Path(__file__).with_name("bad_rubrics.yaml"))
 
 
 @pytest.mark.parametrize("bad", BAD, ids=[bad["new"].strip()[:40] for bad in BAD])

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from places import ROOT
-from ruamel.yaml import YAML
+from tables import read_table
 from tracing import (
     FLOAT32,
     ODOMETRY,
@@ -39,13 +40,13 @@ BATTERY = "/battery/get_status"
 EXAMPLES = ROOT / "examples"
 #: The rubrics whose programs may be spoilt: together they ask most checks.
 RUBRICS = (*builtin_rubrics().values(), *(p.parent / f"{p.parent.name}.yaml" for p in EXAMPLES.glob("*/README.md")))
-EXERCISES: dict[Path, Exercise] = {path: read_rubric(path) for path in RUBRICS}
 RIGHT = {path.stem: path.read_text(encoding="utf-8") for path in sorted((HERE / "right").glob("*.py.txt"))}
 
 
+@cache
 def rows(name: str) -> list[dict[str, Any]]:
     """The rows of a golden table."""
-    return list(YAML(typ="safe").load((HERE / name).read_text(encoding="utf-8")))
+    return list(read_table(HERE / name))
 
 
 def spoilt(file: str, changes: Sequence[Sequence[str]]) -> str:
@@ -62,12 +63,18 @@ def line_of(text: str, code: str) -> int:
     return next(k for k, row in enumerate(text.splitlines(), 1) if code in row)
 
 
+@cache
+def exercises() -> dict[Path, Exercise]:
+    """Return the exercises of `RUBRICS`."""
+    return {path: read_rubric(path) for path in RUBRICS}
+
+
 def rubric_of(file: str) -> Path:
-    return next(path for path, exercise in EXERCISES.items() if file in exercise.files)
+    return next(path for path, exercise in exercises().items() if file in exercise.files)
 
 
 def exercise_of(file: str) -> Exercise:
-    return EXERCISES[rubric_of(file)]
+    return exercises()[rubric_of(file)]
 
 
 def report(file: str, traces: Mapping[str, Trace], texts: Mapping[str, str] | None) -> ExerciseReport:

@@ -10,8 +10,7 @@ from grader.grading.judging.figures import illustrated
 from grader.grading.judging.judge_run import judge_exercise
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.report import ExerciseReport, Report
-from grader.grading.rubrics.builtin import builtin_rubrics
-from grader.grading.rubrics.loader import read_rubric
+from grader.grading.rubrics.builtin import builtin_exercises
 from grader.runtime.model.submission import StudentFile, Submission
 from grader.runtime.model.trace import FaultKind, Trace
 
@@ -56,7 +55,7 @@ def crashed(text: str = "ValueError: no") -> Report:
 
 
 def _report(first: Recording, second: Recording, speed: str, name: str = "ada") -> Report:
-    rubrics = [read_rubric(builtin_rubrics()[id_]) for id_ in CHAPTER]
+    rubrics = [exercise for id_ in CHAPTER for exercise in builtin_exercises() if exercise.id == id_]
     recordings = {"alone": first, "waiting_then_driving": second, **_conversation(speed)}
     traces = {name_: recording.trace(name_) for name_, recording in recordings.items()}
     return report(*(_graded(exercise, traces) for exercise in rubrics), name=name)
