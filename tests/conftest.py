@@ -80,7 +80,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     compute come last and fill what is left.
     """
     for item in items:
-        tier = getattr(item, "callspec", None) and item.callspec.params.get("session_in_tier")
+        tier = item.callspec.params.get("session_in_tier") if hasattr(item, "callspec") else None
         if tier:
             item.add_marker(pytest.mark.xdist_group(f"tier {tier}"))  # one process opens it, once
         if not any(item.get_closest_marker(kind) for kind in NOT_FAST):

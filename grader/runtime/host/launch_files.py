@@ -708,7 +708,7 @@ def _evaluated(value: Any, context: Context) -> Any:  # noqa: PLR0911 - one for 
 
 
 def _loaded(text: str) -> Any:
-    import yaml  # type: ignore[import-untyped]  # comes with rclpy
+    import yaml  # comes with rclpy
 
     return yaml.safe_load(text)
 
