@@ -7,9 +7,11 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
+from time import process_time
 
 import pytest
 from hypothesis import HealthCheck, settings
+from process_table import processor_time_s
 
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import RosInstallation, find_ros
@@ -17,6 +19,7 @@ from grader.runtime.ros_installation import RosInstallation, find_ros
 #: Fixtures that tests in several folders use.
 pytest_plugins = ["browser_fixtures", "common_fixtures"]
 
+BEGAN_S = pytest.StashKey[float]()
 #: The markers of tests that `-m fast` leaves out.
 NOT_FAST = ("ros", "browser", "sandbox", "slow", "long", "nightly")
 
@@ -70,6 +73,32 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Try more examples of each property in the nightly run."""
     settings.load_profile("nightly" if config.getoption("--everything") else "default")
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Note the processor time that had passed when a test begins."""
+    item.stash[BEGAN_S] = _processor_time_s(item)
+    return (yield)
+
+
+def _processor_time_s(item: pytest.Item) -> float:
+    if not item.config.getoption("xmlpath"):
+        return 0.0
+    # Looking at all processes costs more than most fast tests, which start none.
+    return process_time() if item.get_closest_marker("fast") else processor_time_s(os.getpid())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[None]:
+    """Add to the results of `--junitxml` what a test cost, for `tests/durations.py`."""
+    if call.when == "teardown" and item.config.getoption("xmlpath"):
+        item.user_properties += [
+            ("file", item.nodeid.partition("::")[0]),
+            ("markers", " ".join(sorted({marker.name for marker in item.iter_markers()}))),
+            ("processor_s", f"{_processor_time_s(item) - item.stash[BEGAN_S]:.3f}"),
+        ]
+    return (yield)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import subprocess
 from collections.abc import Iterator, Mapping
@@ -48,6 +49,14 @@ def stats() -> dict[Running, list[bytes]]:
         if fields:
             found[int(entry.name), fields[19].decode()] = fields
     return found
+
+
+def processor_time_s(pid: int) -> float:
+    """Return the processor time of a process and of all that it has started, as far as these live or were awaited."""
+    known = stats()
+    tree = {one for one, _ in below(pid)} | {pid}
+    ticks = sum(int(field) for (one, _), status in known.items() if one in tree for field in status[11:15])
+    return ticks / os.sysconf("SC_CLK_TCK")
 
 
 def is_students(process: Path) -> bool:
