@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from decided import grade_until_decided
 from places import ROOT
 from tables import read_table
+from tiers import LONG, NIGHTLY
 
 from grader.cli import main
 from grader.grading.app.request import GradeRequest
@@ -68,7 +69,7 @@ def submissions() -> Iterator[ParameterSet]:
     """Yield each example with each of its submissions; the second mistake and further ones are more of the same."""
     for name in EXAMPLES:
         for place, folder in enumerate(["reference", *(f"wrong/{wrong}" for wrong in expected(name))]):
-            marks = [pytest.mark.nightly] if place >= NIGHTLY_FROM else []
+            marks = NIGHTLY if place >= NIGHTLY_FROM else LONG if place else ()
             yield pytest.param(name, folder, id=f"{name}-{folder}", marks=marks)
 
 

@@ -43,6 +43,7 @@ def test_virtual_seconds_are_those_of_all_recordings(monkeypatch: pytest.MonkeyP
     assert 26 + 28 + 11 + 19 + 20 - 5 < speed["observed_s"](speed["GRADE"]) < 26 + 28 + 15 + 21 + 24 + 5
 
 
+@pytest.mark.long
 @pytest.mark.ros
 @pytest.mark.skipif(shutil.which("perf") is None, reason="perf is not installed")
 def test_a_small_run_is_measured_and_kept(tmp_path: Path) -> None:

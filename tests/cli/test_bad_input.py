@@ -14,6 +14,7 @@ import pytest
 from places import GRADE
 from process_table import Running, read, running, segments_in_use, students_of
 from sample_folders import folder_of
+from tiers import each
 from waiting import wait_for
 
 pytestmark = pytest.mark.ros
@@ -126,7 +127,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("name", BAD)
+@pytest.mark.parametrize("name", each(BAD, 4))
 def test_bad_code_ends_in_a_report(scratch: Path, name: str) -> None:
     """What went wrong is in it; the command ends by itself and leaves nothing behind."""
     submission = folder_of(f"broken/{name}")
@@ -184,6 +185,7 @@ def test_an_interrupt_in_the_middle_leaves_nothing(scratch: Path, tmp_path: Path
     assert_nothing_left(scratch, before)
 
 
+@pytest.mark.long
 def test_a_kill_in_the_middle_ends_everything(scratch: Path, tmp_path: Path) -> None:
     """SIGKILL gives no time to tidy up: folders stay, but no process and no shared memory."""
     before = shared_memory()
@@ -195,6 +197,7 @@ def test_a_kill_in_the_middle_ends_everything(scratch: Path, tmp_path: Path) -> 
     assert all(re.match("grade-", path.name) for path in scratch.iterdir())
 
 
+@pytest.mark.long
 def test_a_termination_in_the_middle_ends_everything(scratch: Path, tmp_path: Path) -> None:
     """As a build server does it that has waited long enough."""
     before = shared_memory()

@@ -17,6 +17,7 @@ from decided import grade_until_decided, say_nothing
 from places import GRADE, ROOT, SHARED
 from process_table import running, students_of
 from sample_folders import expected, folder_of, golden
+from tiers import LONG, NIGHTLY
 from waiting import wait_for
 
 from grader.grading.app.request import GradeRequest
@@ -38,7 +39,7 @@ def run(*arguments: Path | int | str, **options: Any) -> subprocess.CompletedPro
     return subprocess.run([GRADE, *map(str, arguments)], check=False, capture_output=True, text=True, **options)
 
 
-#: Of the submissions of a kind that ask the same, all but each of so many are left to the nightly run.
+#: Of the submissions of a kind that ask the same, the first runs by default, and all but each of so many only nightly.
 EACH = 24
 
 
@@ -47,7 +48,8 @@ def live() -> Iterator[ParameterSet]:
     seen: Counter[tuple[str, ...]] = Counter()
     for folder, entry in expected().items():
         kind = (folder.partition("/")[0], *entry["graded"])
-        yield pytest.param(folder, marks=[pytest.mark.nightly] if seen[kind] % EACH else [])
+        default = not seen[kind] and kind[0] in ("correct", "wrong") and len(entry["graded"]) == 1
+        yield pytest.param(folder, marks=NIGHTLY if seen[kind] % EACH else () if default else LONG)
         seen[kind] += 1
 
 
@@ -94,6 +96,7 @@ def test_the_wall_clock_gives_the_same_verdict() -> None:
     assert lost == {}
 
 
+@pytest.mark.long
 def test_the_same_files_give_the_same_report() -> None:
     """Byte for byte, but for the duration; the seed follows from the files."""
     texts = []
@@ -104,6 +107,7 @@ def test_the_same_files_give_the_same_report() -> None:
     assert texts[0] == texts[1]
 
 
+@pytest.mark.long
 def test_another_seed_plays_another_part_of_the_recording() -> None:
     """What a student could hard-code is drawn."""
     seeds = [
@@ -115,6 +119,7 @@ def test_another_seed_plays_another_part_of_the_recording() -> None:
     assert evidence[0] != evidence[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("bag", ["neato_square", "turtlebot3_path/path.mcap", "standing_best_effort"])
 def test_recordings_of_other_robots_can_be_played(bag: str) -> None:
     """A correct subscriber is correct on anybody's odometry, whatever its pace and its QoS."""
@@ -157,6 +162,7 @@ def test_killing_the_grader_ends_what_it_started(tmp_path: Path) -> None:
     wait_for(lambda: not started & running())
 
 
+@pytest.mark.long
 def test_a_submission_is_never_written_to(tmp_path: Path) -> None:
     """Not even compiled files appear beside the student's."""
     submission = tmp_path / "ada"

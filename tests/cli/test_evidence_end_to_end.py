@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from places import ROOT
 from rosbags.highlevel import AnyReader
 from sample_folders import folder_of
+from tiers import more
 
 from grader.cli import main
 
@@ -32,7 +33,7 @@ def run(*words: str) -> int:
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("path", [ROOT / "reference_solutions", CRASHES], ids=["right", "crashes"])
+@pytest.mark.parametrize("path", [*more([ROOT / "reference_solutions"]), CRASHES], ids=["right", "crashes"])
 def test_every_format_is_the_same_byte_for_byte(tmp_path: Path, path: Any) -> None:
     """Grading keeps evidence; judging it again writes the same files with the same exit code."""
     graded, again, evidence = tmp_path / "graded", tmp_path / "again", tmp_path / "evidence"
@@ -45,6 +46,7 @@ def test_every_format_is_the_same_byte_for_byte(tmp_path: Path, path: Any) -> No
     assert not [p for p in recordings for text in machine if text.encode() in p.read_bytes()]
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_output_names_no_place_of_the_machine(tmp_path: Path) -> None:
     """A traceback that a program prints or logs is the same wherever it ran, also without a sandbox."""

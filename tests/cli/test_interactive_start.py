@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from tiers import each
 
 pytestmark = pytest.mark.slow
 
@@ -27,7 +28,9 @@ def told(*command: str) -> tuple[float, float]:
     return age, later
 
 
-@pytest.mark.parametrize("before", ["sleep 2 &&", "sleep 2;", "(sleep 2);", "sleep 2 & wait;", "sleep 1 | sleep 2;"])
+@pytest.mark.parametrize(
+    "before", each(["sleep 2 &&", "sleep 2;", "(sleep 2);", "sleep 2 & wait;", "sleep 1 | sleep 2;"], 5)
+)
 def test_what_a_shell_ran_before_is_not_counted(before: str) -> None:
     """The shell replaces itself by its last command, which keeps its process and the time of its start.
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from places import GRADE, ROOT
+from tiers import each
 
 pytestmark = pytest.mark.slow
 
@@ -52,7 +53,7 @@ def run(*arguments: str | Path, cwd: Path) -> tuple[int, str]:
     return done.returncode, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", each(KINDS, 2))
 @pytest.mark.parametrize("command", [(), (".",), ("--exercise", "1"), ("velocity_publisher.py",), ("observe", ".")])
 def test_a_file_to_grade(tmp_path: Path, kind: str, command: tuple[str, ...]) -> None:
     """By its folder, without a name, or named itself."""
@@ -63,7 +64,7 @@ def test_a_file_to_grade(tmp_path: Path, kind: str, command: tuple[str, ...]) ->
     assert "failed" not in said
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", each(KINDS, 4))
 def test_a_class(tmp_path: Path, kind: str) -> None:
     """Only the submission is refused."""
     folder = tmp_path / "class" / "ada"
@@ -76,7 +77,7 @@ def test_a_class(tmp_path: Path, kind: str) -> None:
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", each(KINDS, 4))
 def test_files_beside_a_program(tmp_path: Path, kind: str) -> None:
     """Every file that describes a package, and archives, markers and sources, left out with a note."""
     shutil.copy(ROOT / "reference_solutions" / "velocity_publisher.py", tmp_path)

@@ -83,6 +83,7 @@ def test_what_was_handed_in_is_graded_by_the_commit(environment: dict[str, str])
     assert (checkout / JOB["artifacts"]["reports"]["junit"]).exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["GRADER_REPOSITORY", "GRADER_COMMIT"])
 def test_what_was_not_filled_in_is_named(environment: dict[str, str], name: str) -> None:
     """Before anything is fetched."""

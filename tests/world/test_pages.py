@@ -4,6 +4,7 @@ import re
 
 import pytest
 from places import ROOT
+from tiers import each
 
 #: A block that begins with its file's name.
 _FILE = re.compile(r"^```python\n# (\w+\.py)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -12,7 +13,7 @@ PAGES = {"docs/tutorials/first-test.md": (1 + 2 + 5, 4), "docs/how-to/launch-tes
 pytestmark = pytest.mark.ros
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", each(PAGES, 2))
 def test_what_a_page_shows_works(pytester: pytest.Pytester, page: str) -> None:
     """Every test on it passes, with the nodes on it."""
     passed, files = PAGES[page]

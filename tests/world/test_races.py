@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from std_msgs.msg import String
+from tiers import each
 
 from grader.runtime.model.dataclass import dataclass
 from grader.world.opening import Worlds
@@ -192,7 +193,7 @@ def write(pytester: pytest.Pytester, programs: dict[str, str], test: str) -> Non
     pytester.makepyfile(test_it=f"{head}\n@pytest.mark.ros(seeds={SEEDS})\ndef test_it(ros):{test}")
 
 
-@pytest.mark.parametrize("race", RACES.values(), ids=RACES)
+@pytest.mark.parametrize("race", each(RACES.values(), 3), ids=RACES)
 def test_a_race_is_found_and_repeated(pytester: pytest.Pytester, race: Race) -> None:
     """Some seeds lose it and some do not; the failure names the seed, which gives the same again."""
     write(pytester, race.programs, race.test)

@@ -40,6 +40,7 @@ def test_the_tests_of_a_package_pass_without_a_build(workspace: Path, monkeypatc
     assert (suite.tests, suite.failures, suite.errors) == (3, 0, 0)
 
 
+@pytest.mark.long
 def test_tests_may_lie_at_the_top_of_a_workspace(workspace: Path) -> None:
     """A folder that is in no package sees the packages below it."""
     shutil.move(workspace / "src/robot/test/test_battery.py", workspace / "test_battery.py")
@@ -47,6 +48,7 @@ def test_tests_may_lie_at_the_top_of_a_workspace(workspace: Path) -> None:
     assert " 3 passed" in done.stdout, done.stdout + done.stderr
 
 
+@pytest.mark.long
 def test_a_mistake_in_a_definition_is_told_with_its_place(workspace: Path) -> None:
     """The import fails with file and line of the message that cannot be built."""
     (workspace / "src/robot_interfaces/msg/Battery.msg").write_text("float32 share\nflaot32 volts\n")
@@ -61,6 +63,7 @@ PAGE = ROOT / "docs/how-to/package-ci.md"
 _RUN = re.compile(r"^ +run: (.+)$", re.MULTILINE)
 
 
+@pytest.mark.long
 def test_the_workflow_of_the_page_tests_a_package(workspace: Path) -> None:
     """Its commands pass for a right package; for a wrong one they leave the files that the page names."""
     workflow = re.findall(r"^```yaml\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)[0]

@@ -195,6 +195,7 @@ def test_the_reference_scores_full_under_its_skeleton(tmp_path: Path) -> None:
     assert report["score"] == report["max_score"] >= 25
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_a_reference_that_fails_is_told(tmp_path: Path) -> None:
     """A rubric made of a traceback would ask for it."""
@@ -243,6 +244,7 @@ def test_inputs_are_told_apart_by_what_differs_between_them() -> None:
     ]
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_a_message_to_send_has_the_fields_of_its_type(tmp_path: Path) -> None:
     """The reference tells the type; a field that it has not is told like any mistake, and not as a failed run."""

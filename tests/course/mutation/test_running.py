@@ -90,6 +90,7 @@ def test_notes_are_no_rubrics() -> None:
     assert "name rubric.yaml" in said
 
 
+@pytest.mark.long
 @pytest.mark.ros
 @pytest.mark.parametrize(
     "rubric",

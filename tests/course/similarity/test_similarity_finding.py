@@ -12,6 +12,7 @@ import pytest
 from copies import FILE, handed
 from places import ROOT, TESTS
 from sample_folders import folder_of
+from tiers import each
 
 from grader.course.similarity.finding import (
     COMMON_LEAST,
@@ -211,7 +212,7 @@ HOSTILE = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", HOSTILE)
+@pytest.mark.parametrize("what", each(HOSTILE, 5))
 def test_whatever_is_handed_in_the_others_are_compared(what: str) -> None:
     """What two hand in makes no difference to others."""
     odd = [handed("odd", HOSTILE[what]), handed("odder", HOSTILE[what] + b"\n")]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from places import GRADE, ROOT, SHARED, TESTS
+from tiers import each, more
 
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.judging.summary import summarise
@@ -192,7 +193,7 @@ def test_a_traceback_begins_with_the_program(tmp_path: Path) -> None:
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("clock", ["virtual", "wall"])
+@pytest.mark.parametrize("clock", ["virtual", *more(["wall"])])
 def test_a_class_that_needs_arguments_is_not_started(tmp_path: Path, clock: str) -> None:
     """It is for other modules: `python3 FILE` does nothing, and nothing is the student's fault."""
     file = tmp_path / "relay.py"
@@ -226,8 +227,8 @@ LOGS = "import rclpy\n{}\ndef main():\n    rclpy.init()\n    rclpy.create_node('
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("above", ["src", "anything", "src/repository"])
-@pytest.mark.parametrize("target", ["two/two/speaker.py", "two/speaker", "two/launch/all.launch.py"])
+@pytest.mark.parametrize("above", each(["src/repository", "src", "anything"], 3))
+@pytest.mark.parametrize("target", each(["two/two/speaker.py", "two/speaker", "two/launch/all.launch.py"], 3))
 def test_the_packages_beside_one_are_there(tmp_path: Path, above: str, target: str) -> None:
     """As in a workspace that is built, whatever its folder is called and whatever is named."""
     a_package(tmp_path / above, "one", words="TEXT = 'from the other package'\n")
@@ -244,7 +245,7 @@ def test_the_packages_beside_one_are_there(tmp_path: Path, above: str, target: s
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("room", ["hall", "kitchen"])
+@pytest.mark.parametrize("room", ["kitchen", *more(["hall"])])
 def test_the_file_that_is_named_runs(tmp_path: Path, room: str) -> None:
     """A package may have two files of a name."""
     a_package(tmp_path, "rooms", hall__main=LOGS.format("", "'hall'"), kitchen__main=LOGS.format("", "'kitchen'"))
@@ -269,7 +270,7 @@ TARGETS = {
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize(("path", "processes", "nodes"), TARGETS.values(), ids=TARGETS)
+@pytest.mark.parametrize(("path", "processes", "nodes"), each(TARGETS.values(), 3), ids=TARGETS)
 def test_packages_are_observed(path: Path, processes: tuple[str, ...], nodes: tuple[str, ...]) -> None:
     """Every layout that is graded, and the text says what ran."""
     summary = observe(ObserveRequest((path,), 2 * NS_PER_S, clock="virtual"), lambda _: None)
@@ -352,7 +353,7 @@ def test_a_fault_has_the_hint_of_the_report(tmp_path: Path, clock: str) -> None:
 
 @pytest.mark.ros
 @CLOCKS
-@pytest.mark.parametrize(("package", "hint"), LACKING.items())
+@pytest.mark.parametrize(("package", "hint"), each(LACKING.items(), 2))
 def test_a_package_that_is_not_installed_is_no_mistake(tmp_path: Path, clock: str, package: str, hint: str) -> None:
     """Of those that ROS has, and of interfaces."""
     assert seen(tmp_path, clock, node=f"import rclpy\nimport {package}\n").hints == (hint,)
@@ -360,7 +361,7 @@ def test_a_package_that_is_not_installed_is_no_mistake(tmp_path: Path, clock: st
 
 @pytest.mark.ros
 @CLOCKS
-@pytest.mark.parametrize("given", ["domain_id=7", "args=None"])
+@pytest.mark.parametrize("given", ["domain_id=7", *more(["args=None"])])
 def test_a_node_in_another_domain_is_told(tmp_path: Path, clock: str, given: str) -> None:
     """Instead of nothing at all."""
     before = "import os\nos.environ['ROS_DOMAIN_ID'] = '7'\n" if "domain" not in given else ""
@@ -400,7 +401,7 @@ OUTSIDE = {
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize(("statement", "said"), OUTSIDE.items())
+@pytest.mark.parametrize(("statement", "said"), each(OUTSIDE.items(), 4))
 def test_the_note_on_the_wall_clock_names_the_line(tmp_path: Path, statement: str, said: str) -> None:
     """And what stands there."""
     text = (

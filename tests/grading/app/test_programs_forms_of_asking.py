@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
+from _pytest.mark import ParameterSet
 from decided import grade_until_decided
 from places import SHARED
+from tiers import LONG, NIGHTLY, each, more
 
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.app.programs import find_targets, stage
@@ -281,9 +283,16 @@ FORMS: dict[str, Callable[[Path, Path, tuple[str, ...]], Found]] = {
 }
 
 
+def form_and_shape() -> Iterator[ParameterSet]:
+    """Yield every pair: each form and each workspace in at least one that is long, and two by default."""
+    for across, form in enumerate(FORMS):
+        for down, shape in enumerate(SHAPES):
+            kept = () if down % len(FORMS) == 1 else LONG
+            yield pytest.param(form, shape, marks=NIGHTLY if (across - down) % len(FORMS) else kept)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(("form", "shape"), list(form_and_shape()))
 def test_every_form_finds_the_same_programs(tmp_path: Path, form: str, shape: str) -> None:
     """The programs of a workspace do not depend on how one asks for them."""
     files, programs = SHAPES[shape]
@@ -302,7 +311,7 @@ def test_every_form_finds_the_same_programs(tmp_path: Path, form: str, shape: st
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", each(SHAPES, 8))
 def test_files_that_are_named_together_are_the_ones_that_run(tmp_path: Path, shape: str) -> None:
     """Each with the packages beside it, also where several have one name."""
     files, programs = SHAPES[shape]
@@ -419,7 +428,7 @@ def generate_launch_description():
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("process", ["talk/talker.py", "*/talker.py", "talk.launch.py", "talker.py"])
+@pytest.mark.parametrize("process", each(["*/talker.py", "talk/talker.py", "talk.launch.py", "talker.py"], 4))
 def test_programs_of_cmake_packages_are_graded(tmp_path: Path, process: str) -> None:
     """By every name that a rubric may give them."""
     files = {**SHAPES["CMake with a Python package"][0], "src/talk/launch/talk.launch.py": LAUNCH}
@@ -431,9 +440,9 @@ def test_programs_of_cmake_packages_are_graded(tmp_path: Path, process: str) -> 
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("clock", ["virtual", "wall"])
+@pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 @pytest.mark.parametrize(
-    "shape", ["CMake and entry points", "CMake with a Python package", "CMake with console scripts"]
+    "shape", each(["CMake with a Python package", "CMake and entry points", "CMake with console scripts"], 3)
 )
 def test_programs_of_cmake_packages_run(tmp_path: Path, shape: str, clock: str) -> None:
     """As `ros2 run` starts them: a program that is installed as it is, as a script."""

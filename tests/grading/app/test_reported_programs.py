@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from decided import grade_until_decided
 from places import GRADE, ROOT, SHARED
+from tiers import each, more
 
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.app.request import GradeRequest
@@ -56,8 +57,8 @@ def case(name: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("clock", ["auto", pytest.param("wall", marks=pytest.mark.long)])
-@pytest.mark.parametrize("name", HINTS)
+@pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
+@pytest.mark.parametrize("name", each(HINTS, 2))
 def test_the_hint_names_the_cause(name: str, clock: str, tmp_path: Path) -> None:
     """With the line of the file."""
     wanted, code, hint = HINTS[name]
@@ -70,6 +71,7 @@ def test_the_hint_names_the_cause(name: str, clock: str, tmp_path: Path) -> None
     assert code in (tmp_path / wanted).read_text().splitlines()[first.location.line - 1]
 
 
+@pytest.mark.long
 def test_one_processor_is_as_good_as_several(tmp_path: Path) -> None:
     """A client that calls a service in a callback, with threads of an executor of its own: the whole report."""
     shutil.copy(case("one_cpu/battery_service_client.py"), tmp_path)
@@ -87,7 +89,7 @@ def test_one_processor_is_as_good_as_several(tmp_path: Path) -> None:
     assert (reports[0]["score"], reports[0]["max_score"]) == (40, 40)
 
 
-@pytest.mark.parametrize("clock", ["auto", "wall"])
+@pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 def test_a_service_in_a_timer_is_answered(clock: str) -> None:
     """Once a second, by other threads of the same executor."""
     summary = observe(ObserveRequest((case("one_cpu/service_in_timer.py"),), 6 * NS_PER_S, clock=clock), lambda _: None)
@@ -97,7 +99,7 @@ def test_a_service_in_a_timer_is_answered(clock: str) -> None:
     assert clock == "wall" or len(texts) == 5
 
 
-@pytest.mark.parametrize("clock", ["auto", "wall"])
+@pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 def test_there_is_a_user(clock: str) -> None:
     """By the variable, and by the user of the process."""
     summary = observe(ObserveRequest((case("user_name.py"),), 5 * NS_PER_S, clock=clock), lambda _: None)
@@ -105,7 +107,8 @@ def test_there_is_a_user(clock: str) -> None:
     assert [fault.exit_code for fault in summary.faults] == [0]
 
 
-@pytest.mark.parametrize("clock", ["auto", "wall"])
+@pytest.mark.long
+@pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 def test_an_executor_that_virtual_time_cannot_hold_runs_on_the_wall_clock(clock: str) -> None:
     """At once, with the line that makes it as the reason."""
     summary = observe(ObserveRequest((case("events_executor.py"),), 3 * NS_PER_S, clock=clock), lambda _: None)

@@ -20,6 +20,7 @@ def logged(key: SeedKey) -> str:
     return next(v.outcome.value for v in report.exercises[0].verdicts if v.id == "logs_fan_speed")
 
 
+@pytest.mark.long
 def test_who_knows_the_key_knows_the_questions() -> None:
     """So a run with the practice key is nobody's mark; and the program below is able to do what it tries."""
     assert logged(PRACTICE) == "met"

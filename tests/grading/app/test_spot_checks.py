@@ -336,6 +336,7 @@ def told_of(tmp_path: Path, seed: int) -> tuple[int, int, str]:
     return int(date), int(uptime), order
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_the_date_and_the_hashes_follow_from_the_seed(tmp_path: Path) -> None:
     """So no program knows them, and the same file gets the same report on every day."""
@@ -354,6 +355,7 @@ def test_the_order_of_a_set_in_a_fork_helps_nobody(tmp_path: Path) -> None:
     assert graded(tmp_path, HERE / "order_of_a_set.py", clock="virtual").score <= 20
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_a_module_that_nobody_read_is_a_reason_for_a_check(tmp_path: Path) -> None:
     """One that the program writes; one of its own files is not."""

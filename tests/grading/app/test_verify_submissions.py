@@ -41,6 +41,7 @@ def cases() -> list[Any]:
     ]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("names", "condition"), cases())
 def test_submissions_repeat(names: list[str], condition: str) -> None:
     """Those that are recorded in virtual time."""
@@ -55,6 +56,7 @@ def test_submissions_repeat(names: list[str], condition: str) -> None:
     assert tried["compared"] > 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "options",
     [

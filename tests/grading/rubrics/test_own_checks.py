@@ -274,6 +274,7 @@ def test_the_examples_on_the_page_about_own_checks_work() -> None:
     assert (found.location, found.credit) == (Location("planner.py", 2), Fraction(1, 2))
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_real_nodes_are_judged_by_it(tmp_path: Path) -> None:
     """By grade, by the processes of a class, and again from evidence, whose judgement notices a changed check."""

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from places import ROOT
 from sandboxes import USER, find_sandbox, opened_start, unreachable
+from tiers import tiers
 
 import grader
 from grader.runtime.model.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Property, TierReport, missing
@@ -172,7 +173,7 @@ def test_without_bubblewrap_auto_names_the_command_that_installs_it(
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("name", ["bubblewrap-root", "bubblewrap", "bubblewrap-flat", "landlock"])
+@pytest.mark.parametrize("name", tiers("bubblewrap-root", "bubblewrap", "bubblewrap-flat", "landlock"))
 def test_the_self_test_passes_where_a_tier_holds(ros: RosInstallation, tmp_path: Path, name: str) -> None:
     """Everything that is required, but perhaps the network under Landlock; and a message makes the round."""
     found = find_sandbox(name, ros, tmp_path)
@@ -441,7 +442,7 @@ def graded(start: tuple[str, ...], tmp_path: Path, *options: str) -> subprocess.
 
 @pytest.mark.ros
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n == "landlock" else pytest.mark.nightly) for n in ISOLATING]
+    "name", [pytest.param(n, marks=pytest.mark.long if n == "landlock" else pytest.mark.nightly) for n in ISOLATING]
 )
 def test_right_solutions_score_full_under_every_tier(ros: RosInstallation, tmp_path: Path, name: str) -> None:
     """In virtual time, with the same verdicts; the report names the tier and what it contains."""

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from places import GRADE, ROOT
 from sandboxes import USER, unreachable, user_start
+from tiers import more
 
 from grader.runtime.ros_installation import find_ros
 from grader.runtime.sandbox.bubblewrap import USER_NAME
@@ -65,6 +66,7 @@ def test_the_page_lists_what_the_program_prints(usual: dict[str, str]) -> None:
     assert usual.keys() == documented()
 
 
+@pytest.mark.long
 def test_on_one_processor_from_an_odd_shell(program: Path, usual: dict[str, str], open_folder: Path) -> None:
     """Affinity, priority, umask, limits, signals, time zone, locale, folders and variables are the caller's."""
     before = ("taskset", "-c", "0", "bash", "-c", ODD_SHELL, "bash")
@@ -73,12 +75,13 @@ def test_on_one_processor_from_an_odd_shell(program: Path, usual: dict[str, str]
     assert rows(program, before=before, **variables) == usual
 
 
-@pytest.mark.parametrize("tier", [FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME])
+@pytest.mark.parametrize("tier", more([FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME]))
 def test_in_another_tier(program: Path, usual: dict[str, str], tier: str) -> None:
     """The tiers without a view of files of their own answer alike."""
     assert rows(program, "--isolation", tier) == usual
 
 
+@pytest.mark.long
 def test_for_another_user(program: Path, usual: dict[str, str], open_folder: Path) -> None:
     """An ordinary user, whose sandbox has a user namespace, sees what root sees."""
     if os.geteuid() != 0:

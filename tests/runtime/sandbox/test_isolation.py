@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 from sandboxes import DOMAIN, HOST, Sandbox, close, finish, said, sandbox_or_skip, start
+from tiers import tiers
 
 import grader
 from grader.runtime.model.errors import HarnessError
@@ -32,7 +33,7 @@ MIB = 1 << 20
 SEEN_AT = Path("/grader_host/host")
 
 
-@pytest.fixture(params=["bubblewrap-root", "bubblewrap"])
+@pytest.fixture(params=tiers("bubblewrap-root", "bubblewrap"))
 def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
     return sandbox_or_skip(request.param, ros, submission)
 
@@ -43,7 +44,7 @@ def plain(ros: RosInstallation, submission: Path) -> Sandbox:
 
 
 @pytest.fixture(
-    params=[
+    params=tiers(
         "bubblewrap-root",
         "bubblewrap",
         "bubblewrap-flat",
@@ -51,7 +52,7 @@ def plain(ros: RosInstallation, submission: Path) -> Sandbox:
         "landlock",
         "landlock-user",
         "none",
-    ]
+    )
 )
 def any_tier(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
     return sandbox_or_skip(request.param, ros, submission)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from sandboxes import close, find_sandbox, start
+from tiers import tiers
 
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import find_ros
@@ -22,7 +23,7 @@ time.sleep(60)
 
 
 @pytest.mark.parametrize("folder", ["/tmp", "/tmp/work", "/dev/shm"])
-@pytest.mark.parametrize("tier", ["bubblewrap-root", "bubblewrap"])
+@pytest.mark.parametrize("tier", tiers("bubblewrap-root", "bubblewrap"))
 def test_names_are_counted_wherever_a_student_may_make_them(tier: str, folder: str, submission: Path) -> None:
     """From outside, in the file systems that the student's processes see."""
     try:

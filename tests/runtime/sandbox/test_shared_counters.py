@@ -6,6 +6,7 @@ import textwrap
 
 import pytest
 from sandboxes import Sandbox, said, sandbox_or_skip
+from tiers import tiers
 
 from grader.runtime.model.limits import Limits
 from grader.runtime.ros_installation import RosInstallation
@@ -17,7 +18,7 @@ TIERS = ("bubblewrap-root", "bubblewrap", "bubblewrap-flat", "bubblewrap-flat-us
 MIB = 1 << 20
 
 
-@pytest.fixture(params=TIERS)
+@pytest.fixture(params=tiers(*TIERS))
 def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: object) -> Sandbox:
     return sandbox_or_skip(request.param, ros, submission)  # type: ignore[arg-type]
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from hostile import hostile, record
 from sandboxes import DOMAIN, Sandbox, finish, said, sandbox_or_skip
+from tiers import tiers
 
 from grader.runtime.model.limits import Limits
 from grader.runtime.recording.codec import to_json
@@ -127,7 +128,7 @@ BESIDE = {"f": 2, "g": 7}
 TIERS = ("bubblewrap-root", "bubblewrap", "bubblewrap-flat", "bubblewrap-flat-user", "landlock", "landlock-user")
 
 
-@pytest.fixture(params=TIERS)
+@pytest.fixture(params=tiers(*TIERS))
 def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
     return sandbox_or_skip(request.param, ros, submission)
 

@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 from hostile import hostile, printed, record, staging
 from sandboxes import DOMAIN, Sandbox, finish, said, sandbox_or_skip
+from tiers import more, tiers
 
 from grader.runtime.host.originals import wait_until
 from grader.runtime.model.errors import EnvironmentFault
@@ -117,7 +118,7 @@ TIERS = (
 OWN_FOLDER = re.compile(r"grade-student-[0-9a-f]+")
 
 
-@pytest.fixture(params=TIERS)
+@pytest.fixture(params=tiers(*TIERS))
 def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
     return sandbox_or_skip(request.param, ros, submission)
 
@@ -176,7 +177,7 @@ def test_a_forked_process_is_in_the_sandbox_of_an_executed_one(sandbox: Sandbox)
     assert found == expected
 
 
-@pytest.mark.parametrize("clock", ["virtual", "wall"])
+@pytest.mark.parametrize("clock", ["virtual", *more(["wall"])])
 def test_a_node_has_the_same_surroundings_in_both_ways(session: RecordingSession, tmp_path: Path, clock: str) -> None:
     """A node that is forked and one that is executed, each with the host in its process.
 
@@ -200,7 +201,7 @@ def test_a_node_has_the_same_surroundings_in_both_ways(session: RecordingSession
     assert found == expected
 
 
-@pytest.mark.parametrize("tier", ["bubblewrap-flat", "landlock"])
+@pytest.mark.parametrize("tier", tiers("bubblewrap-flat", "landlock", usual="landlock"))
 def test_a_folder_of_a_forked_process_has_a_size_and_ends_with_it(tier: str, tmp_path: Path) -> None:
     """In tiers without namespaces another fork sees to both, in real time, whatever the host makes of the clock."""
     tmp_path.chmod(0o755)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from sandboxes import HOST, Sandbox, close, find_sandbox, said, sandbox_or_skip, start, user_start
+from tiers import more, tiers
 
 import grader
 from grader.runtime.model.errors import HarnessError
@@ -29,12 +30,12 @@ MIB = 1 << 20
 PACKAGE = Path(grader.__file__).resolve().parent
 
 
-@pytest.fixture(params=["executed", "forked"])
+@pytest.fixture(params=[*more(["executed"]), "forked"])
 def way(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-@pytest.fixture(params=["bubblewrap-flat", "bubblewrap-flat-user", "landlock", "landlock-user"])
+@pytest.fixture(params=tiers("bubblewrap-flat", "bubblewrap-flat-user", "landlock", "landlock-user", usual="landlock"))
 def sandbox(request: pytest.FixtureRequest, way: str, ros: RosInstallation, submission: Path) -> Sandbox:
     return replace(sandbox_or_skip(request.param, ros, submission), forks=way == "forked")
 
