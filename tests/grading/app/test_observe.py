@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from places import GRADE, ROOT, SHARED, TESTS
+from places import GRADE, REPORTED, ROOT, TESTS
 from tiers import each, more
 
 from grader.grading.app.observe import ObserveRequest, observe
@@ -435,14 +435,10 @@ def test_output_that_only_looks_like_a_traceback_stays() -> None:
     ]
 
 
-CASES = SHARED / "cases" / "fidelity"
-
-
 @pytest.mark.ros
-@pytest.mark.skipif(not CASES.is_dir(), reason="the programs of others are not here")
 @CLOCKS
 def test_services_of_others_are_in_the_graph(clock: str) -> None:
     """Also of programs without a topic."""
-    files = (CASES / "graph_server.py", CASES / "graph_asks.py")
+    files = (REPORTED / "graph_server.py", REPORTED / "graph_asks.py")
     text = render_summary(observe(ObserveRequest(files, 2 * NS_PER_S, clock=clock), lambda _: None))
     assert "Graph:\n  /asks ┄┄/ask┄┄▶ /server\n" in text

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from _pytest.mark import ParameterSet
 from decided import grade_until_decided
-from places import SHARED
+from places import REPORTED
 from tiers import LONG, NIGHTLY, each, more
 
 from grader.grading.app.observe import ObserveRequest, observe
@@ -22,7 +22,6 @@ from grader.runtime.model.limits import MAX_DEPTH
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.programs.executables import find_executable
 
-FIDELITY = SHARED / "cases" / "fidelity"
 NODE = """#!/usr/bin/env python3
 import rclpy
 
@@ -471,14 +470,13 @@ CASES = {
 }
 
 
-@pytest.mark.skipif(not FIDELITY.is_dir(), reason="the programs of others are not here")
 @pytest.mark.parametrize("case", CASES)
 def test_workspaces_of_others(tmp_path: Path, case: str) -> None:
     """All programs are found, and the same from a copy without links."""
-    found = find_targets((FIDELITY / case,))
+    found = find_targets((REPORTED / case,))
     assert tuple(target.name for target in found.targets) == CASES[case]
     copy = tmp_path / "copy"
-    shutil.copytree(FIDELITY / case, copy)
+    shutil.copytree(REPORTED / case, copy)
     projects, _ = read_projects(copy)
     for program in CASES[case]:
         package, _, name = program.partition("/")

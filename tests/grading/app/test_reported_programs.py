@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from decided import grade_until_decided
-from places import GRADE, ROOT, SHARED
+from places import GRADE, REPORTED, ROOT
 from tiers import each, more
 
 from grader.grading.app.observe import ObserveRequest, observe
@@ -21,7 +21,6 @@ from grader.runtime.model.trace import ClockKind
 
 pytestmark = pytest.mark.ros
 
-CASES = SHARED / "cases" / "fidelity"
 #: Program -> the name under which it is handed in, and the line and hint of what is to be fixed first.
 HINTS = {
     "stale_odometry.py": (
@@ -50,19 +49,12 @@ HINTS = {
 }
 
 
-def case(name: str) -> Path:
-    path = CASES / name
-    if not path.exists():
-        pytest.skip("the programs beside the repository are not here")
-    return path
-
-
 @pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 @pytest.mark.parametrize("name", each(HINTS, 2))
 def test_the_hint_names_the_cause(name: str, clock: str, tmp_path: Path) -> None:
     """With the line of the file."""
     wanted, code, hint = HINTS[name]
-    shutil.copy(case(name), tmp_path / wanted)
+    shutil.copy(REPORTED / name, tmp_path / wanted)
     report = grade_until_decided(GradeRequest(str(tmp_path), clock=clock))
     lost = [v for e in report.exercises for v in e.verdicts if v.outcome is Outcome.NOT_MET and v.location is not None]
     assert hint in [v.hint for v in lost]
@@ -74,7 +66,7 @@ def test_the_hint_names_the_cause(name: str, clock: str, tmp_path: Path) -> None
 @pytest.mark.long
 def test_one_processor_is_as_good_as_several(tmp_path: Path) -> None:
     """A client that calls a service in a callback, with threads of an executor of its own: the whole report."""
-    shutil.copy(case("one_cpu/battery_service_client.py"), tmp_path)
+    shutil.copy(REPORTED / "one_cpu/battery_service_client.py", tmp_path)
     shutil.copy(ROOT / "reference_solutions" / "battery_service_server.py", tmp_path)
     reports = []
     for few in (False, True):
@@ -92,7 +84,9 @@ def test_one_processor_is_as_good_as_several(tmp_path: Path) -> None:
 @pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 def test_a_service_in_a_timer_is_answered(clock: str) -> None:
     """Once a second, by other threads of the same executor."""
-    summary = observe(ObserveRequest((case("one_cpu/service_in_timer.py"),), 6 * NS_PER_S, clock=clock), lambda _: None)
+    summary = observe(
+        ObserveRequest((REPORTED / "one_cpu/service_in_timer.py",), 6 * NS_PER_S, clock=clock), lambda _: None
+    )
     texts = [record.text for record in summary.records]
     assert set(texts) == {"answer True"}
     assert len(texts) >= 3
@@ -102,7 +96,7 @@ def test_a_service_in_a_timer_is_answered(clock: str) -> None:
 @pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 def test_there_is_a_user(clock: str) -> None:
     """By the variable, and by the user of the process."""
-    summary = observe(ObserveRequest((case("user_name.py"),), 5 * NS_PER_S, clock=clock), lambda _: None)
+    summary = observe(ObserveRequest((REPORTED / "user_name.py",), 5 * NS_PER_S, clock=clock), lambda _: None)
     assert [line.text for line in summary.lines] == ["student student"]
     assert [fault.exit_code for fault in summary.faults] == [0]
 
@@ -111,7 +105,7 @@ def test_there_is_a_user(clock: str) -> None:
 @pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 def test_an_executor_that_virtual_time_cannot_hold_runs_on_the_wall_clock(clock: str) -> None:
     """At once, with the line that makes it as the reason."""
-    summary = observe(ObserveRequest((case("events_executor.py"),), 3 * NS_PER_S, clock=clock), lambda _: None)
+    summary = observe(ObserveRequest((REPORTED / "events_executor.py",), 3 * NS_PER_S, clock=clock), lambda _: None)
     assert summary.clock is ClockKind.WALL
     assert clock == "wall" or "events_executor.py:22 makes an EventsExecutor" in summary.clock_reason
     assert summary.nodes == ("/counter",)

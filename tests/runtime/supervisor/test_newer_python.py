@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from decided import grade_until_decided
-from places import SHARED
+from places import REPORTED
 
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.app.request import GradeRequest
@@ -36,7 +36,6 @@ from grader.runtime.supervisor.newer_python import (
 from grader.runtime.supervisor.newer_syntax import needed
 
 HERE = sys.version_info[:2]
-CASES = SHARED / "cases" / "fidelity"
 JAZZY = RELEASES["jazzy"].python or (0, 0)
 older = pytest.mark.skipif(JAZZY <= HERE, reason="the Python of Jazzy or a newer one runs here")
 
@@ -395,7 +394,5 @@ def test_a_mistake_beside_it_costs_the_points(tmp_path: Path) -> None:
 @pytest.mark.parametrize("clock", ["virtual", "wall"])
 def test_observe_says_it_too(clock: str) -> None:
     """As a note beside the fault."""
-    if not CASES.is_dir():
-        pytest.skip("the cases beside the repository are not here")
-    summary = observe(ObserveRequest((CASES / "pep701.py",), NS_PER_S, clock=clock), lambda _: None)
+    summary = observe(ObserveRequest((REPORTED / "pep701.py",), NS_PER_S, clock=clock), lambda _: None)
     assert any("ROS 2 jazzy runs on Python 3.12" in note for note in summary.notes), summary.notes

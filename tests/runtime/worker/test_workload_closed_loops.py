@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from places import SHARED
+from places import REPORTED
 
 from grader.runtime.model.trace import Trace
 from grader.runtime.session import RecordingSession
@@ -16,7 +16,6 @@ from grader.runtime.model.quantities import NS_PER_S
 
 pytestmark = pytest.mark.ros
 
-CASES = SHARED / "cases" / "fidelity"
 BEFORE = """
 import rclpy
 from rclpy.node import Node
@@ -61,10 +60,9 @@ def test_nodes_that_answer_each_other_without_a_rest_are_ended(session: Recordin
 
 
 @pytest.mark.nightly
-@pytest.mark.skipif(not CASES.exists(), reason="the shared cases are not beside this folder")
 def test_a_robot_and_its_controller_go_on(session: RecordingSession, tmp_path: Path) -> None:
     """The controller answers each odometry of a robot that is simulated at 50 Hz."""
-    both = [(CASES / "hops_loop" / name).read_text(encoding="utf-8") for name in ("robot.py", "controller.py")]
+    both = [(REPORTED / "hops_loop" / name).read_text(encoding="utf-8") for name in ("robot.py", "controller.py")]
     trace = record(session, tmp_path / "s", *both, duration_ns=90 * NS_PER_S)
     assert limits(trace) == []
     assert min(len(trace.messages(topic)) for topic in {m.topic for m in trace.messages()}) > 4_000
