@@ -12,11 +12,12 @@ from urllib.parse import unquote, urlparse
 
 import made_class
 import pytest
+from tiers import NIGHTLY, more
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("browser")]
 
 COUNT = 300
 
@@ -131,6 +132,7 @@ def test_the_table_sorts_by_score_and_by_name(page: Page) -> None:
     assert finals(page) == down
 
 
+@pytest.mark.long
 def test_students_stand_before_causes_and_most_causes_are_folded(page: Page) -> None:
     """Eight causes are open to see; a folded one is numbered on and shows its students, too."""
     ids = page.evaluate("[...document.querySelectorAll('main > section')].map((s) => s.id)")
@@ -146,6 +148,7 @@ def test_students_stand_before_causes_and_most_causes_are_folded(page: Page) -> 
     page.locator(".more-causes > summary").click()
 
 
+@pytest.mark.long
 def test_searching_finds_whom_one_means(page: Page) -> None:
     """Every word counts, accents and capitals do not; an empty search shows everybody."""
     page.fill("#search", "elodie ABE")
@@ -158,6 +161,7 @@ def test_searching_finds_whom_one_means(page: Page) -> None:
     assert shown(page) == COUNT
 
 
+@pytest.mark.long
 def test_filters_narrow_the_table_down(page: Page) -> None:
     """By a criterion that was not met, by outcome, by status, by score."""
     cell = page.locator("button[data-criterion='odom_subscriber/log_period'][data-outcome=not_met]")
@@ -177,6 +181,7 @@ def test_filters_narrow_the_table_down(page: Page) -> None:
     assert all(60 <= score <= 80 for score in finals(page))
 
 
+@pytest.mark.long
 def test_a_number_and_a_cause_show_their_students(page: Page) -> None:
     """The table shows just as many, and the keyboard is there."""
     cell = page.locator("button[data-criterion='velocity_publisher/rate'][data-outcome=blocked]")
@@ -190,6 +195,7 @@ def test_a_number_and_a_cause_show_their_students(page: Page) -> None:
     assert page.evaluate("document.activeElement.id") == "shown"
 
 
+@pytest.mark.long
 def test_a_bar_shows_its_students_to_the_keyboard(page: Page) -> None:
     """Arrows walk over the bars and are told, Enter filters."""
     page.locator("[data-figure=scores] .drawing").focus()
@@ -200,6 +206,7 @@ def test_a_bar_shows_its_students_to_the_keyboard(page: Page) -> None:
     assert all(80 <= score < 90 for score in finals(page))
 
 
+@pytest.mark.long
 def test_every_link_leads_to_a_file_of_the_class(page: Page, results: Path) -> None:
     """Also those of students with odd names; one is followed."""
     rows(page)
@@ -214,6 +221,7 @@ def test_every_link_leads_to_a_file_of_the_class(page: Page, results: Path) -> N
     other.close()
 
 
+@pytest.mark.long
 def test_pages_of_students_follow_each_other_as_the_table_does(page: Page) -> None:
     """From the first page to the last, names and all; then back to the class."""
     rows(page)
@@ -254,6 +262,7 @@ def test_hostile_names_stay_text(visit: Visit, page: Page) -> None:
     assert not [url for url in visit.asked if "owned" in url]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("most", [833, 98765])
 def test_the_numbers_of_a_large_class_fit_into_the_chart(browser: Browser, results: Path, most: int) -> None:
     """Those beside its axis as well."""
@@ -273,7 +282,7 @@ def test_the_numbers_of_a_large_class_fit_into_the_chart(browser: Browser, resul
     assert min(box["x"] for box in boxes) >= outer["x"]
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", *more(["dark"])])
 def test_nothing_sticks_out_on_a_phone(browser: Browser, results: Path, scheme: str) -> None:
     """The page scrolls downwards only, and so does the table of students: the final score is first in each row."""
     size = {"width": 390, "height": 800}
@@ -293,6 +302,7 @@ def test_nothing_sticks_out_on_a_phone(browser: Browser, results: Path, scheme: 
     assert phone.said == []
 
 
+@pytest.mark.long
 def test_a_print_has_everybody(page: Page) -> None:
     """Rows that the screen shows later are on paper."""
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
@@ -301,6 +311,7 @@ def test_a_print_has_everybody(page: Page) -> None:
     assert page.locator("#table tbody tr").count() < COUNT
 
 
+@pytest.mark.long
 def test_headings_and_controls_have_names(page: Page) -> None:
     """One h1, no level left out, every control named."""
     levels = page.evaluate("[...document.querySelectorAll('h1, h2, h3')].map((h) => Number(h.tagName[1]))")
@@ -314,6 +325,7 @@ def test_headings_and_controls_have_names(page: Page) -> None:
     assert unnamed == 0
 
 
+@pytest.mark.long
 def test_without_scripts_everybody_is_there(browser: Browser, results: Path) -> None:
     """The table, the causes and the lists need none."""
     context = browser.new_context(java_script_enabled=False)
@@ -325,8 +337,8 @@ def test_without_scripts_everybody_is_there(browser: Browser, results: Path) -> 
     assert "need JavaScript" in text
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("scheme", ["light", *more(["dark"], NIGHTLY)])
+@pytest.mark.parametrize("width", [*more([1280]), 390])
 def test_axe_finds_nothing(browser: Browser, results: Path, scheme: str, width: int) -> None:
     """On the page of the class with everything unfolded, and on the page of a student with links to others."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install -e '.[dev]'")

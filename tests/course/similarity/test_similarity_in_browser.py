@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import copies
 import pytest
 from class_samples import FakeScheduler, course, grade, hand_in
+from tiers import more
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("browser")]
 
 TEXT = "import rclpy\n\n\nclass Pub:\n" + "".join(
     f"    def step_{k}(self, a, b):\n        self.x_{k} = [a * {k}, b % {k + 2}]\n        return self.x_{k}[a > {k}]\n"
@@ -32,7 +33,7 @@ def results(tmp_path: Path) -> Path:
     return tmp_path / "out"
 
 
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("width", [1280, *more([390])])
 def test_two_submissions_side_by_side(browser: Browser, results: Path, width: int) -> None:
     """From the class to the pair by links; side by side where there is room; nothing runs, nothing is loaded."""
     context = browser.new_context(viewport={"width": width, "height": 900})

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from report_samples import criterion, exercise, report
+from tiers import more
 
 from grader.grading.model.chart import Chart, Level, Panel, Series, Tone, VerticalLine
 from grader.grading.model.exercise import Outcome
@@ -17,7 +18,7 @@ from grader.grading.reporting.html.render import render_html
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("browser")]
 
 #: Left, top, right, bottom.
 Box = Sequence[float]
@@ -53,7 +54,7 @@ def overlap(one: Box, other: Box) -> bool:
     return across > 1 and down > 1
 
 
-@pytest.mark.parametrize("width", [390, 1100])
+@pytest.mark.parametrize("width", [390, *more([1100])])
 def test_labels_lie_apart(browser: Browser, tmp_path: Path, width: int) -> None:
     """Every label that is shown can be read; where there is no room for all, faults come first."""
     file = tmp_path / "report.html"

@@ -12,6 +12,7 @@ from urllib.parse import quote
 
 import graded
 import pytest
+from tiers import NIGHTLY, each, more
 
 from grader.grading.model.chart import Playback
 from grader.grading.reporting.html.assets import bundle
@@ -20,7 +21,7 @@ from grader.grading.reporting.html.render import render_html
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Locator, Page
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("browser")]
 
 MADE = {"perfect": graded.perfect, "wrong": graded.wrong, "crashed": graded.crashed}
 ATTACKS = (
@@ -78,7 +79,7 @@ def drawings(page: Page) -> list[tuple[str, bool]]:
     return found
 
 
-@pytest.mark.parametrize(("name", "scheme"), [("perfect", "light"), ("wrong", "dark"), ("crashed", "light")])
+@pytest.mark.parametrize(("name", "scheme"), each([("wrong", "dark"), ("perfect", "light"), ("crashed", "light")], 3))
 def test_every_figure_is_drawn_without_a_complaint_or_a_request(visit: Open, name: str, scheme: str) -> None:
     """The console is silent, and the page itself is all that was ever asked for."""
     page, said, asked = visit(render_html(MADE[name]()), color_scheme=scheme)
@@ -90,6 +91,7 @@ def test_every_figure_is_drawn_without_a_complaint_or_a_request(visit: Open, nam
     assert [url for url in asked if not url.endswith("/report.html")] == []
 
 
+@pytest.mark.long
 def test_shared_files_beside_the_report_draw_the_same(visit: Open, tmp_path: Path) -> None:
     """A class keeps one copy of the scripts."""
     (tmp_path / "assets").mkdir()
@@ -102,7 +104,7 @@ def test_shared_files_beside_the_report_draw_the_same(visit: Open, tmp_path: Pat
     assert {url.rsplit("/", 1)[1] for url in asked} == {"report.html", *bundle().files}
 
 
-@pytest.mark.parametrize("text", ATTACKS)
+@pytest.mark.parametrize("text", each(ATTACKS, len(ATTACKS)))
 def test_hostile_text_stays_text_wherever_it_is_shown(visit: Open, text: str) -> None:
     """In the page, in tooltips, in tables, in the legend and inside the charts."""
     page, said, asked = visit(render_html(graded.crashed(text)))
@@ -136,6 +138,7 @@ def test_a_pointer_over_a_chart_is_told_the_value(visit: Open) -> None:
     assert said == []
 
 
+@pytest.mark.long
 def test_a_pointer_over_answers_is_told_what_was_expected(visit: Open) -> None:
     """What was said long ago and still holds is in the tooltip as well."""
     page, _, _ = visit(render_html(graded.perfect()))
@@ -149,6 +152,7 @@ def test_a_pointer_over_answers_is_told_what_was_expected(visit: Open) -> None:
     assert {part.split(" ")[1] for part in said.split(";")} == {"0.7", "/temperature", "expected", "/fan_speed"}
 
 
+@pytest.mark.long
 def test_a_pointer_over_a_timeline_is_told_what_was_logged(visit: Open) -> None:
     """The text of the record, as it was written."""
     page, said, _ = visit(render_html(graded.perfect()))
@@ -163,6 +167,7 @@ def test_a_pointer_over_a_timeline_is_told_what_was_logged(visit: Open) -> None:
     assert said == []
 
 
+@pytest.mark.long
 def test_keys_walk_along_a_chart_and_tell_a_screen_reader(visit: Open) -> None:
     """Arrow keys go from point to point; the words go to a live region."""
     page, _, _ = visit(render_html(graded.perfect()))
@@ -218,6 +223,7 @@ def turn_wheel(page: Page, figure: str, *, ctrl: bool) -> bool:
     return kept
 
 
+@pytest.mark.long
 def test_buttons_keys_and_the_wheel_zoom(visit: Open) -> None:
     """In, out, along and back to all of it."""
     page, said, _ = visit(render_html(graded.perfect()))
@@ -241,6 +247,7 @@ def test_buttons_keys_and_the_wheel_zoom(visit: Open) -> None:
     assert said == []
 
 
+@pytest.mark.long
 def test_the_wheel_alone_scrolls_the_page(visit: Open) -> None:
     """A chart under the pointer is no trap."""
     page, _, _ = visit(render_html(graded.perfect()))
@@ -249,6 +256,7 @@ def test_the_wheel_alone_scrolls_the_page(visit: Open) -> None:
     assert window_of(page, "velocity_publisher-1") == [0, 100]
 
 
+@pytest.mark.long
 def test_the_graph_lights_up_and_grows(visit: Open) -> None:
     """Hovering or focusing a node shows what it is connected to; the buttons enlarge the drawing."""
     page, said, _ = visit(render_html(graded.perfect()))
@@ -283,6 +291,7 @@ def test_both_directions_are_in_the_graph(visit: Open) -> None:
     }
 
 
+@pytest.mark.long
 def test_every_chart_can_be_read_as_a_table(visit: Open) -> None:
     """All its numbers, with headings."""
     page, _, _ = visit(render_html(graded.perfect()))
@@ -298,8 +307,8 @@ def test_every_chart_can_be_read_as_a_table(visit: Open) -> None:
     assert rows.count() > 300
 
 
-@pytest.mark.parametrize("width", [320, 390])
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("width", [320, *more([390], NIGHTLY)])
+@pytest.mark.parametrize("name", each(MADE, len(MADE)))
 def test_nothing_sticks_out_on_a_phone(visit: Open, name: str, width: int) -> None:
     """The page scrolls downwards only."""
     page, said, _ = visit(
@@ -311,6 +320,7 @@ def test_nothing_sticks_out_on_a_phone(visit: Open, name: str, width: int) -> No
     assert said == []
 
 
+@pytest.mark.long
 def test_charts_stand_in_their_criterion_and_are_folded_with_it(visit: Open) -> None:
     """Only those of what cost points are drawn at once; the others when their criterion is unfolded."""
     page, said, _ = visit(render_html(graded.wrong()))
@@ -324,6 +334,7 @@ def test_charts_stand_in_their_criterion_and_are_folded_with_it(visit: Open) -> 
     assert said == []
 
 
+@pytest.mark.long
 def test_charts_of_one_run_share_their_cursor_and_their_zoom(visit: Open) -> None:
     """What is under the pointer in one chart is told in the others, at the same moment."""
     page, said, _ = visit(render_html(graded.perfect()))
@@ -342,6 +353,7 @@ def test_charts_of_one_run_share_their_cursor_and_their_zoom(visit: Open) -> Non
     assert said == []
 
 
+@pytest.mark.long
 def test_every_series_of_a_chart_has_a_look_of_its_own(visit: Open) -> None:
     """No two entries of a legend look the same, and what is expected is grey."""
     page, _, _ = visit(render_html(graded.wrong()))
@@ -387,6 +399,7 @@ def scrub(page: Page, exercise: str, time_s: float) -> dict[str, Any]:
     return moment_of(page, exercise)
 
 
+@pytest.mark.long
 def test_a_slider_shows_each_moment_of_the_run(visit: Open) -> None:
     """Robot, values, log and graph as they were then; charts of the run show where that is."""
     page, said, _ = visit(render_html(graded.perfect()))
@@ -404,6 +417,7 @@ def test_a_slider_shows_each_moment_of_the_run(visit: Open) -> None:
     assert said == []
 
 
+@pytest.mark.long
 def test_a_run_plays_until_it_is_paused_and_from_the_start_after_its_end(visit: Open) -> None:
     """With the pointer, and with the space bar on the slider; arrow keys move it."""
     page, said, _ = visit(render_html(graded.perfect()))
@@ -428,6 +442,7 @@ def test_a_run_plays_until_it_is_paused_and_from_the_start_after_its_end(visit: 
     assert said == []
 
 
+@pytest.mark.long
 def test_the_graph_of_a_moment_lacks_what_came_later(visit: Open) -> None:
     """A publisher that appears after four seconds is faint until then."""
     report = graded.perfect()
@@ -445,6 +460,7 @@ def test_the_graph_of_a_moment_lacks_what_came_later(visit: Open) -> None:
 PAGES = re.compile(rb"/Type\s*/Page[^s]")
 
 
+@pytest.mark.long
 def test_a_print_is_short_and_shows_every_criterion(visit: Open) -> None:
     """Paper has the words of every criterion and the charts of the unfolded ones; afterwards all is as before."""
     page, said, _ = visit(render_html(graded.wrong()), color_scheme="dark")
@@ -460,6 +476,7 @@ def test_a_print_is_short_and_shows_every_criterion(visit: Open) -> None:
     assert said == []
 
 
+@pytest.mark.long
 def test_a_link_to_a_folded_criterion_unfolds_it(visit: Open) -> None:
     """A colleague can be sent to the very place."""
     page, _, _ = visit(render_html(graded.perfect()))
@@ -467,6 +484,7 @@ def test_a_link_to_a_folded_criterion_unfolds_it(visit: Open) -> None:
     page.wait_for_selector("#velocity_publisher-rate[open]")
 
 
+@pytest.mark.long
 def test_a_place_leads_to_its_line_in_the_whole_file(visit: Open) -> None:
     """The file is folded until somebody wants to see it."""
     page, said, _ = visit(render_html(graded.crashed()))
@@ -478,6 +496,7 @@ def test_a_place_leads_to_its_line_in_the_whole_file(visit: Open) -> None:
     assert said == []
 
 
+@pytest.mark.long
 def test_a_page_on_a_web_server_opens_its_recordings_in_foxglove(browser: Browser) -> None:
     """By their address; a page on a disk only names the file."""
     context = browser.new_context()
@@ -493,7 +512,7 @@ def test_a_page_on_a_web_server_opens_its_recordings_in_foxglove(browser: Browse
     assert f"https://app.foxglove.dev/~/view?ds=remote-file&ds.url={quote(address, safe='')}" in links
 
 
-@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
+@pytest.mark.parametrize(("scheme", "width"), each([("dark", 390), ("light", 1280)], 2))
 def test_axe_finds_nothing(visit: Open, scheme: str, width: int) -> None:
     """As the page opens, and with everything unfolded; axe-core knows the WCAG and good practice."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install -e '.[dev]'")
@@ -506,6 +525,7 @@ def test_axe_finds_nothing(visit: Open, scheme: str, width: int) -> None:
     assert said == []
 
 
+@pytest.mark.long
 def test_headings_landmarks_and_names_are_there(visit: Open) -> None:
     """For whoever listens to the page: one h1, no level left out, every control and picture named."""
     page, _, _ = visit(render_html(graded.wrong()))
@@ -521,6 +541,7 @@ def test_headings_landmarks_and_names_are_there(visit: Open) -> None:
     assert unnamed == 0
 
 
+@pytest.mark.long
 def test_without_scripts_the_report_is_there_in_words(visit: Open, browser: Browser, tmp_path: Path) -> None:
     """Mail programs and wary people switch them off."""
     file = tmp_path / "plain.html"
