@@ -23,7 +23,10 @@ BEGAN_S = pytest.StashKey[float]()
 #: The markers of tests that `-m fast` leaves out.
 NOT_FAST = ("ros", "browser", "sandbox", "slow", "long", "nightly")
 
-settings.register_profile("default", deadline=None, suppress_health_check=[HealthCheck.too_slow], max_examples=30)
+settings.register_profile(
+    "default", deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], max_examples=15
+)
+settings.register_profile("long", settings.get_profile("default"), max_examples=30)
 settings.register_profile("nightly", settings.get_profile("default"), max_examples=200)
 
 # Rewriting the assertions of all tests takes twelve seconds of a processor: it is kept, also where Python should keep
@@ -71,8 +74,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Try more examples of each property in the nightly run."""
-    settings.load_profile("nightly" if config.getoption("--everything") else "default")
+    """Try more examples of each property with the long tests, and most in the nightly run."""
+    everything, long = config.getoption("--everything"), config.getoption("--long")
+    settings.load_profile("nightly" if everything else "long" if long else "default")
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

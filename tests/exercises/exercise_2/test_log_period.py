@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tracing import Recording, position_logs
 from wordings import plain
@@ -50,7 +50,6 @@ def test_the_stream_is_taken_from_the_deliveries_where_no_mark_is_there() -> Non
     assert PERIOD.judge(rec.trace()).credit == 1
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.floats(0.3, 2.5), st.floats(0.0, 0.5), st.floats(0.0, 0.5))
 def test_credit_never_falls_as_the_tolerance_grows(period: float, a: float, b: float) -> None:
     """A wider band accepts whatever a narrower one does."""

@@ -6,7 +6,7 @@ import itertools
 from fractions import Fraction
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tracing import ODOM_TIMES, drive, driving, pose_at, position_logs
 from wordings import RIGHT, WRONG, Writer, plain
@@ -206,7 +206,6 @@ def test_hostile_texts_are_judged(text: str) -> None:
     assert PERIOD.judge(rec.trace()).credit in (0, 1)
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.sampled_from(sorted(RIGHT)), st.integers(0, 999), st.floats(0.9, 1.1))
 def test_right_positions_are_right_at_any_times(name: str, offset_ms: int, period: float) -> None:
     """Neither the phase of the timer nor a period of 1 s ± 10 % changes anything."""
@@ -216,7 +215,6 @@ def test_right_positions_are_right_at_any_times(name: str, offset_ms: int, perio
     assert PERIOD.judge(trace).credit == 1
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.sampled_from(sorted(RIGHT)), st.floats(-40, 40), st.floats(-40, 40))
 def test_positions_of_another_place_never_count(name: str, dx: float, dy: float) -> None:
     """A fixed offset of more than the precision earns nothing in any wording."""

@@ -8,7 +8,7 @@ import types
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from rosidl_parser import definition
@@ -112,7 +112,6 @@ def _parts(message_class: Any, body: bytes) -> list[bytes]:
     return parts
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.sampled_from(CLASSES), st.randoms(use_true_random=False), st.data())
 def test_damaged_bytes_are_refused_or_give_a_message(
     message_class: Any, chance: random.Random, data: st.DataObject
@@ -130,7 +129,6 @@ def test_damaged_bytes_are_refused_or_give_a_message(
         assert type(message) is message_class
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.sampled_from(CLASSES), st.binary(max_size=200))
 def test_random_bytes_are_refused_or_give_a_message(message_class: Any, body: bytes) -> None:
     with contextlib.suppress(MalformedMessageError):

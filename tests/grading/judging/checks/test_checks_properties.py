@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from check_instances import INSTANCES
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from nodes import (
     BATTERY,
@@ -185,7 +185,6 @@ def test_findings_are_plain_and_steady(check: Check) -> None:
     assert any(not isinstance(asked(check, trace), str) for trace in traces.values())
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(st.lists(OBSERVATIONS, max_size=25), st.sampled_from(list(ClockKind)), st.integers(0, 30 * NS_PER_S))
 def test_no_recording_makes_a_check_raise(observations: list[Any], clock: ClockKind, stop_ns: int) -> None:
     """Whatever was observed, every check returns a finding or raises HarnessError."""
@@ -195,7 +194,6 @@ def test_no_recording_makes_a_check_raise(observations: list[Any], clock: ClockK
         assert isinstance(finding, str) or 0 <= finding.credit <= 1
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(st.lists(OBSERVATIONS, max_size=25), st.integers(0, 30 * NS_PER_S))
 @example([Message(0, "/temperature", "std_msgs/msg/Float64MultiArray", {"data": [1.0, 2.0]})], NS_PER_S)
 def test_every_recording_gives_every_check_a_chart_that_a_page_can_hold_or_none(
@@ -231,7 +229,6 @@ def shifted(trace: Trace, by_ns: int) -> Trace:
     return replace(trace, stop_ns=trace.stop_ns + by_ns, observations=moved)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.sampled_from(sorted(TRACES)), st.sampled_from(sorted(INSTANCES)), st.integers(0, 100 * NS_PER_S))
 def test_shifting_all_times_changes_no_credit(name: str, check: str, by_ns: int) -> None:
     """Everything is judged relative to what happened in the recording."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from diagnosis_samples import RECORDINGS, RIGHT, line_of, lost, report, silent, spoilt
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from work import calls_in
 
@@ -76,7 +76,6 @@ def tokens() -> st.SearchStrategy[str]:
     return st.lists(st.sampled_from([*pieces, *more]), max_size=40).map("".join)
 
 
-@settings(max_examples=60, deadline=None)
 @given(text=st.one_of(st.text(max_size=300), tokens()), which=st.integers(0, len(WRONG) - 1))
 def test_no_source_makes_diagnosis_raise(text: str, which: int) -> None:
     """Neither noise nor programs torn to pieces."""
