@@ -73,12 +73,13 @@ class Tables:
 
 def _parameters(item: pytest.Item) -> dict[str, object]:
     callspec = getattr(item, "callspec", None)
-    return {} if callspec is None else callspec.params
+    found: dict[str, object] = {} if callspec is None else callspec.params
+    return found
 
 
 def _session_of(item: pytest.Item) -> str:
     marker = item.get_closest_marker("recorded")
-    return "" if marker is None else marker.args[1]
+    return "" if marker is None else str(marker.args[1])
 
 
 def _beside(one: pytest.Item, other: pytest.Item) -> bool:

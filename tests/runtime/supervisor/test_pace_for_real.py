@@ -158,7 +158,7 @@ def rate_hz(trace: Trace) -> float:
 
 
 def of_each(programs: dict[str, str]) -> list[object]:
-    marks = {name: () if name in ALWAYS else LONG if name in OFTEN else NIGHTLY for name in programs}
+    marks = {name: () if name in ALWAYS else (LONG,) if name in OFTEN else (NIGHTLY,) for name in programs}
     return [pytest.param(program, id=name, marks=marks[name]) for name, program in programs.items()]
 
 
