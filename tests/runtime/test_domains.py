@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from side_by_side import rows_of
+from tiers import LONG, NIGHTLY
 
 from grader.runtime.domains import KEPT, UNUSUAL, USABLE, PrivateDomains, SharedDomains
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.session import RecordingSession
+from grader.runtime.model.trace import Trace
+from grader.runtime.plan import Plan
 
 
 def test_in_a_network_of_ones_own_no_two_scenarios_have_one_domain() -> None:
@@ -132,30 +135,45 @@ executor.spin()
 """
 
 
-@pytest.mark.ros
-@pytest.mark.parametrize("clock", CLOCKS)
-@pytest.mark.parametrize(("choice", "heard"), CHOICES.items())
-def test_a_node_is_heard_in_domain_0(
-    session: RecordingSession, tmp_path: Path, clock: str, choice: str, *, heard: bool
-) -> None:
-    """However the program chose it; in any other it is not."""
-    pytest.importorskip("rclpy")
-    from hostile import record
+#: Choices that ROS refuses.
+NONE = ("domain = -1", "domain = 'a'", "os.environ['ROS_DOMAIN_ID'] = 'a'")
+#: What runs by default; in virtual time all others run with `--long`, in real time every night.
+DEFAULT = (
+    ("domain = 0", "virtual"),
+    ("os.environ['ROS_DOMAIN_ID'] = '7'; domain = 0", "bare"),
+    ("os.environ['ROS_DOMAIN_ID'] = '7'", "wall"),
+    ("domain = 1", "virtual"),
+    ("domain = True", "virtual"),
+    ("domain = -1", "virtual"),
+)
 
-    tmp_path.chmod(0o755)
-    trace = record(session, tmp_path / "s", CHOOSER.format(choice=choice), duration_ns=2 * NS_PER_S, **CLOCKS[clock])
+
+def row(choice: str, clock: str, *values: Any) -> Any:
+    tier = [] if (choice, clock) in DEFAULT else [LONG if clock == "virtual" else NIGHTLY]
+    return pytest.param(choice, clock, *values, marks=tier)
+
+
+def plan(folder: Path, choice: str, clock: str, **_: object) -> Plan:
+    pytest.importorskip("rclpy")
+    from hostile import planned
+
+    return planned(folder, CHOOSER.format(choice=choice), duration_ns=2 * NS_PER_S, **CLOCKS[clock])
+
+
+@pytest.mark.ros
+@rows_of(plan)
+@pytest.mark.parametrize(
+    ("choice", "clock", "heard"), [row(choice, clock, heard) for choice, heard in CHOICES.items() for clock in CLOCKS]
+)
+def test_a_node_is_heard_in_domain_0(trace: Trace, choice: str, clock: str, *, heard: bool) -> None:
+    """However the program chose it; in any other it is not."""
     assert trace.faults() == ()
     assert bool(trace.messages("/words")) == heard
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("clock", CLOCKS)
-@pytest.mark.parametrize("choice", ["domain = -1", "domain = 'a'", "os.environ['ROS_DOMAIN_ID'] = 'a'"])
-def test_a_domain_that_is_none_is_an_error(session: RecordingSession, tmp_path: Path, clock: str, choice: str) -> None:
+@rows_of(plan)
+@pytest.mark.parametrize(("choice", "clock"), [row(choice, clock) for choice in NONE for clock in CLOCKS])
+def test_a_domain_that_is_none_is_an_error(trace: Trace, choice: str, clock: str) -> None:
     """The one of ROS."""
-    pytest.importorskip("rclpy")
-    from hostile import record
-
-    tmp_path.chmod(0o755)
-    trace = record(session, tmp_path / "s", CHOOSER.format(choice=choice), duration_ns=2 * NS_PER_S, **CLOCKS[clock])
     assert [fault.line for fault in trace.faults()] == [9]

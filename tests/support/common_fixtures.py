@@ -15,6 +15,9 @@ import pytest
 from tiers import more
 
 if TYPE_CHECKING:
+    from side_by_side import Tables
+
+    from grader.runtime.model.trace import Trace
     from grader.runtime.session import RecordingSession
 
 
@@ -53,6 +56,25 @@ def session_in_tier(request: pytest.FixtureRequest) -> Iterator[RecordingSession
             yield staging(session)
     except EnvironmentFault as fault:
         pytest.skip(fault.message)
+
+
+@pytest.fixture(scope="session")
+def tables(tmp_path_factory: pytest.TempPathFactory) -> Tables:
+    """The recordings of tables of programs that this process has made."""
+    from side_by_side import Tables
+
+    def new_folder() -> Path:
+        folder = tmp_path_factory.mktemp("row")
+        folder.chmod(0o755)
+        return folder / "s"
+
+    return Tables(new_folder)
+
+
+@pytest.fixture
+def trace(request: pytest.FixtureRequest, tables: Tables) -> Trace:
+    """The trace of this row of a table that `rows_of` marks."""
+    return tables.trace(request)
 
 
 @pytest.fixture

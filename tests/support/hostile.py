@@ -127,8 +127,12 @@ def planned(folder: Path, *programs: str, limits: Limits | None = None, **fields
 
 
 def record(session: RecordingSession, folder: Path, *programs: str, **fields: Any) -> Trace:
-    """Record programs together, as `planned` says; on the wall clock again while other tests keep the machine busy."""
-    plan = planned(folder, *programs, **fields)
+    """Record programs together, as `planned` and `recorded` say."""
+    return recorded(session, planned(folder, *programs, **fields))
+
+
+def recorded(session: RecordingSession, plan: Plan) -> Trace:
+    """Record a plan; on the wall clock again while other tests keep the machine busy."""
     for _ in range(BUSY_TRIES):
         trace = session.recorder.record([Job("hostile", plan)], lambda step: None)[0]
         if not trace.harness_problem.startswith("the machine was too busy"):

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tiers import NIGHTLY, more
 
 from grader.runtime.model.trace import FaultKind, LogRecord, OutputLine, Trace, unmet_policy
 from grader.runtime.session import RecordingSession
@@ -20,7 +21,9 @@ from grader.runtime.worker.virtual_runner import OUTSIDE
 
 pytestmark = pytest.mark.ros
 
-CLOCKS = pytest.mark.parametrize("clock", ["virtual", "wall"])
+CLOCKS = pytest.mark.parametrize("clock", ["virtual", *more(["wall"])])
+#: For what differs little from what runs on both clocks with `--long`.
+MOSTLY_VIRTUAL = pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 BEFORE = """
 import sys, time
 import rclpy
@@ -152,7 +155,7 @@ def warnings(trace: Trace, process: str) -> list[tuple[float, str]]:
 
 @pytest.mark.rule(15)
 @CLOCKS
-@pytest.mark.parametrize("first", ["offering", "requesting"])
+@pytest.mark.parametrize("first", ["offering", *more(["requesting"])])
 def test_both_ends_learn_which_policy_does_not_fit(run: Callable[..., Trace], clock: str, first: str) -> None:
     """In either order; matches are told beside it, of which a publisher has one more with the grader's own node.
 
@@ -190,7 +193,7 @@ def test_the_graph_knows_each_policy(run: Callable[..., Trace]) -> None:
     }
 
 
-@CLOCKS
+@MOSTLY_VIRTUAL
 def test_rclpy_warns_at_both_ends(run: Callable[..., Trace], clock: str) -> None:
     """The warnings come at once, also in a program that nothing else wakes."""
     talking = """
@@ -205,6 +208,7 @@ def test_rclpy_warns_at_both_ends(run: Callable[..., Trace], clock: str) -> None
         assert [at for name in ("a.py", "b.py") for at, _ in warnings(trace, name)] == [0.0, 0.0]
 
 
+@pytest.mark.long
 @CLOCKS
 def test_later_endpoints_are_told_when_they_appear(run: Callable[..., Trace], clock: str) -> None:
     """Each of three publishers at its time, and what has gone is still counted; a program may act on nothing else."""
@@ -235,7 +239,8 @@ def test_later_endpoints_are_told_when_they_appear(run: Callable[..., Trace], cl
         assert [round(message.t_ns / NS_PER_S, 3) for message in trace.messages("/refused")] == [1.0, 2.5, 4.0]
 
 
-@CLOCKS
+@pytest.mark.long
+@MOSTLY_VIRTUAL
 def test_of_three_ends_one_fits(run: Callable[..., Trace], clock: str) -> None:
     """Each message counts once, whatever QoS the publishers of the topic have; the grader's node is no stranger."""
     mixed = """
@@ -261,7 +266,8 @@ def test_of_three_ends_one_fits(run: Callable[..., Trace], clock: str) -> None:
     assert {text for _, text in said(together, "a.py")} == {"heard 1"}
 
 
-@CLOCKS
+@pytest.mark.long
+@MOSTLY_VIRTUAL
 def test_endpoints_of_one_process_are_told_of_each_other(run: Callable[..., Trace], clock: str) -> None:
     """Also in one node, and once it spins."""
     both = """
@@ -278,6 +284,7 @@ def test_endpoints_of_one_process_are_told_of_each_other(run: Callable[..., Trac
         assert {at for at, _ in warnings(trace, "a.py")} == {1.0}
 
 
+@pytest.mark.long
 @CLOCKS
 def test_who_goes_is_told(run: Callable[..., Trace], clock: str) -> None:
     """A program that waits for its counterpart to come and to go, and does nothing else."""
@@ -299,7 +306,8 @@ def test_who_goes_is_told(run: Callable[..., Trace], clock: str) -> None:
         assert [at for at, _ in found] == [1.0, 2.0]
 
 
-@CLOCKS
+@pytest.mark.long
+@MOSTLY_VIRTUAL
 def test_nobody_is_told_who_does_not_want_to_know(run: Callable[..., Trace], clock: str) -> None:
     """Without default callbacks there are no events, and nothing is waited for."""
     deaf = """
@@ -349,7 +357,8 @@ def test_services_see_each_other_if_both_ways_fit(run: Callable[..., Trace], clo
     assert "incompatible QoS: best_effort client, reliable server" in drawn
 
 
-@CLOCKS
+@pytest.mark.long
+@MOSTLY_VIRTUAL
 def test_best_available_takes_what_is_there(run: Callable[..., Trace], clock: str) -> None:
     """The profile that adapts to the endpoints that exist is the same whenever the middleware finds them."""
     talking = """
@@ -371,6 +380,7 @@ def test_best_available_takes_what_is_there(run: Callable[..., Trace], clock: st
     assert [fault.text for fault in trace.faults()] == []
 
 
+@pytest.mark.long
 def test_a_watched_lease_needs_the_wall_clock(run: Callable[..., Trace]) -> None:
     """The middleware times it, as it does deadlines; on its own clock it tells who lives and who does not."""
     program = """

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from hostile import record
+from tiers import each
 
 from grader.runtime.model.trace import Trace
 from grader.runtime.session import RecordingSession
@@ -118,14 +119,17 @@ def test_what_a_replaced_function_raises_is_the_program_s(run: Run) -> None:
 
 @pytest.mark.parametrize(
     ("module", "name", "value", "where"),
-    [
-        ("ledger", "BACKGROUND_PARAMETERS", "None", "ledger.py"),  # TypeError: not iterable
-        ("ledger", "BACKGROUND_SERVICES", "5", "ledger.py"),
-        ("ledger", "_is_background", "lambda: None", "ledger.py"),
-        ("ros", "BACKGROUND", "5", "ros.py"),
-        ("ledger", "MESSAGES_PER_FLUSH", "None", "ledger.py"),
-        ("virtual", "MOST_MOVES", "{}", "virtual.py"),
-    ],
+    each(
+        [
+            ("ledger", "BACKGROUND_PARAMETERS", "None", "ledger.py"),  # TypeError: not iterable
+            ("ledger", "BACKGROUND_SERVICES", "5", "ledger.py"),
+            ("ledger", "_is_background", "lambda: None", "ledger.py"),
+            ("ros", "BACKGROUND", "5", "ros.py"),
+            ("ledger", "MESSAGES_PER_FLUSH", "None", "ledger.py"),
+            ("virtual", "MOST_MOVES", "{}", "virtual.py"),
+        ],
+        5,
+    ),
 )
 def test_an_exception_of_the_grader_s_own_code_is_undecided(
     run: Run, module: str, name: str, value: str, where: str
@@ -137,6 +141,7 @@ def test_an_exception_of_the_grader_s_own_code_is_undecided(
     assert trace.clock_reason == trace.harness_problem  # so `--clock auto` records it on the wall clock
 
 
+@pytest.mark.long
 def test_a_failure_in_virtual_time_is_recorded_on_the_wall_clock(one_worker: RecordingSession, tmp_path: Path) -> None:
     """Little of the grader's code runs there."""
     tmp_path.chmod(0o755)

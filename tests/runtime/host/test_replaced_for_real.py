@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from hostile import printed
+from tiers import more
 
 from grader.runtime.model.trace import Fault, FaultKind, Trace
 from grader.runtime.session import RecordingSession
@@ -20,7 +21,7 @@ from grader.runtime.model.quantities import NS_PER_S
 
 pytestmark = pytest.mark.ros
 
-CLOCKS = pytest.mark.parametrize("clock", ["virtual", "wall"])
+CLOCKS = pytest.mark.parametrize("clock", ["virtual", *more(["wall"])])
 #: Prints which functions of a program's usual modules cannot be pickled, as `multiprocessing` has to.
 PICKLING = """
 import importlib, pickle
@@ -76,6 +77,7 @@ def plainly(program: str) -> list[str]:
     return done.stdout.splitlines()
 
 
+@pytest.mark.long
 @CLOCKS
 def test_what_is_replaced_can_be_pickled_as_before(run: Callable[..., Trace], clock: str) -> None:
     """A program may hand `time.sleep` to another process."""

@@ -9,14 +9,17 @@ import sys
 from pathlib import Path
 
 import pytest
+from tiers import NIGHTLY, but, more
 
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.session import RecordingSession
+from grader.runtime.model.trace import Trace
+from grader.runtime.plan import Plan
 
 pytest.importorskip("rclpy")
 
-from hostile import record
+from hostile import planned
 from sandboxes import DOMAIN
+from side_by_side import rows_of
 
 pytestmark = pytest.mark.ros
 
@@ -72,20 +75,36 @@ PROGRAMS = {
 }
 
 
-def normalised(text: str) -> list[str]:
+def normalised(printed: str) -> list[str]:
     """Return the lines that were printed, without empty ones, which are not recorded, and the addresses of objects."""
-    return [re.sub(r"0x[0-9a-f]+", "0x", line) for line in text.splitlines() if line.strip()]
+    return [re.sub(r"0x[0-9a-f]+", "0x", line) for line in printed.splitlines() if line.strip()]
 
 
-@pytest.mark.parametrize("clock", ["virtual", "wall"])
-@pytest.mark.parametrize("name", PROGRAMS)
-def test_a_traceback_is_that_of_plain_python(session: RecordingSession, tmp_path: Path, name: str, clock: str) -> None:
+def plan(folder: Path, name: str, clock: str) -> Plan:
+    return planned(folder, text(name), clock=clock, duration_ns=2 * NS_PER_S)
+
+
+def text(name: str) -> str:
+    return BEGIN + PROGRAMS[name] + "\n"
+
+
+#: By default: from a callback, from a thread beside it, and where Python prints a stack itself.
+DEFAULT = [("a spin", "virtual"), ("a timer of Python", "virtual"), ("print_stack", "virtual")]
+
+
+@rows_of(plan)
+@pytest.mark.parametrize(
+    ("name", "clock"),
+    [
+        *but(DEFAULT, [(name, "virtual") for name in PROGRAMS]),
+        *more([("a spin", "wall"), ("one in a thread", "wall")]),
+        *more([(name, "wall") for name in PROGRAMS if name not in ("a spin", "one in a thread")], NIGHTLY),
+    ],
+)
+def test_a_traceback_is_that_of_plain_python(trace: Trace, tmp_path: Path, name: str, clock: str) -> None:
     """Line by line, without frames of the grader."""
-    program = BEGIN + PROGRAMS[name] + "\n"
-    tmp_path.chmod(0o755)
-    plain = tmp_path / "plain" / "a.py"
-    plain.parent.mkdir()
-    plain.write_text(program, encoding="utf-8")
+    plain = tmp_path / "a.py"
+    plain.write_text(text(name), encoding="utf-8")
     environment = {
         **os.environ,
         "ROS_DOMAIN_ID": DOMAIN,
@@ -95,7 +114,6 @@ def test_a_traceback_is_that_of_plain_python(session: RecordingSession, tmp_path
         [sys.executable, str(plain)], check=False, capture_output=True, encoding="utf-8", env=environment
     )
     expected = done.stderr.replace(f"{plain.parent}/", "")
-    trace = record(session, tmp_path / "s", program, clock=clock, duration_ns=2 * NS_PER_S)
     found = "".join(f"{line.text}\n" for line in trace.lines() if line.stream == "stderr")
     assert expected
     assert normalised(found) == normalised(expected)

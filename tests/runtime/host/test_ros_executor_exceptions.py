@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import LogRecord, OutputLine, Trace
-from grader.runtime.session import RecordingSession
+from grader.runtime.plan import Plan
 
 pytest.importorskip("rclpy")
 
-from hostile import record
+from hostile import planned
+from side_by_side import rows_of
 
 pytestmark = pytest.mark.ros
 
@@ -123,12 +123,14 @@ def said(trace: Trace) -> str:
     return " ".join(told[: told.index("end")])
 
 
+def plan(folder: Path, entity: str, writes: str, spin: str) -> Plan:
+    program = PROGRAM.format(entity=ENTITIES[entity][0], writes=WRITES[writes], spin=SPINS[spin])
+    return planned(folder, program, duration_ns=4 * NS_PER_S)
+
+
+@rows_of(plan)
 @pytest.mark.parametrize(("entity", "writes", "spin"), CASES)
-def test_an_exception_surfaces_as_on_a_real_clock(
-    session: RecordingSession, tmp_path: Path, entity: str, writes: str, spin: str
-) -> None:
+def test_an_exception_surfaces_as_on_a_real_clock(trace: Trace, entity: str, writes: str, spin: str) -> None:
     """What each says was counted with plain Python on an idle machine, where it is what comes most often."""
-    made, silent, loud = ENTITIES[entity]
-    program = PROGRAM.format(entity=made, writes=WRITES[writes], spin=SPINS[spin])
-    trace: Any = record(session, tmp_path / "s", program, duration_ns=4 * NS_PER_S)
+    _, silent, loud = ENTITIES[entity]
     assert said(trace) == (silent if writes == "nothing" else loud)

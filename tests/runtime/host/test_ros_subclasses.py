@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from hostile import record
+from tiers import NIGHTLY, each, more
 
 from grader.runtime.model.trace import GraphSnapshot, Trace
 from grader.runtime.session import RecordingSession
@@ -138,7 +139,7 @@ executor.spin()
 """
 
 
-@pytest.fixture(params=["virtual", "wall"])
+@pytest.fixture(params=["virtual", *more(["wall"], NIGHTLY)])
 def run(request: pytest.FixtureRequest, one_worker: RecordingSession, tmp_path: Path) -> Run:
     def run_one(source: str, **fields: Any) -> Trace:
         duration_ns = S if request.param == "virtual" else 3 * S
@@ -174,6 +175,7 @@ def test_services(run: Run) -> None:
     assert trace.notes == ()
 
 
+@pytest.mark.long
 def test_actions(run: Run) -> None:
     """A class derived from an action, and classes derived from server and client."""
     trace = run(ACTIONS)
@@ -181,7 +183,7 @@ def test_actions(run: Run) -> None:
     assert trace.notes == ()
 
 
-@pytest.mark.parametrize("executor", ["SingleThreadedExecutor", "MultiThreadedExecutor"])
+@pytest.mark.parametrize("executor", each(["SingleThreadedExecutor", "MultiThreadedExecutor"], 2))
 def test_nodes_executors_publishers_groups_and_profiles(run: Run, executor: str) -> None:
     """Methods that call those of their base."""
     sent, heard = map(int, printed(run(REST.replace("EXECUTOR", executor)))[0].split())

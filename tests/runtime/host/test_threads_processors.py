@@ -103,6 +103,7 @@ def test_what_a_submission_does(names: list[str]) -> None:
     assert (code, differences(found)) == (0, {})
 
 
+@pytest.mark.long
 def test_a_client_that_waits_in_a_callback(open_folder: Path) -> None:
     """With a single thread in its executor it would wait for ever; a machine with one processor would give it that."""
     program = open_folder / "threads.py"

@@ -13,13 +13,16 @@ from typing import Any
 
 import pytest
 from places import TESTS
+from side_by_side import rows_of
 
 from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import Trace
+from grader.runtime.plan import Plan
 from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
-from hostile import record
+from hostile import planned, recorded
 from told import Told, differences, told
 
 pytestmark = pytest.mark.ros
@@ -29,7 +32,7 @@ PARTNER = PROGRAMS / "partner.py"
 GOLDEN = PROGRAMS / "told.json"
 NAMES = sorted(path.stem for path in PROGRAMS.glob("*.py") if path != PARTNER)
 #: One in so many runs by default, and those for which a host has to do something of its own.
-SHARE = 6
+SHARE = 31
 ALWAYS = ("clock_of_the_node_jumps", "graph_counts", "lifecycle_fails")
 
 
@@ -38,21 +41,23 @@ def marks(number: int, name: str) -> list[Any]:
     return [pytest.mark.long] if number % SHARE and name not in ALWAYS else []
 
 
-def recorded(session: RecordingSession, folder: Path, name: str, clock: str) -> Told:
-    """Return what a program does beside its partner."""
-    for each in (folder, folder.parent):
-        each.chmod(0o755)
+def plan(folder: Path, name: str, clock: str = "virtual") -> Plan:
     texts = [path.read_text(encoding="utf-8") for path in (PROGRAMS / f"{name}.py", PARTNER)]
-    trace = record(session, folder / "s", *texts, clock=clock, duration_ns=5 * NS_PER_S)
+    return planned(folder, *texts, clock=clock, duration_ns=5 * NS_PER_S)
+
+
+def told_on(clock: str, trace: Trace) -> Told:
+    """Return what a program did beside its partner on a clock."""
     assert (trace.harness_problem, trace.clock.value) == ("", clock)
     assert trace.clock_reason == "" or clock == "wall"
     return told(trace)
 
 
+@rows_of(plan)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks(n, name)) for n, name in enumerate(NAMES)])
-def test_what_a_program_does_in_virtual_time(session: RecordingSession, tmp_path: Path, name: str) -> None:
+def test_what_a_program_does_in_virtual_time(trace: Trace, name: str) -> None:
     """As it is written down; and virtual time suits it."""
-    found = recorded(session, tmp_path, name, "virtual")
+    found = told_on("virtual", trace)
     known: dict[str, Any] = json.loads(GOLDEN.read_text(encoding="utf-8")) if GOLDEN.exists() else {}
     if "UPDATE_GOLDEN" in os.environ:
         text = json.dumps(dict(sorted({**known, name: found}.items())), indent=1, ensure_ascii=False)
@@ -68,8 +73,8 @@ def test_what_a_program_does_on_the_wall_clock(session: RecordingSession, tmp_pa
     known = json.loads(GOLDEN.read_text(encoding="utf-8"))
     found: list[str] = []
     for number in range(3):
-        (tmp_path / str(number)).mkdir()
-        found = differences(known[name], recorded(session, tmp_path / str(number), name, "wall"))
+        one = recorded(session, plan(tmp_path / str(number), name, "wall"))
+        found = differences(known[name], told_on("wall", one))
         if not found:
             return
     assert found == []

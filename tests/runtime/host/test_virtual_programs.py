@@ -302,14 +302,14 @@ def said(trace: Trace) -> list[tuple[float, str]]:
     return [((o.t_ns - first) / NS_PER_S, re.sub(r"0x[0-9a-f]+", "", o.text)) for o in found]
 
 
-#: Programs that need each look of an executor, of which a host leaves some out. The others run every night.
+#: Programs that need each look of an executor, of which a host leaves some out: with `--long`. Others run every night.
 EACH_LOOK = ("coroutines_that_wait_for_each_other", "coroutine_that_ends_a_spin")
 
 
 @pytest.mark.parametrize(
     "program",
     [
-        pytest.param(program, id=name, marks=[] if name in EACH_LOOK else pytest.mark.nightly)
+        pytest.param(program, id=name, marks=pytest.mark.long if name in EACH_LOOK else pytest.mark.nightly)
         for name, program in PROGRAMS.items()
     ],
 )

@@ -5,9 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hostile import record
+from hostile import planned, record
+from side_by_side import rows_of
+from tiers import but
 
 from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import Trace
+from grader.runtime.plan import Plan
 from grader.runtime.session import RecordingSession
 
 pytestmark = pytest.mark.ros
@@ -37,18 +41,24 @@ node.get_logger().info("done")
 """
 
 
-@pytest.mark.parametrize(("does", "told"), DOES.values(), ids=DOES)
-def test_what_is_told_of_a_program(
-    session_in_tier: RecordingSession, tmp_path: Path, does: str, told: tuple[str, ...]
-) -> None:
+#: By default: nothing at all, what is ordinary, and two ways to look around.
+DEFAULT = [DOES[name] for name in ("nothing", "temporary files", "other processes", "the same by another way")]
+
+
+def plan(folder: Path, does: str, **_: object) -> Plan:
+    return planned(folder, PROGRAM.format(does=does or "pass"), duration_ns=NS_PER_S)
+
+
+@rows_of(plan, session="session_in_tier")
+@pytest.mark.usefixtures("session_in_tier")
+@pytest.mark.parametrize(("does", "told"), but(DEFAULT, DOES.values()), ids=DOES)
+def test_what_is_told_of_a_program(trace: Trace, does: str, told: tuple[str, ...]) -> None:
     """A program of which something is told is recorded again as a bare process."""
-    tmp_path.chmod(0o755)
-    folder = tmp_path / "s"
-    trace = record(session_in_tier, folder, PROGRAM.format(does=does or "pass"), duration_ns=NS_PER_S)
     assert [log.text for log in trace.records()] == ["done"], trace.faults()
     assert trace.reached == told
 
 
+@pytest.mark.long
 def test_nothing_is_told_of_a_module_that_hides_one_of_python(
     session_in_tier: RecordingSession, tmp_path: Path
 ) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from hostile import hostile, printed, record
 from mcap.reader import make_reader
+from tiers import more
 
 from grader.runtime.host.written import ALL_BYTES, FILE_BYTES, FILES
 from grader.runtime.model.limits import Limits
@@ -56,7 +57,7 @@ def kept(trace: Trace) -> dict[tuple[str, str], bytes]:
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("clock", ["virtual", "wall"])
+@pytest.mark.parametrize("clock", ["virtual", *more(["wall"])])
 def test_a_program_writes_beside_itself_and_it_is_kept(run: Run, clock: str) -> None:
     """With a relative name, and by the folder of its file; files that it holds open are written to their end."""
     trace = run(hostile(before=WRITES), clock=clock, first_message_on="/cmd_vel")
@@ -88,6 +89,7 @@ def test_nobody_else_sees_what_a_program_wrote(run: Run, tmp_path: Path) -> None
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_the_copy_has_the_size_of_a_scratch_folder(run: Run) -> None:
     """More ends the program, with the limit as the reason."""
     fills = """
@@ -103,6 +105,7 @@ def test_the_copy_has_the_size_of_a_scratch_folder(run: Run) -> None:
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_only_plain_small_files_are_kept(run: Run) -> None:
     """No link, pipe or large file, and no more than so many."""
     odd = f"""
@@ -140,6 +143,7 @@ def test_a_large_submission_is_only_read(run: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_a_program_of_a_package_works_in_an_empty_folder(session_in_tier: RecordingSession, tmp_path: Path) -> None:
     """As under `ros2 run`, from anywhere; it may write beside its module all the same."""
     tmp_path.chmod(0o755)

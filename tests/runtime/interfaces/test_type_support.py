@@ -10,6 +10,7 @@ import pytest
 import test_msgs
 from samples import SHARE, installed_packages, share_without
 from sandboxes import DOMAIN
+from tiers import more
 
 from grader.runtime.interfaces.build import BuiltInterfaces, build
 from grader.runtime.interfaces.definitions import (
@@ -102,7 +103,7 @@ def test_shipped_packages_have_the_hashes_of_the_releases(tmp_path: Path) -> Non
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("both", [False, True])
+@pytest.mark.parametrize("both", [False, *more([True])])
 def test_exchanges_with_the_compiled_type_support(built: BuiltInterfaces, *, both: bool) -> None:
     sides = (("ours", "theirs", [built]), ("theirs", "ours", [built] if both else []))
     processes = [
@@ -180,6 +181,7 @@ executor.shutdown()
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_threads_that_publish_take_and_call_at_once_do_not_block_each_other(built: BuiltInterfaces) -> None:
     assert run(THREADS, built).split() == ["160", "True"]
 

@@ -3,37 +3,27 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tiers import NIGHTLY, each, more
 
 pytest.importorskip("rclpy")
 
 from counter_examples import COUNTER_EXAMPLES
-from hostile import staging
 from program_comparison import compared, differences_of_each
 from program_description import Program
 from program_strategy import drawn
 
-from grader.runtime.session import RecordingSession, open_session
+from grader.runtime.session import RecordingSession
 
 pytestmark = pytest.mark.ros
 
 #: In so many parts, with so many programs each.
 PARTS, EACH = 8, 25
-#: Recorded at the same time: they mostly wait for the middleware.
-AT_ONCE = 4
 
 
-@pytest.fixture(scope="module")
-def session() -> Iterator[RecordingSession]:
-    """The strongest sandbox of this machine."""
-    with open_session("auto", AT_ONCE) as session:
-        yield staging(session)
-
-
-@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("part", [0, *more([1, 2]), *more(range(3, PARTS), NIGHTLY)])
 def test_random_programs_do_what_the_model_says(session: RecordingSession, part: int) -> None:
     """Two hundred of them, the same ones each time."""
     chosen = drawn(part, EACH)
@@ -45,7 +35,7 @@ def test_random_programs_do_what_the_model_says(session: RecordingSession, part:
     assert not wrong, "\n\n".join([*wrong, f"python benchmarks/programs.py {EACH} --seed {part} makes them smaller"])
 
 
-@pytest.mark.parametrize("program", COUNTER_EXAMPLES.values(), ids=COUNTER_EXAMPLES)
+@pytest.mark.parametrize("program", each(COUNTER_EXAMPLES.values(), 3), ids=COUNTER_EXAMPLES)
 def test_what_once_was_a_counter_example_is_none(session: RecordingSession, tmp_path: Path, program: Program) -> None:
     """Each was one until the grader, or the model, was corrected."""
     tmp_path.chmod(0o755)

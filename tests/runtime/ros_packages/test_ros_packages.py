@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tiers import NIGHTLY, but, more
 
 pytest.importorskip("rclpy")
 
@@ -581,8 +582,10 @@ PROGRAMS = {
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("clock", ["virtual", "wall"])
-@pytest.mark.parametrize(("program", "logged"), PROGRAMS.values(), ids=PROGRAMS)
+@pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
+@pytest.mark.parametrize(
+    ("program", "logged"), but([PROGRAMS["listener"], PROGRAMS["filters"]], PROGRAMS.values()), ids=PROGRAMS
+)
 def test_programs_use_them(tmp_path: Path, program: str, logged: list[str], clock: str) -> None:
     """As where ROS brings them, on both clocks."""
     file = tmp_path / "node.py"

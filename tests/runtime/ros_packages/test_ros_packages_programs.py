@@ -18,23 +18,24 @@ PROGRAMS = Path(__file__).parent / "programs"
 DURATION_NS = 60 * NS_PER_S
 FOLDERS = ("angles", "clouds", "filters", "images", "tf2")
 FILES = sorted(path.relative_to(PROGRAMS).as_posix() for path in PROGRAMS.rglob("*.py"))
-#: Those of the default run, on one clock each.
-DEFAULT = {
+#: Those of the default run.
+DEFAULT = {("images/red_ball.py", "auto"), ("tf2/awaiting.py", "auto")}
+#: Those that `--long` adds; all others run every night.
+LONG = {
     ("angles/yaw_of_odometry.py", "auto"),
     ("clouds/pass_through.py", "auto"),
     ("filters/near_stamps.py", "auto"),
     ("filters/without_headers.py", "wall"),
-    ("images/red_ball.py", "auto"),
-    ("tf2/awaiting.py", "auto"),
     ("tf2/own_thread.py", "auto"),
     ("tf2/waiting_in_a_callback.py", "wall"),
-}
+    *((file, "auto") for file in FILES[::5]),
+} - DEFAULT
 CASES = [
     pytest.param(
         file,
         clock,
         id=f"{file.removesuffix('.py')}-{clock}",
-        marks=() if (file, clock) in DEFAULT else pytest.mark.long if clock == "auto" else pytest.mark.nightly,
+        marks=() if (file, clock) in DEFAULT else pytest.mark.long if (file, clock) in LONG else pytest.mark.nightly,
     )
     for clock in ("auto", "wall")
     for file in FILES

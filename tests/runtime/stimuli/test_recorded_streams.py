@@ -14,6 +14,7 @@ import pytest
 from places import GRADE
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from tiers import NIGHTLY, each, more
 
 from grader.course.authoring.checking import check_rubric
 from grader.course.classroom.sending import checks_of
@@ -145,13 +146,16 @@ def grade(*words: object) -> dict[str, Any]:
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("clock", ["virtual", "wall"])
+@pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 @pytest.mark.parametrize(
     ("topic", "type_", "bag", "value", "band"),
-    [
-        ("/scan", SCAN, SCANS, "min(msg.ranges)", ("1.9", "3.1")),
-        ("/pose", POSE, POSES, "msg.pose.position.x", ("3.9", "5.1")),
-    ],
+    each(
+        [
+            ("/scan", SCAN, SCANS, "min(msg.ranges)", ("1.9", "3.1")),
+            ("/pose", POSE, POSES, "msg.pose.position.x", ("3.9", "5.1")),
+        ],
+        2,
+    ),
 )
 def test_a_node_gets_what_was_recorded(
     tmp_path: Path,
@@ -173,6 +177,7 @@ def test_a_node_gets_what_was_recorded(
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_another_recording_can_be_played(tmp_path: Path) -> None:
     """By its topic or its type; the report tells the command that plays it again."""
     rubric = course(tmp_path / "course")

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from decided import grade_until_decided
 from places import REPORTED
+from tiers import NIGHTLY, each, more
 
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.app.request import GradeRequest
@@ -357,14 +358,17 @@ rclpy.spin(Drive())
 
 @older
 @pytest.mark.ros
-@pytest.mark.parametrize("clock", ["auto", "wall"])
+@pytest.mark.parametrize("clock", ["auto", *more(["wall"], NIGHTLY)])
 @pytest.mark.parametrize(
     ("imports", "logs"),
-    [
-        ("", "self.get_logger().info(f'driving at {self.speeds['x']} m/s')"),
-        ("type Speed = float", "self.get_logger().info('driving')"),
-        ("from typing import override", "self.get_logger().info('driving')"),
-    ],
+    each(
+        [
+            ("", "self.get_logger().info(f'driving at {self.speeds['x']} m/s')"),
+            ("type Speed = float", "self.get_logger().info('driving')"),
+            ("from typing import override", "self.get_logger().info('driving')"),
+        ],
+        3,
+    ),
     ids=["f-string", "type", "library"],
 )
 def test_a_program_for_the_python_of_the_release_is_undecided(
@@ -391,7 +395,8 @@ def test_a_mistake_beside_it_costs_the_points(tmp_path: Path) -> None:
 
 @older
 @pytest.mark.ros
-@pytest.mark.parametrize("clock", ["virtual", "wall"])
+@pytest.mark.long
+@pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 def test_observe_says_it_too(clock: str) -> None:
     """As a note beside the fault."""
     summary = observe(ObserveRequest((REPORTED / "pep701.py",), NS_PER_S, clock=clock), lambda _: None)

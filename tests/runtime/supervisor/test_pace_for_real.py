@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tiers import LONG, NIGHTLY
 
 from grader.runtime.model.trace import ClockKind, Trace
 from grader.runtime.session import AUTO, CHARGED_NOTE, DRIFTS, VIRTUAL, RecordingSession
@@ -134,8 +135,8 @@ async def main():
 asyncio.run(main())
 """,
 }
-#: One of each kind is tested each time.
-ALWAYS = {"look", "asyncio", "deadline", "rest"}
+#: One of each kind is tested by default, and two with `--long`.
+ALWAYS, OFTEN = {"look", "deadline"}, {"asyncio", "rest"}
 Record = Callable[..., Trace]
 
 
@@ -157,7 +158,7 @@ def rate_hz(trace: Trace) -> float:
 
 
 def of_each(programs: dict[str, str]) -> list[object]:
-    marks = {name: () if name in ALWAYS else (pytest.mark.nightly,) for name in programs}
+    marks = {name: () if name in ALWAYS else (LONG,) if name in OFTEN else (NIGHTLY,) for name in programs}
     return [pytest.param(program, id=name, marks=marks[name]) for name, program in programs.items()]
 
 
@@ -178,6 +179,7 @@ def test_a_loop_that_sleeps_until_a_deadline_keeps_its_pace(run: Record, program
     assert f"{rate_hz(trace):.3f}" == "20.000"
 
 
+@pytest.mark.long
 def test_a_recording_in_virtual_time_is_the_same_each_time(run: Record) -> None:
     """To the microseconds that looks at clocks take."""
     program = """
@@ -196,6 +198,7 @@ def test_a_recording_in_virtual_time_is_the_same_each_time(run: Record) -> None:
     assert len({(s["sec"], s["nanosec"]) for s in stamps}) == len(stamps) > 90
 
 
+@pytest.mark.long
 @pytest.mark.rule(23)
 def test_time_passes_while_a_program_works_where_it_is_charged(run: Record) -> None:
     """The recording that decides: what a program publishes after its work comes later, and so does its next pause.

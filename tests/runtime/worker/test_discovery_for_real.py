@@ -6,20 +6,23 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tiers import NIGHTLY, but, more
 
 from grader.runtime.model.trace import OutputLine, Trace
+from grader.runtime.plan import Plan
 from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
 
-from hostile import record
+from hostile import planned, record
+from side_by_side import rows_of
 
 from grader.grading.judging.judge_run import unheard
 from grader.runtime.model.quantities import NS_PER_S
 
 pytestmark = pytest.mark.ros
 
-CLOCKS = pytest.mark.parametrize("clock", ["virtual", "wall"])
+CLOCKS = pytest.mark.parametrize("clock", ["virtual", *more(["wall"])])
 BEFORE = """
 import threading, time
 import rclpy
@@ -82,15 +85,19 @@ rclpy.spin(node)
 }
 
 
+#: Two seconds from the first message on: a busy machine takes long to get there.
+USUAL: dict[str, Any] = {"duration_ns": 2 * NS_PER_S, "first_message_on": "/count"}
+#: Those that are recorded on the wall clock with `--long`; the others are every night.
+ON_THE_WALL = ("at once", "beside a spinning thread", "from a timer", "latched")
+
+
 @pytest.fixture
 def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     tmp_path.chmod(0o755)
 
     def run_all(*programs: str, clock: str, **fields: Any) -> Trace:
         whole = [BEFORE + textwrap.dedent(program) for program in programs]
-        # Two seconds from the first message on: a busy machine takes long to get there.
-        usual: dict[str, Any] = {"duration_ns": 2 * NS_PER_S, "first_message_on": "/count"}
-        trace = record(session, tmp_path / "s", *whole, clock=clock, **{**usual, **fields})
+        trace = record(session, tmp_path / "s", *whole, clock=clock, **{**USUAL, **fields})
         assert trace.harness_problem == ""
         return trace
 
@@ -102,20 +109,33 @@ def early(trace: Trace) -> list[bool]:
     return [message.before_discovery for message in trace.messages("/count")]
 
 
-@CLOCKS
-@pytest.mark.parametrize("program", EARLY.values(), ids=EARLY)
-def test_a_message_without_a_wait_is_early(run: Callable[..., Trace], clock: str, program: str) -> None:
+def plan(folder: Path, program: str, clock: str) -> Plan:
+    return planned(folder, BEFORE + textwrap.dedent({**EARLY, **HEARD}[program]), clock=clock, **USUAL)
+
+
+def rows(programs: dict[str, str], default: str) -> Any:
+    """Return a mark: each program on each clock."""
+    virtual = but([(default, "virtual")], [(name, "virtual") for name in programs])
+    wall = [(name, "wall") for name in programs]
+    often, others = ([row for row in wall if (row[0] in ON_THE_WALL) is kept] for kept in (True, False))
+    return pytest.mark.parametrize(("program", "clock"), [*virtual, *more(often), *more(others, NIGHTLY)])
+
+
+@rows_of(plan)
+@rows(EARLY, "beside a spinning thread")
+def test_a_message_without_a_wait_is_early(trace: Trace, program: str, clock: str) -> None:
     """Only the first: those that come after a wait are heard."""
-    found = early(run(program, clock=clock))
+    assert trace.harness_problem == ""
+    found = early(trace)
     assert found[0]
     assert not any(found[1:])
 
 
-@CLOCKS
-@pytest.mark.parametrize("program", HEARD.values(), ids=HEARD)
-def test_a_message_after_a_wait_is_not(run: Callable[..., Trace], clock: str, program: str) -> None:
+@rows_of(plan)
+@rows(HEARD, "once there is a subscription")
+def test_a_message_after_a_wait_is_not(trace: Trace, program: str, clock: str) -> None:
     """Whatever the program has waited for; and nothing is said of it."""
-    trace = run(program, clock=clock)
+    assert trace.harness_problem == ""
     assert early(trace)
     assert not any(early(trace))
     assert unheard(trace) == ()
@@ -138,6 +158,7 @@ def test_what_a_message_of_the_same_instant_causes_is_not_early(run: Callable[..
     assert [(m.t_ns, m.before_discovery) for m in trace.messages("/asked")] == [(0, True)]
 
 
+@pytest.mark.long
 def test_a_found_server_is_a_wait(run: Callable[..., Trace]) -> None:
     """On a real clock the program itself is discovered meanwhile; in virtual time the server is there at once."""
     serving = """
@@ -154,6 +175,7 @@ def test_a_found_server_is_a_wait(run: Callable[..., Trace]) -> None:
     assert early(run(serving, asking, clock="virtual")) == [False]
 
 
+@pytest.mark.long
 def test_long_work_is_a_wait(run: Callable[..., Trace]) -> None:
     """Virtual time stands still meanwhile, discovery would not."""
     working = """
@@ -181,6 +203,7 @@ def test_all_of_a_burst_is_early(run: Callable[..., Trace], clock: str) -> None:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("paces", ["node.create_timer(9, send)", "node.create_rate(10)", "rclpy.spin_once(node)"])
 def test_a_timer_begins_after_the_publishers_are_heard(run: Callable[..., Trace], paces: str) -> None:
     """On the wall clock a timer that began before would send late once and in time the next time."""

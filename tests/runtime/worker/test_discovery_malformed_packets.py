@@ -81,6 +81,7 @@ def sender(packets: list[bytes]) -> str:
     return hostile(before=f"PACKETS = {packets!r}", later=SENDS)
 
 
+@pytest.mark.long
 def test_malformed_packets_cost_only_their_sender(run: Callable[..., Any]) -> None:
     """It may lose its own messages, or end at a limit; the next submission gets what it deserves."""
     packets = mutants(BODIES)

@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from tiers import each
 
 START = """
 import sys
@@ -38,15 +39,18 @@ def test_messages_without_arrays_do_without_it() -> None:
 @pytest.mark.ros
 @pytest.mark.parametrize(
     "text",
-    [
-        "print(type(PoseWithCovariance().covariance).__name__, loaded())",
-        "cdr = serialize_message(PoseWithCovariance(covariance=[1.0] * 36))\n"
-        "print(type(deserialize_message(cdr, PoseWithCovariance).covariance).__name__, loaded())",
-        "import numpy as np\nprint(np.ndarray.__name__, loaded())",
-        "from numpy import ndarray\nprint(ndarray.__name__, loaded())",
-        "import numpy.linalg, numpy\nprint(numpy.ndarray.__name__, numpy.linalg is sys.modules['numpy.linalg'])",
-        "late_numpy.load()\nprint('ndarray', loaded())",
-    ],
+    each(
+        [
+            "print(type(PoseWithCovariance().covariance).__name__, loaded())",
+            "cdr = serialize_message(PoseWithCovariance(covariance=[1.0] * 36))\n"
+            "print(type(deserialize_message(cdr, PoseWithCovariance).covariance).__name__, loaded())",
+            "import numpy as np\nprint(np.ndarray.__name__, loaded())",
+            "from numpy import ndarray\nprint(ndarray.__name__, loaded())",
+            "import numpy.linalg, numpy\nprint(numpy.ndarray.__name__, numpy.linalg is sys.modules['numpy.linalg'])",
+            "late_numpy.load()\nprint('ndarray', loaded())",
+        ],
+        6,
+    ),
 )
 def test_whatever_uses_it_finds_all_of_it(text: str) -> None:
     """A field, a message from elsewhere, and every way to import it."""
@@ -54,6 +58,7 @@ def test_whatever_uses_it_finds_all_of_it(text: str) -> None:
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_a_name_that_it_lacks_is_missing() -> None:
     """With numpy's own words."""
     assert "has no attribute 'nothing'" in run(

@@ -7,10 +7,12 @@ import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from decided import grade_until_decided
 from places import TESTS
+from tiers import LONG, NIGHTLY, but, each, more
 
 from grader.grading.app.request import GradeRequest
 from grader.grading.model.exercise import Outcome
@@ -65,6 +67,7 @@ def test_a_launch_file_starts_its_nodes(graded: Callable[..., ExerciseReport]) -
     assert {start.process for start in report.starts} == {"robot.launch.py"}
 
 
+@pytest.mark.long
 def test_the_wall_clock_starts_the_same(graded: Callable[..., ExerciseReport], tmp_path: Path) -> None:
     """The same command lines, in real time, where a busy machine delays some of the few messages."""
     text = (HERE / "rubrics" / "launched.yaml").read_text()
@@ -92,6 +95,7 @@ def test_an_executable_that_is_not_there_is_a_fault(graded: Callable[..., Exerci
     assert "executable 'talk' not found; its executables are talker, listener" in fault.text
 
 
+@pytest.mark.long
 def test_what_is_left_out_costs_no_points(graded: Callable[..., ExerciseReport]) -> None:
     """What is not met is undecided, because what was left out may be why; a viewer changes nothing."""
     node = 'Node(package="turtle_sim", executable="node"),'
@@ -120,9 +124,14 @@ def with_command(command: str) -> tuple[Edit, ...]:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command",
-    ["['true']", "['/bin/sleep', '5']", "['rviz2', '-d', 'a.rviz']", "['gz', 'sim']", "['ros2 topic echo /talk']"],
+    but(
+        ["['true']", "['rviz2', '-d', 'a.rviz']"],
+        ["['true']", "['/bin/sleep', '5']", "['rviz2', '-d', 'a.rviz']", "['gz', 'sim']", "['ros2 topic echo /talk']"],
+        NIGHTLY,
+    ),
 )
 def test_a_command_that_takes_no_part_in_the_graph_excuses_nothing(
     graded: Callable[..., ExerciseReport], command: str
@@ -135,7 +144,11 @@ def test_a_command_that_takes_no_part_in_the_graph_excuses_nothing(
 
 @pytest.mark.parametrize(
     "command",
-    ["['ros2', 'param', 'set', '/talker', 'rate', '4.0']", "['bash', '-c', 'true']", "['echo', 'a; ros2']"],
+    each(
+        ["['ros2', 'param', 'set', '/talker', 'rate', '4.0']", "['bash', '-c', 'true']", "['echo', 'a; ros2']"],
+        3,
+        NIGHTLY,
+    ),
 )
 def test_a_command_that_may_take_part_leaves_a_criterion_undecided(
     graded: Callable[..., ExerciseReport], command: str
@@ -144,14 +157,19 @@ def test_a_command_that_may_take_part_leaves_a_criterion_undecided(
     assert outcomes(graded(*with_command(command)))["names"] == "undecided"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("command", "expected"),
-    [
-        ("['ros2', 'topic', 'pub', '/else', 'std_msgs/msg/String', '{data: x}']", "not_met"),
-        ("['ros2', 'topic', 'pub', '-r', '4', '/talk', 'std_msgs/msg/String', '{data: x}']", "not_met"),
-        ("['ros2', 'topic', 'pub', '/ears/heard', 'std_msgs/msg/String']", "undecided"),
-        ("['ros2', 'bag', 'play', 'recording']", "undecided"),
-    ],
+    each(
+        [
+            ("['ros2', 'topic', 'pub', '/else', 'std_msgs/msg/String', '{data: x}']", "not_met"),
+            ("['ros2', 'topic', 'pub', '-r', '4', '/talk', 'std_msgs/msg/String', '{data: x}']", "not_met"),
+            ("['ros2', 'topic', 'pub', '/ears/heard', 'std_msgs/msg/String']", "undecided"),
+            ("['ros2', 'bag', 'play', 'recording']", "undecided"),
+        ],
+        2,
+        NIGHTLY,
+    ),
 )
 def test_a_command_for_one_topic_explains_no_other(
     graded: Callable[..., ExerciseReport], command: str, expected: str
@@ -167,7 +185,8 @@ def test_a_command_for_one_topic_explains_no_other(
 BREAKS = "import sys\nsys.modules['_grader_host.launch_files'].DEEPEST = None\n"
 
 
-@pytest.mark.parametrize("clock", ["virtual", "wall"])
+@pytest.mark.long
+@pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 def test_a_mistake_of_the_evaluator_costs_no_points(graded: Callable[..., ExerciseReport], clock: str) -> None:
     """Everything is undecided, with a line for a bug report, and there is no fault."""
     report = graded((LAUNCH, "import os\n", f"import os\n{BREAKS}"), clock=clock)
@@ -182,6 +201,7 @@ def test_a_mistake_of_the_evaluator_costs_no_points(graded: Callable[..., Exerci
         assert "please report this line" in verdict.reason
 
 
+@pytest.mark.long
 def test_a_misspelt_package_is_a_fault(graded: Callable[..., ExerciseReport]) -> None:
     """`ros2 launch` refuses it, although a program of that name is there."""
     report = graded((LAUNCH, 'package="robot"', 'package="robto"'))
@@ -191,6 +211,7 @@ def test_a_misspelt_package_is_a_fault(graded: Callable[..., ExerciseReport]) ->
     assert fault.text == 'PackageNotFoundError: package "robto" not found; the submission has robot'
 
 
+@pytest.mark.long
 def test_a_program_that_cmake_builds_costs_no_points(graded: Callable[..., ExerciseReport], tmp_path: Path) -> None:
     """The Python nodes beside it start."""
     drive = tmp_path / "ws" / "src" / "drive_cpp"
@@ -205,6 +226,7 @@ def test_a_program_that_cmake_builds_costs_no_points(graded: Callable[..., Exerc
     assert said in report.notes
 
 
+@pytest.mark.long
 def test_any_name_that_ends_in_launch_py_is_a_launch_file(
     graded: Callable[..., ExerciseReport], tmp_path: Path
 ) -> None:
@@ -234,7 +256,13 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize(("harm", "said"), HOSTILE.values(), ids=HOSTILE)
+def row(name: str, values: tuple[str, str]) -> Any:
+    """Return one harm: one is done by default, and three more with `--long`."""
+    often = ("raises", "forks", "no_description")
+    return pytest.param(*values, marks=[] if name == "exits_hard" else LONG if name in often else NIGHTLY)
+
+
+@pytest.mark.parametrize(("harm", "said"), [row(name, values) for name, values in HOSTILE.items()], ids=HOSTILE)
 def test_a_launch_file_that_does_harm_is_a_fault(graded: Callable[..., ExerciseReport], harm: str, said: str) -> None:
     """It ends in its sandbox, and costs what it describes nothing of."""
     report = graded((LAUNCH, '    share = get_package_share_directory("robot")\n', f"    {harm}\n    share = ''\n"))
@@ -264,8 +292,8 @@ OUTSIDE = [
 ]
 
 
-@pytest.mark.parametrize("executable", OUTSIDE)
-@pytest.mark.parametrize("package", ["robot", "elsewhere"])
+@pytest.mark.parametrize("executable", each(OUTSIDE, len(OUTSIDE), NIGHTLY))
+@pytest.mark.parametrize("package", ["robot", *more(["elsewhere"])])
 def test_a_launch_file_starts_nothing_outside_of_the_submission(
     graded: Callable[..., ExerciseReport], package: str, executable: str
 ) -> None:
@@ -289,7 +317,8 @@ WORDS = [
 ]
 
 
-@pytest.mark.parametrize("words", WORDS, ids=lambda words: words.get("code", "none"))
+@pytest.mark.long
+@pytest.mark.parametrize("words", each(WORDS, 5, NIGHTLY), ids=lambda words: words.get("code", "none"))
 def test_a_launch_file_says_nothing_in_the_graders_voice(
     graded: Callable[..., ExerciseReport], words: dict[str, str]
 ) -> None:
@@ -306,6 +335,7 @@ def test_a_launch_file_says_nothing_in_the_graders_voice(
         assert FORGED not in re.sub(r'"[^"]*"', "", text), text
 
 
+@pytest.mark.long
 def test_the_evaluation_of_a_launch_file_is_part_of_the_time_budget(graded: Callable[..., ExerciseReport]) -> None:
     """A launch file that sleeps has used it up; one that takes its time leaves less of it."""
     sleep = (
@@ -320,6 +350,7 @@ def test_the_evaluation_of_a_launch_file_is_part_of_the_time_budget(graded: Call
         assert {fault.text for fault in report.faults} == {words}
 
 
+@pytest.mark.long
 def test_arguments_without_end_are_a_fault_of_the_launch_file(graded: Callable[..., ExerciseReport]) -> None:
     """No process could be started with them."""
     node = "Node(package='robot', executable='talker', arguments=['x' * 900] * 100),"
@@ -336,6 +367,7 @@ def test_an_endless_launch_file_is_ended(graded: Callable[..., ExerciseReport]) 
     assert "did not return within 10 s of processor time" in report.faults[0].text
 
 
+@pytest.mark.long
 def test_executables_are_found_by_their_names(graded: Callable[..., ExerciseReport]) -> None:
     """Two of one module, each by its own entry point."""
     assert set(outcomes(graded(rubric="installed.yaml")).values()) == {"met"}

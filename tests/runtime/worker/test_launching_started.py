@@ -46,6 +46,7 @@ def test_what_a_program_is_started_with_reaches_it() -> None:
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_a_bare_process_is_started_with_the_same() -> None:
     """A spot check would find any difference between the clocks, and say so."""
     request = GradeRequest(str(HERE / "right"), rubrics=(RUBRIC,), clock="auto", spot_checks=1.0)
@@ -55,6 +56,7 @@ def test_a_bare_process_is_started_with_the_same() -> None:
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_a_missing_parameter_file_is_missing(tmp_path: Path) -> None:
     """Only what needs it is lost."""
     (tmp_path / "talker.py").write_text("x = 1\n")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tiers import each
 
 from grader.runtime.model.trace import Trace
 from grader.runtime.session import RecordingSession
@@ -58,6 +59,7 @@ def test_filled_memory_is_told_as_memory(run: Callable[..., Trace]) -> None:
     assert trace.stop_ns == 10 * NS_PER_S
 
 
+@pytest.mark.long
 def test_memory_of_children_counts(run: Callable[..., Trace]) -> None:
     """Several processes below the limit are together above it."""
     trace = run(
@@ -74,15 +76,18 @@ def test_memory_of_children_counts(run: Callable[..., Trace]) -> None:
 
 @pytest.mark.parametrize(
     ("harm", "said"),
-    [
-        ("bytearray(1 << 34)", "MemoryError (the limit is 512 MiB of memory)"),
-        (
-            "for _ in range(1000): threading.Thread(target=time.sleep, args=(999,), daemon=True).start()",
-            "(the limit is 64 processes and threads)",
-        ),
-        ("self.files = [open('/dev/null') for _ in range(1000)]", "(the limit is 128 open files)"),
-        ("open('/tmp/x', 'wb').write(bytes(9 << 20))", "(the limit is 3 MiB in one file)"),
-    ],
+    each(
+        [
+            ("bytearray(1 << 34)", "MemoryError (the limit is 512 MiB of memory)"),
+            (
+                "for _ in range(1000): threading.Thread(target=time.sleep, args=(999,), daemon=True).start()",
+                "(the limit is 64 processes and threads)",
+            ),
+            ("self.files = [open('/dev/null') for _ in range(1000)]", "(the limit is 128 open files)"),
+            ("open('/tmp/x', 'wb').write(bytes(9 << 20))", "(the limit is 3 MiB in one file)"),
+        ],
+        4,
+    ),
 )
 def test_an_error_at_a_limit_names_it_and_the_line(run: Callable[..., Trace], harm: str, said: str) -> None:
     """Python's own words say nothing to a beginner."""
@@ -92,17 +97,20 @@ def test_an_error_at_a_limit_names_it_and_the_line(run: Callable[..., Trace], ha
     assert len(trace.messages("/cmd_vel")) >= 39
 
 
+@pytest.mark.long
 def test_a_full_folder_is_told(run: Callable[..., Trace]) -> None:
     """Many files below the limit of one file fill a folder too."""
     trace = run("for n in range(9): open(f'/tmp/{n}', 'wb').write(bytes(4 << 20))")
     assert words(trace).endswith("(the limit is 16 MiB in one folder)")
 
 
+@pytest.mark.long
 def test_processor_time_is_told_as_such(run: Callable[..., Trace]) -> None:
     """Counted by the system, not by what the program says."""
     assert words(run("while True: pass", Limits(processor_ns=2 * NS_PER_S))) == "stopped at 2 s of processor time"
 
 
+@pytest.mark.long
 def test_real_time_is_told_as_such(run: Callable[..., Trace]) -> None:
     """A node that keeps the grader waiting is at fault itself, unless the machine gave it no time."""
     trace = run("time.sleep(99)", Limits(wall_ns=5 * NS_PER_S), busy=True, clock="wall")
@@ -119,6 +127,7 @@ def test_a_flood_of_messages_ends_the_recording_in_words(run: Callable[..., Trac
     assert BEGIN_NS <= trace.stop_ns < 10 * NS_PER_S
 
 
+@pytest.mark.long
 def test_a_large_message_is_counted_but_not_read(run: Callable[..., Trace]) -> None:
     """Its time and topic are evidence, its five megabytes are nobody's; everything else goes on."""
     trace = run(
@@ -133,6 +142,7 @@ def test_a_large_message_is_counted_but_not_read(run: Callable[..., Trace]) -> N
     assert trace.notes == ("/big: the content of messages larger than 32 KiB was ignored (1 in all)",)
 
 
+@pytest.mark.long
 def test_output_without_end_is_cut_and_the_run_goes_on(run: Callable[..., Trace]) -> None:
     """A gigabyte costs the student nothing but the output."""
     trace = run("for _ in range(1000): os.write(1, b'y\\n' * (1 << 19))", Limits(output_bytes=MIB, lines=1000))
@@ -142,6 +152,7 @@ def test_output_without_end_is_cut_and_the_run_goes_on(run: Callable[..., Trace]
     assert f"a.py: more than 1,000 lines and log records: {REST}" in trace.notes
 
 
+@pytest.mark.long
 def test_log_records_without_end_are_cut_and_the_run_goes_on(run: Callable[..., Trace]) -> None:
     """Records count as lines do."""
     trace = run("for n in range(3000): self.get_logger().info(str(n))", Limits(lines=1000))
@@ -149,6 +160,7 @@ def test_log_records_without_end_are_cut_and_the_run_goes_on(run: Callable[..., 
     assert len(trace.messages("/cmd_vel")) == 199
 
 
+@pytest.mark.long
 def test_participants_without_end_are_told(run: Callable[..., Trace]) -> None:
     """A process may have several contexts, and not any number of them."""
     trace = run(
@@ -164,6 +176,7 @@ def test_participants_without_end_are_told(run: Callable[..., Trace]) -> None:
     assert [mark.detail for mark in trace.marks("limit")] == [f"more than 4 DDS participants: {REST}"]
 
 
+@pytest.mark.long
 def test_a_hundred_and_fifty_participants_are_ended_by_their_threads(run: Callable[..., Trace]) -> None:
     """Each brings a dozen of them; the C++ below aborts, and the fault says at which limit."""
     trace = run(

@@ -11,6 +11,7 @@ import pytest
 from hostile import HOST_LINE
 from hypothesis import given
 from hypothesis import strategies as st
+from tiers import NIGHTLY, each, more
 
 pytest.importorskip("rclpy", reason="needs rclpy")
 
@@ -106,8 +107,8 @@ FORGED = ["//bad__name/", "/1", "/a//b", "/a/", "/" + "a" * 250]
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("name", FORGED)
-@pytest.mark.parametrize("kind", ["client", "service"])
+@pytest.mark.parametrize("name", each(FORGED, len(FORGED)))
+@pytest.mark.parametrize("kind", ["client", *more(["service"], NIGHTLY)])
 def test_a_forged_claim_costs_nobody_a_verdict(run: Callable[..., Trace], kind: str, name: str) -> None:
     """The recording goes on, and so does the right node beside it."""
     claim = {"kind": kind, "name": name, "type": "std_srvs/srv/Trigger"}
@@ -149,7 +150,8 @@ def of_types(first: int, end: int) -> str:
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("clock", ["virtual", "wall"])
+@pytest.mark.long
+@pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 def test_too_many_types_on_a_topic_are_a_limit_of_the_node(run: Callable[..., Trace], clock: str) -> None:
     """Which is judged; no failure of the grader."""
     trace: Any = run(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from decided import grade_until_decided, verdicts
+from tiers import each
 
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.start import grade
@@ -169,6 +170,7 @@ rclpy.spin(node)
 """
 
 
+@pytest.mark.long
 def test_a_turtle_has_the_messages_of_turtlesim(tmp_path: Path) -> None:
     """They come with the grader, also for the student's node."""
     made = request(tmp_path, follow=DRIVER)
@@ -186,12 +188,15 @@ def test_a_loop_is_closed_on_the_wall_clock(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("old", "new", "told"),
-    [
-        ("        self.speed = message", "        self.speed = 1 / 0 or message", "ZeroDivisionError"),
-        ('"/echo", {"data": self.speed}', '"/echo", {"date": self.speed}', "expected a field of std_msgs/Float64"),
-        ('"/echo", {"data": self.speed}', '"/ecko", {"data": self.speed}', "expected a topic that it publishes on"),
-        ("        return [(", "        while True: pass\n        return [(", "the call took more than"),
-    ],
+    each(
+        [
+            ("        self.speed = message", "        self.speed = 1 / 0 or message", "ZeroDivisionError"),
+            ('"/echo", {"data": self.speed}', '"/echo", {"date": self.speed}', "expected a field of std_msgs/Float64"),
+            ('"/echo", {"data": self.speed}', '"/ecko", {"data": self.speed}', "expected a topic that it publishes on"),
+            ("        return [(", "        while True: pass\n        return [(", "the call took more than"),
+        ],
+        4,
+    ),
 )
 def test_an_error_in_a_simulation_leaves_all_undecided(tmp_path: Path, old: str, new: str, told: str) -> None:
     """It arises only once the student's node has said something, so that reading the rubric could not find it."""
@@ -202,6 +207,7 @@ def test_an_error_in_a_simulation_leaves_all_undecided(tmp_path: Path, old: str,
         assert told in verdict.reason
 
 
+@pytest.mark.long
 def test_a_node_that_floods_a_simulation_is_at_fault_itself(tmp_path: Path) -> None:
     """The recording ends at its limit, and is judged."""
     report = grade(request(tmp_path, follow=FLOOD), lambda _: None, pictures=False)

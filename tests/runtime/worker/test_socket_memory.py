@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from hostile import hostile, record
+from tiers import each
 
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import KIB, MIB, NS_PER_S
@@ -193,13 +194,16 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
 @pytest.mark.ros
 @pytest.mark.parametrize(
     ("harm", "words"),
-    [
-        (PAIRS_IN_CHILDREN, ("128 MiB of memory in sockets and pipes", "500 open sockets")),
-        (NOT_ACCEPTED, ("128 MiB of memory in sockets and pipes",)),
-        (UDP, ("128 MiB of memory in sockets and pipes", "500 open sockets")),
-        (PIPES, ("250 open pipes",)),
-        (TCP, ("128 MiB of memory in sockets and pipes",)),
-    ],
+    each(
+        [
+            (PAIRS_IN_CHILDREN, ("128 MiB of memory in sockets and pipes", "500 open sockets")),
+            (NOT_ACCEPTED, ("128 MiB of memory in sockets and pipes",)),
+            (UDP, ("128 MiB of memory in sockets and pipes", "500 open sockets")),
+            (PIPES, ("250 open pipes",)),
+            (TCP, ("128 MiB of memory in sockets and pipes",)),
+        ],
+        5,
+    ),
     ids=["pairs", "not accepted", "UDP", "pipes", "TCP"],
 )
 def test_memory_in_sockets_and_pipes_ends_the_node(
@@ -216,6 +220,7 @@ def test_memory_in_sockets_and_pipes_ends_the_node(
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_a_node_beside_it_goes_on(run: Callable[..., Trace]) -> None:
     """Memory is charged to the one that holds it."""
     other = hostile().replace("/cmd_vel", "/other").replace("velocity_publisher", "other")
@@ -225,6 +230,7 @@ def test_a_node_beside_it_goes_on(run: Callable[..., Trace]) -> None:
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_what_a_large_honest_node_needs_is_far_from_the_limits(run: Callable[..., Trace]) -> None:
     """Loops, child processes with pipes, and a hundred sockets."""
     trace = run(

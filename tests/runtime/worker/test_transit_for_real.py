@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from rosbags.highlevel import AnyReader
+from tiers import more
 
 from grader.cli import main
 
@@ -84,6 +85,7 @@ def arrivals(evidence: Path, topic: str = "/target") -> list[tuple[int, float]]:
         return [((at - reader.start_time) // 1_000_000, data) for at, data in found]
 
 
+@pytest.mark.long
 def test_who_copes_with_lost_messages_keeps_the_point(tmp_path: Path) -> None:
     """The evidence holds what arrived; judged again it gives the same report. Another seed loses others."""
     copes, evidence = grade(tmp_path, COPES, "copes")
@@ -105,6 +107,7 @@ def test_who_copes_with_lost_messages_keeps_the_point(tmp_path: Path) -> None:
     assert arrivals(different) != found
 
 
+@pytest.mark.long
 def test_without_the_condition_both_keep_it(tmp_path: Path) -> None:
     """The echo loses its point by the losses alone."""
     perfect, _, rest = RUBRIC.partition("    connections:")
@@ -123,7 +126,9 @@ TWO_STREAMS = """\
 """
 
 
-@pytest.mark.parametrize("delay", ["", "    connections: [{topic: /target, delay: 800 ms}]\n"], ids=["at once", "late"])
+@pytest.mark.parametrize(
+    "delay", [*more([""]), "    connections: [{topic: /target, delay: 800 ms}]\n"], ids=["at once", "late"]
+)
 def test_a_publisher_leaves_after_its_last_message(tmp_path: Path, delay: str) -> None:
     """Also if another one follows on the topic before: every message arrives."""
     head, _, rest = RUBRIC.partition("    stimuli:")

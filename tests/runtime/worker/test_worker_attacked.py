@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from hostile import HOST_LINE
+from tiers import NIGHTLY, but, each, more
 
 from grader.runtime.model.trace import Trace
 from grader.runtime.session import RecordingSession
@@ -90,7 +91,12 @@ JUNK = ["send(b'x' * 100 + b'\\n')", "send(b'[' * 100000 + b'\\n')", "send(b'\\x
 
 
 @pytest.mark.parametrize(
-    ("said", "clock"), [*((said, "virtual") for said in (*FLOODS, *JUNK)), *((said, "wall") for said in FLOODS)]
+    ("said", "clock"),
+    [
+        *but([(JUNK[1], "virtual")], [(said, "virtual") for said in (*FLOODS, *JUNK)]),
+        *more([(FLOODS[0], "wall")]),
+        *more([(said, "wall") for said in FLOODS[1:]], NIGHTLY),
+    ],
 )
 def test_junk_on_the_line_ends_the_process_that_sent_it(run: Callable[..., Trace], said: str, clock: str) -> None:
     """Not JSON, too deep, too much: its process is ended, and everybody else goes on."""
@@ -103,13 +109,16 @@ def test_junk_on_the_line_ends_the_process_that_sent_it(run: Callable[..., Trace
 
 @pytest.mark.parametrize(
     "report",
-    [
-        '{"kind": "note", "text": "x", "now_ns": 1e400, "cpu_ns": NaN}',
-        '{"kind": "note", "text": "x", "now_ns": -99999999999999999999999999}',
-        '{"kind": "note", "text": {"a": []}, "sent": {"topic /cmd_vel": 1e308}}',
-        '{"kind": "fault", "text": [1], "file": {}, "line": 1e300, "frames": [[]], "t_ns": 99}',
-        '{"kind": "fault", "text": "' + "x" * 100_000 + '", "line": 999999999999999999999}',
-    ],
+    each(
+        [
+            '{"kind": "note", "text": "x", "now_ns": 1e400, "cpu_ns": NaN}',
+            '{"kind": "note", "text": "x", "now_ns": -99999999999999999999999999}',
+            '{"kind": "note", "text": {"a": []}, "sent": {"topic /cmd_vel": 1e308}}',
+            '{"kind": "fault", "text": [1], "file": {}, "line": 1e300, "frames": [[]], "t_ns": 99}',
+            '{"kind": "fault", "text": "' + "x" * 100_000 + '", "line": 999999999999999999999}',
+        ],
+        5,
+    ),
 )
 def test_absurd_reports_change_nothing_that_counts(run: Callable[..., Trace], report: str) -> None:
     """Times, counts and places of a report are bounded before they are used; messages are those that came."""
@@ -118,6 +127,7 @@ def test_absurd_reports_change_nothing_that_counts(run: Callable[..., Trace], re
     assert all(len(o.text) <= 500 and 0 <= o.t_ns <= 10 * NS_PER_S for o in trace.faults())
 
 
+@pytest.mark.long
 def test_a_report_of_the_far_future_only_ends_the_senders_own_time(run: Callable[..., Trace]) -> None:
     """Its process sleeps for ever, as it asked; the other one is stepped as before."""
     report = (
@@ -131,6 +141,7 @@ def test_a_report_of_the_far_future_only_ends_the_senders_own_time(run: Callable
     assert len(trace.messages("/cmd_vel")) <= 199
 
 
+@pytest.mark.long
 def test_hidden_work_is_charged(run: Callable[..., Trace]) -> None:
     """A program that has its host say that it computes nothing is for the wall clock all the same."""
     lie = "import _grader_host.virtual as virtual\nvirtual.VirtualTime._charge = lambda self: None"
@@ -151,6 +162,7 @@ def test_bytes_that_are_no_message_have_no_content(run: Callable[..., Trace]) ->
     )
 
 
+@pytest.mark.long
 def test_garbage_on_the_ports_disturbs_nobody(run: Callable[..., Trace]) -> None:
     """Random bytes, some with the beginning of RTPS, as fast as a process can send them."""
     harm = """
@@ -176,6 +188,7 @@ while True:
     assert len(run(hostile(harm=harm)).messages("/cmd_vel")) == 199
 
 
+@pytest.mark.long
 def test_a_clock_and_events_of_somebody_else_change_nothing(run: Callable[..., Trace]) -> None:
     """The grader's node follows no /clock, and believes no parameter event."""
     harm = """
@@ -197,6 +210,7 @@ def test_a_clock_and_events_of_somebody_else_change_nothing(run: Callable[..., T
     assert {b - a for a, b in pairwise(times)} == {50 * MS}
 
 
+@pytest.mark.long
 def test_the_graders_node_offers_nothing_to_call(run: Callable[..., Trace]) -> None:
     """No parameters, no log levels, no descriptions of types: what is not there cannot be called."""
     later = """
@@ -208,6 +222,7 @@ def test_the_graders_node_offers_nothing_to_call(run: Callable[..., Trace]) -> N
     assert [line.text for line in run(hostile(later=later)).lines()] == ["_ros2cli_ []"]
 
 
+@pytest.mark.long
 def test_the_graders_name_gives_no_power(run: Callable[..., Trace]) -> None:
     """A node of the same name hides from the graph, which helps nobody; its messages count as everybody's."""
     later = """
@@ -263,6 +278,7 @@ print(len(self.get_node_names()), flush=True)
     assert len(trace.messages("/cmd_vel")) <= 59
 
 
+@pytest.mark.long
 def test_a_flood_on_the_wall_clock_is_a_limit_and_no_failure_of_the_machine(run: Callable[..., Trace]) -> None:
     """The reference beside the nodes is not held up by what they send."""
     flood = hostile(
@@ -278,6 +294,7 @@ def test_a_flood_on_the_wall_clock_is_a_limit_and_no_failure_of_the_machine(run:
     ]
 
 
+@pytest.mark.long
 def test_a_flood_of_giants_leaves_the_grader_standing(run: Callable[..., Trace]) -> None:
     """Six megabytes at a time; each is counted, none is kept."""
     harm = (
@@ -291,7 +308,8 @@ def test_a_flood_of_giants_leaves_the_grader_standing(run: Callable[..., Trace])
     assert len(trace.messages("/cmd_vel")) == 39
 
 
-@pytest.mark.parametrize("clock", ["wall", "virtual"])
+@pytest.mark.long
+@pytest.mark.parametrize("clock", [*more(["wall"], NIGHTLY), "virtual"])
 def test_nobody_is_waited_for_in_another_domain(session: RecordingSession, tmp_path: Path, clock: str) -> None:
     """A message waits for its subscription to be matched; where the grader is not, there will be none."""
     tmp_path.chmod(0o755)
@@ -319,6 +337,7 @@ if self.count == 20:
 """
 
 
+@pytest.mark.long
 def test_a_gap_over_millions_of_messages_does_not_fill_the_grader(run: Callable[..., Trace]) -> None:
     """The middleware would note each of them: the worker is ended, and what brings two of them there is the node."""
     most_bytes = 0
@@ -399,6 +418,11 @@ def workers_of(pid: int, *, starting: bool = True) -> list[int]:
     return [p for p in found if pid in ancestors(p)]
 
 
+def workers_beside(others: set[int], *, starting: bool = True) -> list[int]:
+    """Return the workers below this process that are none of the others, which other sessions have, nor below one."""
+    return [p for p in workers_of(os.getpid(), starting=starting) if others.isdisjoint((p, *ancestors(p)))]
+
+
 def ancestors(pid: int) -> list[int]:
     """Return the processes above a process."""
     above = []
@@ -414,13 +438,14 @@ def ancestors(pid: int) -> list[int]:
 def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path: Path) -> None:
     """Its scenario is recorded again by another worker; what a killed one had is gone with it."""
     tmp_path.chmod(0o755)
+    others = {*workers_of(os.getpid())}
     with open_session("auto") as opened:
         session = staging(opened)
         killed = threading.Event()
 
         def kill() -> None:
             while not killed.wait(0.05):
-                if (tmp_path / "s" / "a.py").exists() and (workers := workers_of(os.getpid(), starting=False)):
+                if (tmp_path / "s" / "a.py").exists() and (workers := workers_beside(others, starting=False)):
                     killed.set()
                     os.killpg(os.getpgid(workers[0]), signal.SIGKILL)
 
@@ -433,16 +458,18 @@ def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path: Path) -> None:
     assert len(trace.messages("/cmd_vel")) == 199
 
 
+@pytest.mark.long
 def test_a_worker_that_is_always_killed_decides_nothing(tmp_path: Path) -> None:
     """No trace, no marks: a problem of ours."""
     tmp_path.chmod(0o755)
+    others = {*workers_of(os.getpid())}
     with open_session("auto") as opened:
         session = staging(opened)
         done = threading.Event()
 
         def kill() -> None:
             while not done.wait(0.02):
-                for worker in workers_of(os.getpid(), starting=False):
+                for worker in workers_beside(others, starting=False):
                     with contextlib.suppress(ProcessLookupError):  # the group: no child that was just made outlives it
                         os.killpg(os.getpgid(worker), signal.SIGKILL)
 
@@ -462,8 +489,10 @@ def test_scenarios_leave_no_descriptor_and_no_process(tmp_path: Path) -> None:
     tmp_path.chmod(0o755)
     hogs = [hostile(), hostile(later="if self.count == 9: os.kill(os.getpid(), 9)")]
 
+    others = {*workers_of(os.getpid())}
+
     def held() -> tuple[int, ...]:
-        pids = (os.getpid(), *sorted(workers_of(os.getpid())))
+        pids = (os.getpid(), *sorted(workers_beside(others)))
         return tuple(len(list(Path(f"/proc/{pid}/fd").iterdir())) for pid in pids)
 
     with open_session("auto", 1) as opened:  # of several workers, those that are worn are replaced later

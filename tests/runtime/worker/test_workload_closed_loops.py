@@ -45,6 +45,7 @@ def limits(trace: Trace) -> list[str]:
     return [mark.detail for mark in trace.marks("limit")]
 
 
+@pytest.mark.long
 def test_a_node_that_hears_itself_goes_on(session: RecordingSession, tmp_path: Path) -> None:
     """It takes more messages than nodes may take from each other without a rest, and rests between them."""
     trace = record(session, tmp_path / "s", BEFORE + ITSELF, duration_ns=24 * NS_PER_S)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.trace import LogRecord
-from grader.runtime.session import RecordingSession
+from grader.runtime.model.trace import LogRecord, Trace
+from grader.runtime.plan import Plan
 
 pytest.importorskip("rclpy")
 
-from hostile import record
+from hostile import planned
+from side_by_side import rows_of
+from tiers import NIGHTLY, but, more
 
 pytestmark = pytest.mark.ros
 
@@ -37,16 +40,26 @@ rclpy.spin(node)
 """
 
 
-@pytest.mark.parametrize("clock", CLOCKS)
-@pytest.mark.parametrize("look", LOOKS)
-@pytest.mark.parametrize("place", ["before", "after"])
-def test_a_log_is_a_log_whatever_it_looks_like(
-    session: RecordingSession, tmp_path: Path, place: str, look: str, clock: str
-) -> None:
-    """No line of it counts as printed."""
+#: Each look, each place and each clock is tried by default.
+DEFAULT = [
+    ("before", "all of them", "virtual"),
+    ("after", "the other stream", "virtual"),
+    ("before", "a format", "wall"),
+    ("after", "colours", "bare"),
+]
+VIRTUAL = list(itertools.product(["before", "after"], LOOKS, ["virtual"]))
+REAL = [row for row in itertools.product(["before", "after"], LOOKS, ["wall", "bare"]) if row not in DEFAULT]
+
+
+def plan(folder: Path, place: str, look: str, clock: str) -> Plan:
     program = TALKER.format(**{"before": "", "after": "", place: LOOKS[look]})
-    tmp_path.chmod(0o755)
-    trace = record(session, tmp_path / "s", program, duration_ns=2 * NS_PER_S, **CLOCKS[clock])
+    return planned(folder, program, duration_ns=2 * NS_PER_S, **CLOCKS[clock])
+
+
+@rows_of(plan)
+@pytest.mark.parametrize(("place", "look", "clock"), [*but(DEFAULT, [*VIRTUAL, *DEFAULT[2:]]), *more(REAL, NIGHTLY)])
+def test_a_log_is_a_log_whatever_it_looks_like(trace: Trace, place: str, look: str, clock: str) -> None:
+    """No line of it counts as printed."""
     logs = [each for each in trace.observations if isinstance(each, LogRecord)]
     assert {(each.severity, each.logger, each.text) for each in logs} == {("WARN", "talker", "half a second")}
     assert trace.lines() == ()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from places import REPORTED
+from tiers import NIGHTLY, but, each, more
 
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.model.report import Summary
@@ -134,8 +135,8 @@ def says(texts: list[str], logged: list[str], clock: str) -> bool:
     return late_enough and [TIME.sub("", t) for t in texts[: len(logged)]] == [TIME.sub("", t) for t in logged]
 
 
-@pytest.mark.parametrize("clock", ["auto", pytest.param("wall", marks=pytest.mark.long)])
-@pytest.mark.parametrize(("text", "logged"), PLOTTING.values(), ids=PLOTTING)
+@pytest.mark.parametrize("clock", ["auto", *more(["wall"], NIGHTLY)])
+@pytest.mark.parametrize(("text", "logged"), but([PLOTTING["a window stays open"]], PLOTTING.values()), ids=PLOTTING)
 def test_a_program_that_plots(text: str, logged: list[str], clock: str, tmp_path: Path) -> None:
     """In virtual time nothing sends it to the wall clock, where importing alone may take more than its time."""
     pytest.importorskip("matplotlib")
@@ -152,8 +153,8 @@ def test_a_program_that_plots(text: str, logged: list[str], clock: str, tmp_path
     assert not any("font" in line.text.lower() for line in summary.lines), summary.lines
 
 
-@pytest.mark.parametrize("clock", ["auto", pytest.param("wall", marks=pytest.mark.long)])
-@pytest.mark.parametrize(("text", "logged"), LOOKING.values(), ids=LOOKING)
+@pytest.mark.parametrize("clock", ["auto", *more(["wall"], NIGHTLY)])
+@pytest.mark.parametrize(("text", "logged"), but([LOOKING["a loop over images"]], LOOKING.values()), ids=LOOKING)
 def test_a_program_that_shows_images(text: str, logged: list[str], clock: str, tmp_path: Path) -> None:
     """The wheel of OpenCV for servers would raise in each of these functions."""
     pytest.importorskip("cv2")
@@ -163,7 +164,8 @@ def test_a_program_that_shows_images(text: str, logged: list[str], clock: str, t
     assert [fault.text for fault in summary.faults] == []
 
 
-@pytest.mark.parametrize("clock", ["auto", "wall"])
+@pytest.mark.long
+@pytest.mark.parametrize("clock", ["auto", *more(["wall"], NIGHTLY)])
 def test_importing_a_library_that_plots_is_no_reason_for_the_wall_clock(clock: str) -> None:
     """Nor is it one to start a program that lists fonts."""
     pytest.importorskip("matplotlib")
@@ -176,11 +178,14 @@ def test_importing_a_library_that_plots_is_no_reason_for_the_wall_clock(clock: s
 
 @pytest.mark.parametrize(
     ("code", "said"),
-    [
-        ("subprocess.run(['true'])", "starts another process, which runs in real time"),
-        ("signal.alarm(1)", "sets an alarm that rings in real time"),
-        ("time.sleep(0.1); select.select([0], [], [], 0)", None),
-    ],
+    each(
+        [
+            ("subprocess.run(['true'])", "starts another process, which runs in real time"),
+            ("signal.alarm(1)", "sets an alarm that rings in real time"),
+            ("time.sleep(0.1); select.select([0], [], [], 0)", None),
+        ],
+        3,
+    ),
 )
 def test_the_reason_for_the_wall_clock_names_the_line(code: str, said: str | None, tmp_path: Path) -> None:
     """And what the program does there."""
