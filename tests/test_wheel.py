@@ -39,6 +39,7 @@ def wheel(packages: Path) -> Path:
     return next(packages.glob("*.whl"))
 
 
+@pytest.mark.long
 def test_an_index_takes_the_packages(packages: Path) -> None:
     """Its own checker has no complaint, not even a warning."""
     command = [sys.executable, "-m", "twine", "check", "--strict", *map(str, packages.iterdir())]
@@ -112,6 +113,7 @@ def test_the_libraries_of_the_report_travel_as_published_with_their_licences(whe
     assert sum("LICENSE" in name or "NOTICE" in name for name in wanted) == 4
 
 
+@pytest.mark.long
 def test_each_command_has_a_man_page_that_can_be_shown(wheel: Path, tmp_path: Path) -> None:
     """It travels where installers put man pages, and the formatter has no complaint."""
 

@@ -53,7 +53,7 @@ def run(*arguments: str | Path, cwd: Path) -> tuple[int, str]:
     return done.returncode, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("kind", each(KINDS, 2))
+@pytest.mark.parametrize("kind", each(KINDS, 4))
 @pytest.mark.parametrize("command", [(), (".",), ("--exercise", "1"), ("velocity_publisher.py",), ("observe", ".")])
 def test_a_file_to_grade(tmp_path: Path, kind: str, command: tuple[str, ...]) -> None:
     """By its folder, without a name, or named itself."""
@@ -76,6 +76,7 @@ def test_a_class(tmp_path: Path, kind: str) -> None:
     assert "refused: ada" in said
 
 
+@pytest.mark.long
 @pytest.mark.ros
 @pytest.mark.parametrize("kind", each(KINDS, 4))
 def test_files_beside_a_program(tmp_path: Path, kind: str) -> None:

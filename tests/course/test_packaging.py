@@ -35,6 +35,7 @@ def test_gradescope_s_zip_has_what_the_platform_runs() -> None:
     assert archive.testzip() is None
 
 
+@pytest.mark.long
 def test_the_same_choice_gives_the_same_bytes() -> None:
     """So that a course can tell whether anything changed."""
     assert gradescope(Chosen()) == gradescope(Chosen())
@@ -125,6 +126,7 @@ def test_the_command_warns_of_an_autograder_without_a_sandbox(tmp_path: Path) ->
     assert (tmp_path / "a.zip").exists()
 
 
+@pytest.mark.long
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     """In one line."""
     (tmp_path / "file").write_text("")

@@ -66,6 +66,7 @@ def solve(checkout: Path) -> None:
     shutil.copy(ROOT / "reference_solutions" / "velocity_publisher.py", checkout)
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_the_action_grades_and_a_prying_student_finds_nothing(checkout: Path, tmp_path: Path) -> None:
     """No token in the environment, in /proc, in the checkout or the runner's folder; no command in the log."""
@@ -91,6 +92,7 @@ def test_the_action_grades_and_a_prying_student_finds_nothing(checkout: Path, tm
     assert (Path(upload["path"]) / "report.html").stat().st_size > 10_000
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_without_a_sandbox_the_prying_student_finds_something(checkout: Path, tmp_path: Path) -> None:
     """The test above can fail."""
@@ -133,6 +135,7 @@ def run_autograder(root: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([root / "run_autograder"], env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_gradescope_s_zip_leaves_results(autograder: Path) -> None:
     """Unpacked and run as the platform does; the exercise is the one that was chosen."""
@@ -145,6 +148,7 @@ def test_gradescope_s_zip_leaves_results(autograder: Path) -> None:
     assert result["stdout_visibility"] == "hidden"
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_prairielearn_s_question_is_graded(tmp_path: Path) -> None:
     """By the words of its own entry point, with the share of the points as the score."""
@@ -183,6 +187,7 @@ def run_vpl(folder: Path, grade: str, **more: str) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_no_student_gives_a_mark_on_vpl(tmp_path: Path) -> None:
     """Whatever is printed, logged or raised, and however files are called: the only mark is the grader's."""
@@ -208,6 +213,7 @@ def test_vpl_gets_no_mark_where_nothing_was_decided(tmp_path: Path) -> None:
     assert said == "<|--\n>Grade :=>>10\n--|>\n"
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_classroom50_gets_its_files(checkout: Path, tmp_path: Path) -> None:
     """The result follows the platform's schema, a student's file of that name is replaced, no command is obeyed."""

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 
+import pytest
 from archive import Recorded, exercises_by_id, recordings
 from sample_folders import expected
 
@@ -69,6 +70,7 @@ def by_node(one: Observation) -> bool:
     return sent or isinstance(one, (Message, LogRecord, OutputLine))
 
 
+@pytest.mark.long
 def test_no_correct_submission_loses_a_criterion_to_a_real_clock() -> None:
     """With jitter, and with and without lost messages; and nearly every criterion can be judged from a beginning."""
     lost: list[str] = []

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 Running = tuple[int, str]  # a process id, and when the kernel started it
@@ -51,12 +52,30 @@ def stats() -> dict[Running, list[bytes]]:
     return found
 
 
-def processor_time_s(pid: int) -> float:
-    """Return the processor time of a process and of all that it has started, as far as these live or were awaited."""
+def processor_time_s() -> float:
+    """Return the processor time of this process and of all that it starts.
+
+    Exactly where root counts it by a control group of version 1, which this process enters. Elsewhere that of the
+    processes that live or were awaited, which leaves out what a killed process had started.
+    """
+    if (group := _counted()) is not None:
+        return int(read(group / "cpuacct.usage")) / 1e9
     known = stats()
-    tree = {one for one, _ in below(pid)} | {pid}
+    tree = {one for one, _ in below(os.getpid())} | {os.getpid()}
     ticks = sum(int(field) for (one, _), status in known.items() if one in tree for field in status[11:15])
     return ticks / os.sysconf("SC_CLK_TCK")
+
+
+@cache
+def _counted() -> Path | None:
+    own = re.search(rb"^\d+:[^:]*\bcpuacct\b[^:]*:/(.*)$", read(Path("/proc/self/cgroup")), re.MULTILINE)
+    group = Path("/sys/fs/cgroup/cpuacct") / (own[1].decode() if own else "") / f"pytest-{os.getpid()}"
+    try:
+        group.mkdir(exist_ok=True)
+        (group / "cgroup.procs").write_text(str(os.getpid()))
+    except OSError:
+        return None
+    return group
 
 
 def is_students(process: Path) -> bool:

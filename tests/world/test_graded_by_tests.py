@@ -156,11 +156,13 @@ def test_late(ros):
 """
 
 
+@pytest.mark.long
 def test_messages_of_a_test_may_come_late_or_not_at_all(grade: Grade) -> None:
     """As its marker says, for programs in the sandbox as for one's own."""
     assert outcomes(grade(RIGHT, ON_THEIR_WAY)) == ["met", "met"]
 
 
+@pytest.mark.long
 def test_what_does_not_fit_is_the_hint(grade: Grade) -> None:
     """Where nobody hears the test, the hint names the topic, whatever the assertion says."""
     deaf = verdicts(grade(RIGHT.replace('"/scan"', '"/scn"')))["test_stops_0_1"]
@@ -197,6 +199,7 @@ def test_commands(ros):
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("program", "said"),
     [
@@ -218,6 +221,7 @@ def test_programs_that_end_badly_lose_points(grade: Grade, program: str, said: s
     assert said in report.exercises[0].verdicts[0].reason
 
 
+@pytest.mark.long
 def test_a_file_is_missing_only_where_a_test_runs_it(grade: Grade) -> None:
     """A submission without one of the files loses what runs it, and nothing else."""
     assert verdicts(grade(None))["test_rate"].reason == "obstacle_stop.py: not in the submission; found notes.py"
@@ -279,6 +283,7 @@ rclpy.spin(node)
 LOOKS = REPEATS.replace('"hello"', '"[]"')
 
 
+@pytest.mark.long
 def test_a_program_does_not_see_the_tests(grade: Grade) -> None:
     """The programs run in the sandbox: neither the file of tests nor the process of pytest is within their reach."""
     assert verdicts(grade(SPY, LOOKS))["test_text"].outcome is Outcome.MET
@@ -415,6 +420,7 @@ def test_an_endless_test_is_no_mark(grade: Grade) -> None:
     assert right.outcome is Outcome.MET
 
 
+@pytest.mark.long
 def test_a_file_that_cannot_be_imported_is_no_mark(grade: Grade) -> None:
     """A mistake outside of the tests leaves all of them undecided, with its line."""
     report = grade(RIGHT, "import nothing_at_all\n" + TESTS)
@@ -446,6 +452,7 @@ def test_a_recording_keeps_the_verdict(grade: Grade, tmp_path: Path) -> None:
 PAGE = ROOT / "docs/how-to/tests-as-criteria.md"
 
 
+@pytest.mark.long
 def test_the_page_about_tests_shows_what_works(grade: Grade) -> None:
     """The rubric and the tests of the how-to grade the program of the tutorial."""
     rubric, tests = re.findall(r"^```(?:yaml|python)\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
@@ -460,6 +467,7 @@ def test_the_page_about_tests_shows_what_works(grade: Grade) -> None:
     assert verdicts(wrong)["test_stops_0_5"].reason == "the robot stands although nothing is near"
 
 
+@pytest.mark.long
 def test_a_class_is_graded_by_tests(tmp_path: Path) -> None:
     """`grade batch` runs the tests on every submission."""
     (tmp_path / "rubric.yaml").write_text(RUBRIC)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from tiers import each
 
 import grader
 
@@ -143,6 +144,7 @@ def test_what_is_lost_and_late(ros):
 """
 
 
+@pytest.mark.long
 def test_losses_and_delays_follow_from_the_seed(suite: pytest.Pytester) -> None:
     """The same seed loses the same messages, another one others."""
     for seed in ((), (), ("--ros-seed", "4")):
@@ -174,6 +176,7 @@ def test_time_has_passed(robot):
 """
 
 
+@pytest.mark.long
 def test_a_wider_scope_and_several_processes(suite: pytest.Pytester) -> None:
     """One world for a module, beside those of single tests; with xdist as well."""
     run(suite, WIDE).assert_outcomes(passed=3)
@@ -201,6 +204,7 @@ def test_it(ros):
 """
 
 
+@pytest.mark.long
 def test_without_bubblewrap_the_network_is_shared_and_that_is_said(suite: pytest.Pytester) -> None:
     """The nodes run all the same, where they lie."""
     suite.makeconftest(WITHOUT_BUBBLEWRAP)
@@ -227,6 +231,7 @@ def test_although_it_expects_a_failure(ros):
 """
 
 
+@pytest.mark.long
 def test_what_virtual_time_does_not_suit_fails_once(suite: pytest.Pytester) -> None:
     """A program that starts another process is told with its line; no test passes with it."""
     result = run(suite, UNSUITABLE)
@@ -283,7 +288,9 @@ def test_it_fails(ros):
 """
 
 
-@pytest.mark.parametrize(("arguments", "clock", "seeds"), [((), "virtual", 3), (("--ros-clock", "wall"), "wall", 1)])
+@pytest.mark.parametrize(
+    ("arguments", "clock", "seeds"), each([((), "virtual", 3), (("--ros-clock", "wall"), "wall", 1)], 2)
+)
 def test_the_clock_is_an_option_and_a_marker(
     suite: pytest.Pytester, arguments: tuple[str, ...], clock: str, seeds: int
 ) -> None:

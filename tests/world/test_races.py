@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from std_msgs.msg import String
-from tiers import each
+from tiers import each, more
 
 from grader.runtime.model.dataclass import dataclass
 from grader.world.opening import Worlds
@@ -193,7 +193,7 @@ def write(pytester: pytest.Pytester, programs: dict[str, str], test: str) -> Non
     pytester.makepyfile(test_it=f"{head}\n@pytest.mark.ros(seeds={SEEDS})\ndef test_it(ros):{test}")
 
 
-@pytest.mark.parametrize("race", each(RACES.values(), 3), ids=RACES)
+@pytest.mark.parametrize("race", each([*RACES.values()][::-1], len(RACES)), ids=[*RACES][::-1])
 def test_a_race_is_found_and_repeated(pytester: pytest.Pytester, race: Race) -> None:
     """Some seeds lose it and some do not; the failure names the seed, which gives the same again."""
     write(pytester, race.programs, race.test)
@@ -253,7 +253,7 @@ def logs_of(ros_session: Worlds, folder: Path, seed: int, *programs: str) -> lis
         return [f"{log.t_ns} {log.text}" for log in first.logs]
 
 
-@pytest.mark.parametrize("spin", [TAIL, MANY], ids=["one thread", "four threads"])
+@pytest.mark.parametrize("spin", [*more([TAIL]), MANY], ids=["one thread", "four threads"])
 def test_a_drawn_order_is_one_that_messages_can_have(ros_session: Worlds, tmp_path: Path, spin: str) -> None:
     """Messages of one publisher stay in order, none is lost, and the same seed gives the same order."""
     (tmp_path / "listener.py").write_text(HEAD + LISTENER + spin, encoding="utf-8")

@@ -104,6 +104,7 @@ def called(page: Page) -> list[str]:
     return [cells[0].split("\n")[0] for cells in rows(page)]
 
 
+@pytest.mark.long
 def test_the_table_sorts_by_score_and_by_name(page: Page) -> None:
     """Down, up, and back to surnames; whoever has no score comes last; the order is told to who listens."""
     head = page.locator("th[data-sort=final]")
@@ -337,6 +338,7 @@ def test_without_scripts_everybody_is_there(browser: Browser, results: Path) -> 
     assert "need JavaScript" in text
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", *more(["dark"], NIGHTLY)])
 @pytest.mark.parametrize("width", [*more([1280]), 390])
 def test_axe_finds_nothing(browser: Browser, results: Path, scheme: str, width: int) -> None:

@@ -169,6 +169,7 @@ def test_a_killed_run_goes_on_and_tells_all_changes(folder: Path) -> None:
     assert not list(folder.rglob(BEFORE))
 
 
+@pytest.mark.long
 def test_many_are_judged_by_several_processes(folder: Path) -> None:
     """With the same results, also if the recordings of one are damaged."""
     grade(folder)

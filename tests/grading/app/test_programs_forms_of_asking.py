@@ -452,6 +452,7 @@ def test_programs_of_cmake_packages_run(tmp_path: Path, shape: str, clock: str) 
     assert summary.faults == ()
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_more_programs_than_a_scenario_has_by_default_are_all_heard(tmp_path: Path) -> None:
     """A limit for stray participants does not count the programs themselves."""

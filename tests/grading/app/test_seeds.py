@@ -174,6 +174,7 @@ for path in map(Path, sys.argv[1:]):
 """
 
 
+@pytest.mark.long
 def test_what_is_drawn_does_not_depend_on_the_hashes_of_the_grader() -> None:
     """Python draws them anew for each process, and a set of names has another order then."""
     examples = [path for path in ROOT.glob("examples/*/*.yaml") if path.stem == path.parent.name]

@@ -97,6 +97,7 @@ def test_a_rubric_elsewhere_uses_it_by_name(elsewhere: Path) -> None:
     assert verdict(read_rubric(FAN)) == verdict(exercise)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted({kind.parent.name for kind in shipped("rubrics").glob("*/checks.py")}))
 def test_a_rubric_that_names_no_files_judges_every_recording_the_same(tmp_path: Path, name: str) -> None:
     """As rubrics did before the checks lay beside the exercises: points, reasons, hints and charts are equal."""

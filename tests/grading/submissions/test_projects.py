@@ -204,6 +204,7 @@ def test_what_a_hostile_file_holds_becomes_a_note(
     assert {path.name for path in tmp_path.iterdir()} == {"ws", "prefix"}
 
 
+@pytest.mark.long
 def test_a_trusted_process_stays_small_whatever_the_files_are(tmp_path: Path) -> None:
     """All hostile files, one after the other, in a process that does nothing else."""
     roots = [str(made(tmp_path / str(number), files)) for number, (files, _) in enumerate(HOSTILE.values())]

@@ -89,6 +89,7 @@ PUBLISHED = {
 }
 
 
+@pytest.mark.long
 def test_shipped_packages_have_the_hashes_of_the_releases(tmp_path: Path) -> None:
     made = build(shipped_packages(), tmp_path, [SHARE])
     assert made.names == ("example_interfaces", "tf2_msgs", "turtlesim")

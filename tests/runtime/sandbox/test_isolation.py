@@ -649,6 +649,7 @@ print(json.dumps([readable, writable]))
 """
 
 
+@pytest.mark.long
 def test_a_worker_opens_nothing_of_the_instructor(sandbox: Sandbox, tmp_path: Path, ros: RosInstallation) -> None:
     """It sees Python, ROS, its own modules and its folder: no other folder, no rubric, no key, no other submission."""
     beside = sandbox.submission.parent / "another-submission.py"

@@ -335,6 +335,7 @@ rclpy.spin(Server())
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("program", but([ANEW["collected"]], ANEW.values()), ids=ANEW)
 def test_a_client_made_anew_for_each_question_finds_the_graders_server(run: Callable[..., Trace], program: str) -> None:
     server = PlannedServer("/status", "std_srvs/srv/Trigger", 0, 0, 0, cycle=False, answers=0, responses=ANSWERS)

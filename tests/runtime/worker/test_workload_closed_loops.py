@@ -52,6 +52,7 @@ def test_a_node_that_hears_itself_goes_on(session: RecordingSession, tmp_path: P
     assert (limits(trace), len(trace.messages("/n"))) == ([], 4799)
 
 
+@pytest.mark.long
 def test_nodes_that_answer_each_other_without_a_rest_are_ended(session: RecordingSession, tmp_path: Path) -> None:
     """No time would ever pass."""
     both = [BEFORE + SERVES.format(mine=mine, theirs=theirs) for mine, theirs in ("ab", "ba")]
