@@ -21,7 +21,7 @@ from grader.grading.rubrics.loader import read_rubric
 ROOT = EXERCISES.parents[1]
 NAMES = sorted(path.name for path in EXERCISES.glob("[!_]*/"))
 #: Graded before a change lands: one that plays a recording of its own, by default, and one of two nodes.
-USUAL = {"exercise_2": (), "exercise_3": LONG}
+USUAL: dict[str, tuple[pytest.MarkDecorator, ...]] = {"exercise_2": (), "exercise_3": (LONG,)}
 GRADE = (sys.executable, "-c", "from grader.cli.main import main; main()")
 
 
@@ -55,7 +55,7 @@ def test_what_was_recorded_is_judged_the_same_elsewhere(moved: Path) -> None:
 @pytest.mark.ros
 @pytest.mark.parametrize(
     "moved",
-    [pytest.param(name, marks=USUAL.get(name, NIGHTLY)) for name in NAMES],
+    [pytest.param(name, marks=USUAL.get(name, (NIGHTLY,))) for name in NAMES],
     indirect=True,
 )
 def test_a_copied_exercise_grades_real_nodes(moved: Path) -> None:

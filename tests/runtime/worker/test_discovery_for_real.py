@@ -113,7 +113,7 @@ def plan(folder: Path, program: str, clock: str) -> Plan:
     return planned(folder, BEFORE + textwrap.dedent({**EARLY, **HEARD}[program]), clock=clock, **USUAL)
 
 
-def rows(programs: dict[str, str], default: str) -> Any:
+def rows(programs: dict[str, str], default: str) -> pytest.MarkDecorator:
     """Return a mark: each program on each clock."""
     virtual = but([(default, "virtual")], [(name, "virtual") for name in programs])
     wall = [(name, "wall") for name in programs]
