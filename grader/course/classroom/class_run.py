@@ -34,7 +34,16 @@ from grader.course.classroom.grading import (
 from grader.course.classroom.intake import HandedInEntry, Intake, take_in
 from grader.course.classroom.last_run import RUN, LastRun, dump_last_run, read_last_run
 from grader.course.classroom.local import LocalScheduler, MakeScheduler
-from grader.course.classroom.outputs import CHANGES, CLASS, Graded, class_files, exports, reveals, summary_json
+from grader.course.classroom.outputs import (
+    CHANGES,
+    CLASS,
+    GRADEBOOK,
+    Graded,
+    class_files,
+    exports,
+    reveals,
+    summary_json,
+)
 from grader.course.classroom.renaming import with_renamed_files
 from grader.course.classroom.roster import RosterMatch, Table, match, read_roster
 from grader.course.classroom.store import BEFORE, REPORT, SEED_KEY, Conditions, Store, open_store
@@ -237,13 +246,13 @@ def _written(graded: Graded, run: RunOfClass, store: Store, course: ClassRequest
     left_out = {platform: export.left_out for platform, export in made.items() if export.left_out}
     remarks = (*graded.remarks, *(export.remark for export in made.values() if export.remark))
     remarks = (*remarks, *([reveals(graded.book)] if made and reveals(graded.book) else []))
+    remarks = (*remarks, *_hand_back(graded.book, run, store))
     graded = replace(graded, left_out=left_out, remarks=remarks, moved=_moved(graded.book, store))
     files = class_files(graded.book, made, run, links=graded.links, standalone=course.standalone)
     if any(each.criteria for each in graded.changes):  # an empty record would replace that of a real change
         files = {CHANGES: render_changes_table(graded.changes).encode(), **files}
     written = _write({CLASS: summary_json(graded).encode(), **files}, store)
     _link_students(graded.book, store)
-    _hand_back(graded.book, run, store)
     store.forget_before()
     return replace(graded, files=(*graded.files, *written))
 
@@ -288,24 +297,37 @@ def _link_students(book: Gradebook, store: Store) -> None:
             store.write(f"students/{name}/{PAGE}", linked.encode())
 
 
-def _hand_back(book: Gradebook, run: RunOfClass, store: Store) -> None:
-    """Put name, final mark and decisions into everybody's page; who was refused gets a page that says why."""
+def _hand_back(book: Gradebook, run: RunOfClass, store: Store) -> tuple[str, ...]:
+    """Put name, final mark and decisions into everybody's page; who was refused gets a page that says why.
+
+    Returns a remark for each submission whose files cannot be written because of what they hold: the others are.
+    """
+    remarks = []
     for row in book.rows:
         if not row.name:
             continue
-        mark = kept_mark(row)
-        if row.status is Status.REFUSED:
-            problem, hint = (without_folders(text, run.folders) for text in (row.refusal, row.hint))
-            page = render_refusal(shown_mark(mark, None), problem, hint)
-            store.write(f"students/{row.name}/{HANDED_BACK_PAGE}", page.encode())
-        if row.report is None:
-            continue
-        store.write(f"students/{row.name}/{MARK}", dump_mark(mark))
-        for name, report in ((PAGE, row.report), (HANDED_BACK_PAGE, row.handed_back)):
-            page = _text(store.place(row.name) / name)
-            marked = page if report is None else with_final_mark(page, shown_mark(mark, report))
-            if marked != page:
-                store.write(f"students/{row.name}/{name}", marked.encode())
+        try:
+            _hand_back_one(row, run, store)
+        except (LookupError, TypeError, ValueError, RecursionError) as error:
+            cause = f"{type(error).__name__}: {error}"
+            remarks.append(f"the pages of {row.name} do not show the final mark, which is in {GRADEBOOK}: {cause}")
+    return tuple(remarks)
+
+
+def _hand_back_one(row: Row, run: RunOfClass, store: Store) -> None:
+    mark = kept_mark(row)
+    if row.status is Status.REFUSED:
+        problem, hint = (without_folders(text, run.folders) for text in (row.refusal, row.hint))
+        page = render_refusal(shown_mark(mark, None), problem, hint)
+        store.write(f"students/{row.name}/{HANDED_BACK_PAGE}", page.encode())
+    if row.report is None:
+        return
+    store.write(f"students/{row.name}/{MARK}", dump_mark(mark))
+    for name, report in ((PAGE, row.report), (HANDED_BACK_PAGE, row.handed_back)):
+        page = _text(store.place(row.name) / name)
+        marked = page if report is None else with_final_mark(page, shown_mark(mark, report))
+        if marked != page:
+            store.write(f"students/{row.name}/{name}", marked.encode())
 
 
 def _report(path: Path) -> ReportData | None:

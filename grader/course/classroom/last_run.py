@@ -38,8 +38,9 @@ def read_last_run(results: Path) -> LastRun:
     except OSError as error:
         raise ClassError(f"{path}: the options of the last run cannot be read: {error.strerror}") from None
     try:
-        last = msgspec.json.decode(data, type=LastRun)
-    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+        # A path need not be valid text: `json` keeps its bytes as lone surrogates, which msgspec's decoder rejects.
+        last = msgspec.convert(json.loads(data), LastRun)
+    except (msgspec.MsgspecError, RecursionError, ValueError) as error:
         raise _damaged(path, str(error)) from None
     if last.schema != SCHEMA:
         raise _damaged(path, f"schema {last.schema!r}")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
+import os
 import shutil
+import tarfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,10 +16,14 @@ from typing import Any
 import pytest
 from class_samples import GRADING, FakeScheduler, course, grade, hand_in, scores
 
+from grader.course.classroom import class_run
+from grader.course.classroom.final_marks import load_mark
 from grader.course.classroom.gradebook import Status
-from grader.course.classroom.outputs import Graded
+from grader.course.classroom.last_run import read_last_run
+from grader.course.classroom.outputs import Graded, Platforms, render_summary
 from grader.course.classroom.store import SEED_KEY, State, Store, open_store
 from grader.grading.app.seeds import SeedKey
+from grader.grading.reporting.html.final_mark import FinalMark
 from grader.runtime.model.errors import ClassError, HarnessError
 
 
@@ -229,3 +236,61 @@ def test_a_seed_for_everybody_needs_no_key(tmp_path: Path) -> None:
     grade(course(tmp_path / "in", tmp_path / "out", grading=replace(GRADING, seed=5)), scheduler)
     assert seeds(scheduler) == {"ada": 5}
     assert not (tmp_path / "out" / SEED_KEY).exists()
+
+
+#: A name in Latin-1, as a zip from Windows gives a folder on Linux.
+LATIN_1 = os.fsdecode("M\xfcller".encode("latin-1"))
+
+
+@pytest.mark.parametrize("layout", ["{}", "{}_1_assignsubmission_file_", "hw-{}"])
+def test_a_name_in_another_encoding_stops_nobody(tmp_path: Path, layout: str) -> None:
+    """Everybody after it in the class has a mark, in whatever layout; the next run goes on from there."""
+    source = tmp_path / "hw-submissions"
+    for name in ("ada", LATIN_1, "zoe"):
+        hand_in(source, **{layout.format(name): 7})
+    wanted = course(source, tmp_path / "out", platforms=Platforms(gradescope=True))
+    for done_before in (0, 3):
+        graded = grade(wanted)
+        assert (graded.kept_before, graded.remarks) == (done_before, ())
+        marks = [load_mark(path.read_bytes()) for path in sorted((tmp_path / "out" / "students").glob("*/mark.json"))]
+        assert [mark and mark.adjusted.score for mark in marks] == [7, 7, 7]
+        assert [mark and "\ufffd" in mark.student for mark in marks] == [False, True, False]
+        assert f"written: {tmp_path}/out/gradescope.csv" in render_summary(graded)
+
+
+def test_a_download_with_a_name_in_another_encoding(tmp_path: Path) -> None:
+    """The name of a member of a tar archive is bytes, too."""
+    with tarfile.open(tmp_path / "hw.tar", "w") as archive:
+        for name in ("ada", LATIN_1, "zoe"):
+            info = tarfile.TarInfo(f"{name}/score.py")
+            info.size = 1
+            archive.addfile(info, io.BytesIO(b"7"))
+    assert list(scores(grade(course(tmp_path / "hw.tar", tmp_path / "out"))).values()) == [7, 7, 7]
+    assert len(list((tmp_path / "out" / "students").glob("*/mark.json"))) == 3
+
+
+def test_folders_in_another_encoding_are_graded_again(tmp_path: Path) -> None:
+    """What the next run repeats is read as it was written: the folders of class and results, and the paths of options."""
+    hand_in(tmp_path / LATIN_1, ada=10)
+    wanted = course(tmp_path / LATIN_1, tmp_path / f"out-{LATIN_1}", options={"roster": (f"/x/{LATIN_1}.csv",)})
+    for _ in range(2):
+        assert scores(grade(wanted)) == {"ada": 10}
+    assert read_last_run(wanted.results).options == wanted.options
+
+
+def test_a_row_that_cannot_be_written_stops_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The remark names the submission; its mark is in the gradebook."""
+
+    def fails_for_bob(page: str, mark: FinalMark) -> str:
+        if mark.student == "bob":
+            raise UnicodeEncodeError("utf-8", "\udcfc", 0, 1, "surrogates not allowed")
+        return f"{page}{mark.student}"
+
+    monkeypatch.setattr(class_run, "with_final_mark", fails_for_bob)
+    hand_in(tmp_path / "in", ada=10, bob=7, cleo=5)
+    graded = grade(course(tmp_path / "in", tmp_path / "out"))
+    assert scores(graded) == {"ada": 10, "bob": 7, "cleo": 5}
+    assert [remark.partition(",")[0] for remark in graded.remarks] == ["the pages of bob do not show the final mark"]
+    pages = sorted((tmp_path / "out" / "students").glob("*/report.html"))
+    assert [page.read_text(encoding="utf-8") for page in pages] == ["ada", "cleo"]
+    assert graded.remarks[0] in json.loads((tmp_path / "out" / "batch.json").read_bytes())["remarks"]
