@@ -31,7 +31,7 @@ from grader.course.classroom.grading import (
     refuse_without_key,
     with_known_students,
 )
-from grader.course.classroom.intake import HandedInEntry, Intake, take_in
+from grader.course.classroom.intake import HandedInEntry, Intake, check_places, take_in
 from grader.course.classroom.last_run import RUN, LastRun, dump_last_run, read_last_run
 from grader.course.classroom.local import LocalScheduler, MakeScheduler
 from grader.course.classroom.outputs import (
@@ -66,6 +66,7 @@ from grader.grading.reporting.rejudged import ReportChange, change, render_chang
 from grader.grading.rubrics.draws import First
 from grader.runtime.interface_packages import offered_digest
 from grader.runtime.model.errors import ClassError, GraderError, HarnessError, SubmissionError
+from grader.runtime.model.wording import shown
 from grader.runtime.temp_dirs import scratch_folder
 
 __all__ = [
@@ -98,16 +99,18 @@ def grade_class(
     refuse_without_key(course, exercises)
     conditions = conditions_of(course.grading, exercises)
     roster = None if course.roster is None else read_roster(course.roster)
+    check_places(course.sources, course.results)
     with open_store(course.results) as store:
         adjustments = _adjustments(course, exercises, warn)
-        intake = take_in(course.sources, course.results, layout=course.layout, pattern=course.pattern)
+        wanted = wanted_files(exercises)
+        intake = take_in(course.sources, course.results, layout=course.layout, pattern=course.pattern, wanted=wanted)
+        _warn_of_another_class(course, store, intake, warn)
         matching = match(intake.entries, roster)
         intake = replace(intake, entries=with_known_students(intake.entries, matching.people, exercises))
         own = own_conditions(course, intake.entries, matching.people, exercises, conditions)
         decisions = decisions_for(intake.entries, matching, adjustments)  # reports mistakes before hours of grading
         unpacked = course.results / "unpacked"
         intake = replace(intake, entries=with_renamed_files(intake.entries, decisions, unpacked))
-        wanted = wanted_files(exercises)
         with scratch_folder() as scratch:
             read = {entry.name: _digest(entry, scratch, wanted) for entry in intake.entries}
         digests = {name: digest for name, (digest, _) in read.items()}
@@ -163,7 +166,21 @@ def _adjustments(course: ClassRequest, exercises: Sequence[Exercise], warn: Call
 def _kept_options(course: ClassRequest, adjustments: Adjustments) -> LastRun:
     """Return what the next run needs to know of this one."""
     path = "" if adjustments.path is None else str(adjustments.path.resolve())
-    return LastRun(course.options, path, adjustments.count)
+    return LastRun(course.options, path, adjustments.count, _places(course.sources))
+
+
+def _places(sources: Sequence[Path]) -> tuple[str, ...]:
+    return tuple(str(source.resolve()) for source in sources)
+
+
+def _warn_of_another_class(course: ClassRequest, store: Store, intake: Intake, warn: Callable[[str], None]) -> None:
+    """Warn before the gradebook of other sources is replaced, of which no submission is in these."""
+    last, results = read_last_run(course.results).sources, set(store.names())
+    if last and results and not results & {entry.name for entry in intake.entries}:
+        count = f"{len(results)} result{'' if len(results) == 1 else 's'}"
+        where = ", ".join(shown(place, 200) for place in last)
+        kept = f"{course.results} holds {count} of another class, of {where}"
+        warn(f"{kept}: they stay, but gradebook and page show this class; name another folder with -o to keep both")
 
 
 def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Conditions:
@@ -269,7 +286,7 @@ def _moved(book: Gradebook, store: Store) -> tuple[str, ...]:
         person = None if row.person is None else json_value(row.person.name)
         old, new = before.get((row.name or None, person)), row.adjusted.score
         if old is not None and (new is None or json_value(new) != old):
-            found.append(f"{row.shown_name} {number(old)} -> {number(new) or 'no score'}")
+            found.append(f"{row.distinct_name} {number(old)} -> {number(new) or 'no score'}")
     return tuple(found)
 
 

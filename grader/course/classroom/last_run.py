@@ -25,6 +25,7 @@ class LastRun:
     options: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     adjustments: str = ""  # absolute path of the file of decisions that was applied; empty for none
     decisions: int = 0  # how many it held
+    sources: tuple[str, ...] = ()  # absolute paths of the folders and downloads that were graded
     schema: str = SCHEMA  # version of this format
 
 
@@ -54,6 +55,7 @@ def dump_last_run(last: LastRun) -> bytes:
         "options": {name: list(found) for name, found in last.options.items()},
         "adjustments": last.adjustments,
         "decisions": last.decisions,
+        "sources": list(last.sources),
     }
     return json.dumps(values, indent=2).encode() + b"\n"
 
