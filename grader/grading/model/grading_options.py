@@ -170,7 +170,7 @@ class GradingOptions:
         choices=SANDBOXES,
         commands={
             GRADE: "",
-            BATCH: f"As in `grade`, but {ISOLATION} is not read: a class says on the command line how it is graded.",
+            BATCH: f"As in `grade`, but {ISOLATION} is not read.",
             VERIFY: "",
             OBSERVE: _AS_IN_GRADE,
         },

@@ -310,7 +310,7 @@ def _unknown_type(interface: Interface, member: FieldOrConstant, known: Collecti
     if local and (same or bare):
         near = same[:1] or bare
     fix = f"did you mean {near[0].replace('/msg/', '/')}?" if near else "bring the package that defines it"
-    problem = f"no message {member.type.base.replace('/msg/', '/')} is known"
+    problem = f"no message {shown(member.type.base.replace('/msg/', '/'), _SHOWN)} is known"
     return DefinitionError(interface.package, interface.file, member.line, problem, fix)
 
 
@@ -411,7 +411,8 @@ class _Reader:
             raise self._error(f"{_quoted(text)} is not a type", _FIX_TYPE)
         base, bound, size = match["base"], match["bound"], match["size"]
         if bound is not None and base not in {"string", "wstring"}:
-            raise self._error(f"{base} cannot have a greatest length", f"write {base} or {base}[<={bound}]")
+            name = shown(base, _SHOWN)
+            raise self._error(f"{name} cannot have a greatest length", f"write {name} or {name}[<={bound}]")
         for number in (bound, size):
             if number is not None and (len(number) > _MOST_DIGITS or not 0 < int(number) < 2**31):
                 raise self._error(f"a length of {shown(number, _SHOWN)} is not possible", "write a length from 1 on")

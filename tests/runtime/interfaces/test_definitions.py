@@ -193,7 +193,7 @@ def test_unknown_types_are_no_matter_for_a_single_definition() -> None:
 ODD: dict[str, tuple[str, str, str]] = {
     # what is odd -> package.xml, file, text
     "a type of 220 characters": ("", "msg/" + "Ab" * 110 + ".msg", "int32 a\n"),
-    "a type that is long in lower case": ("", "msg/" + "AbC" * 40 + ".msg", "int32 a\n"),
+    "a type that is long in lower case": ("", "msg/" + "AbC" * 41 + ".msg", "int32 a\n"),
     "a package of 120 characters": (f"<package><name>{'p' * 120}</name></package>", "msg/Foo.msg", "int32 a\n"),
     "a package of 60,000 characters": (f"<package><name>{'p' * 60_000}</name></package>", "msg/Foo.msg", "int32 a\n"),
     "a file in Latin-1": ("", "msg/" + os.fsdecode(b"S\xe4y") + ".msg", "int32 a\n"),
