@@ -115,6 +115,8 @@ def test_the_workflow_names_one_commit_and_nothing_to_fill_in(filled: Path) -> N
     """A branch or a tag may point elsewhere tomorrow."""
     assert f"uses: {AT}\n" in filled.read_text(encoding="utf-8")
     assert "__" not in filled.read_text(encoding="utf-8")
+    assert "fills this in" not in filled.read_text(encoding="utf-8")
+    assert f"# Made by: grade export workflow {AT}\n" in filled.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("action", ["a/b", "a/b@main", "a@" + "0" * 40, "a/b/c@" + "0" * 40, "a/ b@" + "0" * 40, ""])

@@ -178,7 +178,7 @@ def _canvas_row(row: Row, gradebook: Table | None) -> Mapping[str, str] | None:
     if gradebook is not None:
         return row_of(row.person, gradebook)
     person = row.person
-    return person.row if person is not None else None
+    return person.row if person is not None and person.canvas else None
 
 
 def _possible(gradebook: Table | None, title: str) -> str:

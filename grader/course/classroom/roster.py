@@ -193,7 +193,8 @@ def person_of(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> P
 
     exact = {kind: [row[name] for name in columns.get(kind, ()) if row[name].strip()] for kind in _EXACT}
     exact["identifier"] += [match[1] for text in exact["identifier"] if (match := _PARTICIPANT.fullmatch(text.strip()))]
-    if _OF_CANVAS.isdisjoint(name.strip().casefold() for name in row):
+    of_canvas = not _OF_CANVAS.isdisjoint(name.strip().casefold() for name in row)
+    if not of_canvas:
         exact["number"] = exact.pop("canvas")
     first, last = value("first"), value("last")
     name = f"{first} {last}".strip() or _in_reading_order(value("name"))
@@ -203,8 +204,8 @@ def person_of(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> P
         name=name or value("identifier") or next((text.strip() for texts in exact.values() for text in texts), ""),
         user=value("user") or value("github"),
         email=value("email"),
-        id=value("id"),
-        canvas=value("canvas"),
+        id=value("id") or ("" if of_canvas else value("canvas")),
+        canvas=value("canvas") if of_canvas else "",
         ids={kind: frozenset(map(fold_handle, texts)) for kind, texts in exact.items() if texts},
         names=frozenset(spellings(name)),
         row=row,
@@ -326,7 +327,17 @@ def _unknown(entry: HandedInEntry) -> Person:
     name = identity.get("name") or identity.get("user") or identity.get("email") or entry.label
     names = frozenset({fold_name(name)} - {""})
     ids = {kinds[0]: frozenset({text}) for kinds, text in _told(entry)}
-    return Person(name, identity.get("user", ""), identity.get("email", ""), identity.get("id", ""), ids, names)
+    number = identity.get("id", "")
+    return Person(
+        name=name,
+        user=identity.get("user", ""),
+        email=identity.get("email", ""),
+        # A platform's own number for a participant or an account is not the number at the institution.
+        id="" if entry.layout in _HELD_BY_IN else number,
+        canvas=number if entry.layout == CANVAS else "",
+        ids=ids,
+        names=names,
+    )
 
 
 def _twice(entries: Sequence[HandedInEntry]) -> tuple[tuple[str, ...], ...]:

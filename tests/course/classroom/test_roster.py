@@ -144,6 +144,17 @@ def test_the_number_of_an_account_in_canvas_is_no_number_of_the_institution(tmp_
     assert who(match(entries, roster(tmp_path, "id,name\n1,Ada\n77,Bob\n"))) == {"x": "Bob"}
 
 
+def test_a_number_of_a_platform_is_not_that_of_the_institution(tmp_path: Path) -> None:
+    """Marks are uploaded by ids of their kind, with a roster of one's own and without one."""
+    entries = [entry("x", MOODLE_LAYOUT, name="Bob", id="77"), entry("y", CANVAS_LAYOUT, name="eve", id="78")]
+    people = match(entries, None).people
+    assert [people[name].platform_ids for name in ("x", "y")] == [{}, {"canvas": "78"}]
+    (own,) = roster(tmp_path, "id,name\n77,Bob\n")
+    assert own.platform_ids == {"id": "77"}
+    (theirs,) = roster(tmp_path, "ID,SIS User ID,Student\n77,s1,Bob\n")
+    assert theirs.platform_ids == {"canvas": "77", "id": "s1"}
+
+
 def test_a_namesake_with_another_number_is_somebody_else(tmp_path: Path) -> None:
     """Where the numbers of roster and download are of one kind, as others of the class show."""
     people = roster(tmp_path, CANVAS)
