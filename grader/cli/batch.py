@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,13 +17,14 @@ from grader.cli.options import (
 )
 from grader.cli.remembered import RepeatingCommand, is_left_out, options_to_keep
 from grader.cli.run_options import run_options
-from grader.grading.model.grading_options import BATCH, GradingOptions
+from grader.grading.model.grading_options import BATCH, ISOLATION, SANDBOXES, GradingOptions
 from grader.runtime.model.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED, UNUSABLE
 from grader.runtime.model.extras import require
 
 if TYPE_CHECKING:
     from grader.course.classroom.outputs import Graded
 
+AUTO = SANDBOXES[0]
 _LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "canvas")
 _RERUNS = ("changed", "failed", "undecided", "all")
 
@@ -113,6 +116,9 @@ def command(  # noqa: PLR0913  one parameter an option
     if templates and not similarity:
         raise click.BadParameter("--template needs --similarity")
     ctx = click.get_current_context()
+    sandbox = os.environ.get(ISOLATION, "")
+    if options.isolation == AUTO and sandbox not in ("", AUTO):
+        complain(f"{ISOLATION} is not read for a class: give --isolation {shlex.quote(sandbox)} instead", kind="note")
     course = ClassRequest(
         sources=sources,
         results=results,

@@ -48,6 +48,7 @@ PAGE = "html"
 )
 @click.option("--rubric", "rubrics", type=RUBRIC, multiple=True, help="Use this rubric; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+@click.option("-v", "--verbose", is_flag=True, help="Write texts with every reason, hint and call, and the graph.")
 @outputs_option("Write a report ({formats}); of a class, one file a submission in the folder PATH; repeatable.")
 @click.option(
     "--min-score",
@@ -69,6 +70,7 @@ def command(  # noqa: PLR0913  one parameter an option
     exercises: tuple[str, ...],
     rubrics: tuple[Path, ...],
     as_json: bool,
+    verbose: bool,
     outputs: tuple[Output, ...],
     min_score: Fraction | None,
     show_changes: bool,
@@ -87,7 +89,7 @@ def command(  # noqa: PLR0913  one parameter an option
     """
     from grader.grading.app import rejudge
     from grader.grading.evidence.store import is_evidence
-    from grader.grading.reporting.delivery import Output
+    from grader.grading.reporting.delivery import Output, prepared
 
     if any(output.format == EVIDENCE for output in outputs):
         raise click.BadParameter("evidence is kept while grading, not while judging again")
@@ -104,10 +106,11 @@ def command(  # noqa: PLR0913  one parameter an option
     )
     one = len(evidence) == 1 and is_evidence(evidence[0])
     if one and not show_changes:
-        code = _one(evidence[0], how, (*outputs, Output("json")) if as_json else outputs, min_score, for_whom)
+        reports = (*outputs, Output("json")) if as_json else outputs
+        code = _one(evidence[0], how, prepared(reports, verbose=verbose), min_score, for_whom)
         return _confirmed(code, 1, verify=verify)
     wanted = rejudge.Wanted(
-        tuple(outputs),
+        tuple(replace(output, verbose=verbose) for output in outputs),
         reports=as_json and not show_changes,
         changes=show_changes,
         min_score=min_score,
@@ -130,9 +133,9 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
     from grader.grading.evidence.store import open_evidence
     from grader.grading.model.report import exit_code
     from grader.grading.reporting.audience import told
-    from grader.grading.reporting.delivery import deliver, prepared
+    from grader.grading.reporting.delivery import deliver
 
-    wanted = tuple(replace(output, evidence=folder) for output in prepared(outputs))
+    wanted = tuple(replace(output, evidence=folder) for output in outputs)
     report = rejudge.rejudge(open_evidence(folder), how)
     deliver(report, wanted, for_whom)
     if for_whom.only_students:

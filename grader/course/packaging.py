@@ -154,6 +154,8 @@ _PROGRAMS = ("prepare", "setup.sh", "run_autograder", "autograder.py")
 SEED_KEY = "seed.key"
 #: Largest autograder that Classroom 50 fetches.
 CLASSROOM50_BYTES = 10 * 1024 * 1024
+# What the workflow says above the line that is filled in.
+_TO_FILL_IN = re.compile("# Whoever sets up the course fills this in: .*")
 _OWNER, _COMMIT = "__OWNER__/rclpy-grader", "__COMMIT__"
 _ACTION = re.compile(r"([A-Za-z0-9._-]+/[A-Za-z0-9._-]+)@([0-9a-f]{40})")
 
@@ -198,7 +200,8 @@ def workflow(action: str) -> str:
         text = f"{action}: expected OWNER/NAME@COMMIT with a commit of 40 digits, found something else"
         raise GraderError(text, "git rev-parse HEAD in the repository of the grader says the commit")
     text = integration("github/workflow.yml").decode()
-    return text.replace(_OWNER, match[1]).replace(_COMMIT, match[2])
+    made = _TO_FILL_IN.sub(lambda _: f"# Made by: grade export workflow {action}", text)
+    return made.replace(_OWNER, match[1]).replace(_COMMIT, match[2])
 
 
 def _common(chosen: Chosen) -> dict[str, bytes]:

@@ -24,6 +24,7 @@ from grader.runtime.interfaces.program import needed
 from grader.runtime.lending import LENDABLE, LENT, Lent, copied, lent_to
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault, RubricError
+from grader.runtime.model.limits import MAX_NAME_BYTES
 from grader.runtime.model.packages import BroughtPackage, DescribedPackage
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.wording import listed, shown
@@ -99,6 +100,8 @@ class Provided:
 
 def is_installed(name: str, ros: RosInstallation) -> bool:
     """Return whether ROS or Python has a package of this name, so that nobody can bring one."""
+    if len(os.fsencode(name)) > MAX_NAME_BYTES or "/" in name or "\0" in name:
+        return False  # no folder can have it
     folders = (*ros.runtime.python_paths, *(Path(sysconfig.get_path(kind)) for kind in ("purelib", "platlib")))
     modules = any((folder / name).is_dir() or (folder / f"{name}.py").is_file() for folder in folders)
     return modules or name in sys.stdlib_module_names or any((folder / name).is_dir() for folder in ros.share)
@@ -322,7 +325,7 @@ def _of_submission(
     for source in sorted((PACKAGE / "runtime" / "interfaces").rglob("*.py")):
         key.update(source.read_bytes())
     for path in files:
-        key.update(f"{path.relative_to(root)}\0{path.stat().st_size}\0".encode("utf-8", "replace") + path.read_bytes())
+        key.update(os.fsencode(f"{path.relative_to(root)}\0{path.stat().st_size}\0") + path.read_bytes())
     place = (kept_interfaces() or session.folder) / f"submitted-{key.hexdigest()}"
     kept = _kept_build(place)
     if kept is not None:

@@ -1,8 +1,10 @@
 """The files that platforms read, the project's own among them: they follow schemas, and linters find nothing."""
 
+import importlib.util
 import re
 import subprocess
 import sys
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 
 import pytest
@@ -113,6 +115,8 @@ def test_the_workflow_names_one_commit_and_nothing_to_fill_in(filled: Path) -> N
     """A branch or a tag may point elsewhere tomorrow."""
     assert f"uses: {AT}\n" in filled.read_text(encoding="utf-8")
     assert "__" not in filled.read_text(encoding="utf-8")
+    assert "fills this in" not in filled.read_text(encoding="utf-8")
+    assert f"# Made by: grade export workflow {AT}\n" in filled.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("action", ["a/b", "a/b@main", "a@" + "0" * 40, "a/b/c@" + "0" * 40, "a/ b@" + "0" * 40, ""])
@@ -134,6 +138,7 @@ def release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "## [1.1.0] - 2026-01-01\n\n- B.\n"
     )
     monkeypatch.chdir(tmp_path)
+    subprocess.run(["git", "init", "-q", "."], check=True)
     return tmp_path
 
 
@@ -164,6 +169,56 @@ def test_what_is_not_ready_is_not_released(release: Path, name: str, old: str, n
     """With the file and what it lacks."""
     (release / name).write_text((release / name).read_text().replace(old, new))
     assert said in released("v1.2.0")[1]
+
+
+UNRELEASED_PAGE = """<!-- until the first release -->
+There is no release yet.
+
+<!-- end of it -->
+    pip install './rclpy-grader[all]'
+    pip install 'rclpy-grader[tests] @ git+https://github.com/OWNER/rclpy-grader' && pipx install ./rclpy-grader
+    <!-- until the first release -->OWNER is you. <!-- end of it -->pipx install git+https://github.com/OWNER/rclpy-grader
+    cd ./rclpy-grader/tests
+"""
+RELEASED_PAGE = """    pip install 'rclpy-grader[all]'
+    pip install 'rclpy-grader[tests]' && pipx install rclpy-grader
+    pipx install rclpy-grader
+    cd ./rclpy-grader/tests
+"""
+
+
+def test_what_pages_say_before_the_first_release_is_switched_in_one_step(release: Path) -> None:
+    """And nothing is released before that."""
+    (release / "page.md").write_text(UNRELEASED_PAGE)
+    (release / "picture.png").write_bytes(b"\xff\xd8")
+    assert "found page.md from before the first release: run python3 .ci/release --switch" in released("v1.2.0")[1]
+    assert released("--switch") == ("page.md\n", "")
+    assert (release / "page.md").read_text() == RELEASED_PAGE
+    assert released("--switch") == ("", "")
+    assert released("v1.2.0") == ("### Added\n\n- A.\n", "")
+
+
+def test_no_page_tells_to_install_what_is_not_released() -> None:
+    """Either all commands are those of before the first release, or all are those of after it."""
+    spec = importlib.util.spec_from_loader("release", SourceFileLoader("release", str(ROOT / ".ci" / "release")))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    before, after = set(), set()
+    command = re.compile(r"(?:pip|pipx|uv(?: tool| pip)?) install (?:--\S+ )*['\"]?rclpy-grader\b(?![\w\[\],-]* @)\S*")
+    kinds = (".md", ".py", ".ipynb", ".json", ".yml", ".yaml", ".toml", ".sh")
+    for name in filter(None, listed.split("\0")):
+        path = ROOT / name
+        if path.suffix not in kinds or name.startswith("tests/"):
+            continue
+        text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+        if module.switched(text) != text:
+            before.add(name)
+        after |= {(name, found) for found in command.findall(text)}
+    assert not before or not after, (before, after)
+    assert before or after
 
 
 def test_the_citation_names_this_version() -> None:

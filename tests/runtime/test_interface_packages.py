@@ -8,7 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -42,6 +42,10 @@ from grader.runtime.interface_packages import (
     offered_digest,
     provide,
 )
+from grader.runtime.interfaces import program
+from grader.runtime.interfaces.build import BuiltInterfaces
+from grader.runtime.interfaces.definitions import InterfacePackage
+from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.submission import Submission
 from grader.runtime.ros_installation import find_ros
 from grader.runtime.session import RecordingSession, open_session
@@ -210,6 +214,57 @@ def test_a_hostile_definition_is_refused_or_stays_text(session: RecordingSession
     else:
         assert "Hostile.msg" in found.problems[0]
     assert not canary.exists()
+
+
+@pytest.mark.sandbox
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        (os.fsdecode(b"bad_msgs/msg/S\xe4y.msg"), "int32 x\n"),
+        ("bad_msgs/msg/" + "Ab" * 110 + ".msg", "int32 x\n"),
+        ("bad_msgs/msg/Say.msg", f"int32 {'x' * 12_000}\n"),
+    ],
+    ids=["Latin-1", "220 characters", "a field of 12,000"],
+)
+def test_a_mistake_in_a_package_is_a_note(session: RecordingSession, tmp_path: Path, file: str, text: str) -> None:
+    """The submission is graded without the package."""
+    found = provided(session, tmp_path, {file: text, "other/msg/Folder.msg/x.py": "", "other/package.xml/x.py": ""})
+    assert (found.packages, len(found.problems)) == ((), 1)
+    assert found.problems[0].startswith("bad_msgs/msg/")
+
+
+class UnknownDefectError(Exception):
+    """What nobody has thought of."""
+
+
+@pytest.mark.parametrize("works", [True, False])
+def test_what_fails_with_definitions_alone_is_their_mistake(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], works: bool
+) -> None:
+    """Where a plain package cannot be built either, the grader or the machine fails, and that is no note."""
+
+    def build_nothing(packages: Collection[InterfacePackage], cache: Path, share: Sequence[Path]) -> BuiltInterfaces:
+        if packages == [program._PLAIN]:
+            if not works:
+                raise EnvironmentFault("no generators")
+            return BuiltInterfaces(cache, ())
+        raise UnknownDefectError("\udce4" * 400)
+
+    monkeypatch.setattr(program, "build", build_nothing)
+    (tmp_path / "own" / "msg").mkdir(parents=True)
+    (tmp_path / "own" / "msg" / "Foo.msg").write_text("int32 x\n", encoding="utf-8")
+    request = {"submission": str(tmp_path), "into": str(tmp_path), "others": [], "taken": [], "share": []}
+    monkeypatch.setattr(sys, "stdin", io.StringIO(json.dumps(request)))
+    if not works:
+        with pytest.raises(UnknownDefectError):
+            program.main()
+        return
+    program.main()
+    told = told_of(json.loads(capsys.readouterr().out))
+    assert told is not None
+    assert told.packages == {}
+    assert "are not used: building them ended with UnknownDefectError" in told.problems[0]
+    assert len(told.problems[0]) < 400
 
 
 @pytest.mark.sandbox

@@ -129,6 +129,7 @@ _TONES = {
     Status.REFUSED: RowTone.THEIRS,
     Status.NOT_RUN: RowTone.NOTHING,
     Status.MISSING: RowTone.NOTHING,
+    Status.EXCUSED: RowTone.NOTHING,
 }
 _NOT_GRADED = (Status.REFUSED, Status.FAILED, Status.NOT_RUN)
 # A path with three or more parts in a problem is a path of this machine; ROS names are shorter.
@@ -241,7 +242,10 @@ def _roster(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator[L
         return tuple(PageEntry(text, place.get(name)) for name in names)
 
     twins = tuple(PageEntry(" = ".join(names), place.get(names[0])) for names in matching.duplicates)
-    missing = tuple(PageEntry("nothing handed in", k) for k, row in enumerate(rows) if row.status is Status.MISSING)
+    missing, excused = (
+        tuple(PageEntry(status.value, k) for k, row in enumerate(rows) if row.status is status)
+        for status in (Status.MISSING, Status.EXCUSED)
+    )
     outdated = [row.name for row in rows if row.outdated]
     yield Listing(
         "unmatched",
@@ -256,6 +260,7 @@ def _roster(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator[L
         twins,
     )
     yield Listing("missing", "Nothing handed in", "People on the roster without a submission.", missing)
+    yield Listing("excused", "Excused", "People without a submission who do not count, by a decision.", excused)
     yield Listing(
         "outdated",
         "Outdated results",

@@ -31,10 +31,19 @@ from grader.course.classroom.grading import (
     refuse_without_key,
     with_known_students,
 )
-from grader.course.classroom.intake import HandedInEntry, Intake, take_in
+from grader.course.classroom.intake import HandedInEntry, Intake, check_places, take_in
 from grader.course.classroom.last_run import RUN, LastRun, dump_last_run, read_last_run
 from grader.course.classroom.local import LocalScheduler, MakeScheduler
-from grader.course.classroom.outputs import CHANGES, CLASS, Graded, class_files, exports, reveals, summary_json
+from grader.course.classroom.outputs import (
+    CHANGES,
+    CLASS,
+    GRADEBOOK,
+    Graded,
+    class_files,
+    exports,
+    reveals,
+    summary_json,
+)
 from grader.course.classroom.renaming import with_renamed_files
 from grader.course.classroom.roster import RosterMatch, Table, match, read_roster
 from grader.course.classroom.store import BEFORE, REPORT, SEED_KEY, Conditions, Store, open_store
@@ -57,6 +66,7 @@ from grader.grading.reporting.rejudged import ReportChange, change, render_chang
 from grader.grading.rubrics.draws import First
 from grader.runtime.interface_packages import offered_digest
 from grader.runtime.model.errors import ClassError, GraderError, HarnessError, SubmissionError
+from grader.runtime.model.wording import shown
 from grader.runtime.temp_dirs import scratch_folder
 
 __all__ = [
@@ -89,16 +99,18 @@ def grade_class(
     refuse_without_key(course, exercises)
     conditions = conditions_of(course.grading, exercises)
     roster = None if course.roster is None else read_roster(course.roster)
+    check_places(course.sources, course.results)
     with open_store(course.results) as store:
         adjustments = _adjustments(course, exercises, warn)
-        intake = take_in(course.sources, course.results, layout=course.layout, pattern=course.pattern)
+        wanted = wanted_files(exercises)
+        intake = take_in(course.sources, course.results, layout=course.layout, pattern=course.pattern, wanted=wanted)
+        _warn_of_another_class(course, store, intake, warn)
         matching = match(intake.entries, roster)
         intake = replace(intake, entries=with_known_students(intake.entries, matching.people, exercises))
         own = own_conditions(course, intake.entries, matching.people, exercises, conditions)
         decisions = decisions_for(intake.entries, matching, adjustments)  # reports mistakes before hours of grading
         unpacked = course.results / "unpacked"
         intake = replace(intake, entries=with_renamed_files(intake.entries, decisions, unpacked))
-        wanted = wanted_files(exercises)
         with scratch_folder() as scratch:
             read = {entry.name: _digest(entry, scratch, wanted) for entry in intake.entries}
         digests = {name: digest for name, (digest, _) in read.items()}
@@ -154,7 +166,21 @@ def _adjustments(course: ClassRequest, exercises: Sequence[Exercise], warn: Call
 def _kept_options(course: ClassRequest, adjustments: Adjustments) -> LastRun:
     """Return what the next run needs to know of this one."""
     path = "" if adjustments.path is None else str(adjustments.path.resolve())
-    return LastRun(course.options, path, adjustments.count)
+    return LastRun(course.options, path, adjustments.count, _places(course.sources))
+
+
+def _places(sources: Sequence[Path]) -> tuple[str, ...]:
+    return tuple(str(source.resolve()) for source in sources)
+
+
+def _warn_of_another_class(course: ClassRequest, store: Store, intake: Intake, warn: Callable[[str], None]) -> None:
+    """Warn before the gradebook of other sources is replaced, of which no submission is in these."""
+    last, results = read_last_run(course.results).sources, set(store.names())
+    if last and results and not results & {entry.name for entry in intake.entries}:
+        count = f"{len(results)} result{'' if len(results) == 1 else 's'}"
+        where = ", ".join(shown(place, 200) for place in last)
+        kept = f"{course.results} holds {count} of another class, of {where}"
+        warn(f"{kept}: they stay, but gradebook and page show this class; name another folder with -o to keep both")
 
 
 def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Conditions:
@@ -237,13 +263,13 @@ def _written(graded: Graded, run: RunOfClass, store: Store, course: ClassRequest
     left_out = {platform: export.left_out for platform, export in made.items() if export.left_out}
     remarks = (*graded.remarks, *(export.remark for export in made.values() if export.remark))
     remarks = (*remarks, *([reveals(graded.book)] if made and reveals(graded.book) else []))
+    remarks = (*remarks, *_hand_back(graded.book, run, store))
     graded = replace(graded, left_out=left_out, remarks=remarks, moved=_moved(graded.book, store))
     files = class_files(graded.book, made, run, links=graded.links, standalone=course.standalone)
     if any(each.criteria for each in graded.changes):  # an empty record would replace that of a real change
         files = {CHANGES: render_changes_table(graded.changes).encode(), **files}
     written = _write({CLASS: summary_json(graded).encode(), **files}, store)
     _link_students(graded.book, store)
-    _hand_back(graded.book, run, store)
     store.forget_before()
     return replace(graded, files=(*graded.files, *written))
 
@@ -260,7 +286,7 @@ def _moved(book: Gradebook, store: Store) -> tuple[str, ...]:
         person = None if row.person is None else json_value(row.person.name)
         old, new = before.get((row.name or None, person)), row.adjusted.score
         if old is not None and (new is None or json_value(new) != old):
-            found.append(f"{row.shown_name} {number(old)} -> {number(new) or 'no score'}")
+            found.append(f"{row.distinct_name} {number(old)} -> {number(new) or 'no score'}")
     return tuple(found)
 
 
@@ -288,24 +314,37 @@ def _link_students(book: Gradebook, store: Store) -> None:
             store.write(f"students/{name}/{PAGE}", linked.encode())
 
 
-def _hand_back(book: Gradebook, run: RunOfClass, store: Store) -> None:
-    """Put name, final mark and decisions into everybody's page; who was refused gets a page that says why."""
+def _hand_back(book: Gradebook, run: RunOfClass, store: Store) -> tuple[str, ...]:
+    """Put name, final mark and decisions into everybody's page; who was refused gets a page that says why.
+
+    Returns a remark for each submission whose files cannot be written because of what they hold: the others are.
+    """
+    remarks = []
     for row in book.rows:
         if not row.name:
             continue
-        mark = kept_mark(row)
-        if row.status is Status.REFUSED:
-            problem, hint = (without_folders(text, run.folders) for text in (row.refusal, row.hint))
-            page = render_refusal(shown_mark(mark, None), problem, hint)
-            store.write(f"students/{row.name}/{HANDED_BACK_PAGE}", page.encode())
-        if row.report is None:
-            continue
-        store.write(f"students/{row.name}/{MARK}", dump_mark(mark))
-        for name, report in ((PAGE, row.report), (HANDED_BACK_PAGE, row.handed_back)):
-            page = _text(store.place(row.name) / name)
-            marked = page if report is None else with_final_mark(page, shown_mark(mark, report))
-            if marked != page:
-                store.write(f"students/{row.name}/{name}", marked.encode())
+        try:
+            _hand_back_one(row, run, store)
+        except (LookupError, TypeError, ValueError, RecursionError) as error:
+            cause = f"{type(error).__name__}: {error}"
+            remarks.append(f"the pages of {row.name} do not show the final mark, which is in {GRADEBOOK}: {cause}")
+    return tuple(remarks)
+
+
+def _hand_back_one(row: Row, run: RunOfClass, store: Store) -> None:
+    mark = kept_mark(row)
+    if row.status is Status.REFUSED:
+        problem, hint = (without_folders(text, run.folders) for text in (row.refusal, row.hint))
+        page = render_refusal(shown_mark(mark, None), problem, hint)
+        store.write(f"students/{row.name}/{HANDED_BACK_PAGE}", page.encode())
+    if row.report is None:
+        return
+    store.write(f"students/{row.name}/{MARK}", dump_mark(mark))
+    for name, report in ((PAGE, row.report), (HANDED_BACK_PAGE, row.handed_back)):
+        page = _text(store.place(row.name) / name)
+        marked = page if report is None else with_final_mark(page, shown_mark(mark, report))
+        if marked != page:
+            store.write(f"students/{row.name}/{name}", marked.encode())
 
 
 def _report(path: Path) -> ReportData | None:

@@ -9,7 +9,7 @@ import re
 import secrets
 import shutil
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from grader.grading.submissions.archives import (
     unpacked,
     zip_members,
 )
-from grader.grading.submissions.collected import collision, is_skipped, name_problem, why_skipped
+from grader.grading.submissions.collected import USUAL, collision, is_skipped, name_problem, why_skipped
 from grader.runtime.files import write_whole
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, HarnessError
@@ -44,6 +44,13 @@ PATTERNS: Mapping[str, str] = {
     MOODLE: r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)(?:_(?P<file>.*))?",
     CANVAS: r"(?P<name>[^_]+)_(?:(?P<late>LATE)_)?(?P<id>\d+)_\d+_(?P<file>.+)",
 }
+# The folder of a participant ends where Moodle's own words end, whatever the participant is called.
+_MOODLE_FOLDER = re.compile(r"(?P<name>.+)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)_?", re.DOTALL)
+# A file whose name can be read in two ways, because a display name or the student's file has the platform's own words.
+_DOUBTFUL: Mapping[str, re.Pattern[str]] = {
+    MOODLE: re.compile(r"(?:.*_)?\d+_assignsubmission_(?:file|onlinetext)_.*", re.DOTALL),
+    CANVAS: re.compile(r"\d+_.+", re.DOTALL),
+}
 # Canvas appends a number to the name of a resubmitted file.
 _HANDED_IN_AGAIN = re.compile(r"-\d+(?=\.[^.]+$)")
 _FOLDER_OF_CLONES = re.compile(r"(?P<slug>.+)-submissions(?:-.*)?")
@@ -57,6 +64,7 @@ class Named:
     file: str = ""  # original name of the student's file; empty if this is the complete submission
     late: bool = False  # whether the platform marked it as late
     recognised: bool = True  # whether the name fits the layout
+    doubtful: bool = False  # whether it can also be read as the name of another student's file
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,14 +83,36 @@ class DownloadLayout:
         if self.pattern is None:
             known = bool(self.prefix) and label.startswith(self.prefix) and len(label) > len(self.prefix)
             return Named({"user": label[len(self.prefix) :]} if known else {}, recognised=known)
-        match = self.pattern.fullmatch(label)
+        folder = _MOODLE_FOLDER.fullmatch(label) if self.name == MOODLE else None
+        match = folder or self.pattern.fullmatch(label)
         if match is None:
             return Named({}, recognised=False)
         groups = {key: value for key, value in match.groupdict().items() if value}
         file = groups.pop("file", "")
-        if self.name == CANVAS:
-            file = _HANDED_IN_AGAIN.sub("", file)
-        return Named({k: v for k, v in groups.items() if k != "late"}, file, late="late" in groups)
+        doubtful = self.name in _DOUBTFUL and _DOUBTFUL[self.name].fullmatch(file) is not None
+        identity = {key: value for key, value in groups.items() if key != "late"}
+        return Named(identity, file, late="late" in groups, doubtful=doubtful)
+
+    def original_names(self, files: Sequence[str], wanted: Collection[str]) -> list[tuple[str, ...]]:
+        """Return the names that each file of one student had before the platform changed them.
+
+        Canvas appends a number to a file that was handed in again, but students number their files, too. It is removed
+        where no other file of the student has the name without it; a wanted name stays. A file that programs may open
+        by either name gets both.
+        """
+        if self.name != CANVAS:
+            return [(file,) for file in files]
+        plain = [file if file in wanted else _HANDED_IN_AGAIN.sub("", file) for file in files]
+        taken = Counter([*files, *(short for short, file in zip(plain, files, strict=True) if short != file)])
+        return [
+            (file,) if taken[short] > 1 or short == file else (short,) if is_program(short) else (file, short)
+            for short, file in zip(plain, files, strict=True)
+        ]
+
+
+def is_program(name: str) -> bool:
+    """Whether a file may hold what is graded: a program, or an archive of some."""
+    return name.casefold().endswith((".py", *ARCHIVE_SUFFIXES))
 
 
 def layout_of(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> DownloadLayout:
@@ -283,16 +313,30 @@ def _write_part(inside: list[tuple[str, Member]], into: Path, left: int) -> tupl
         if member.kind == FOLDER:
             (into / name).mkdir(parents=True, exist_ok=True)
             continue
+        # As in a folder that is graded by itself: there a larger file is left out with a note.
+        is_whole = "/" not in name and name.casefold().endswith(ARCHIVE_SUFFIXES)
+        most = MAX_ARCHIVE_BYTES if is_whole else USUAL.file_bytes
         try:
-            content = member.read(MAX_ARCHIVE_BYTES + 1)
+            content = member.read(most + 1) if member.size <= most else None
         except UnusableArchiveError as error:
             return error.problem, total
+        if content is None or len(content) > most:
+            write_without_content(into / name, most)
+            continue
         total += len(content)
-        if len(content) > MAX_ARCHIVE_BYTES or total > min(MAX_PART_BYTES, left):
-            return f"expected at most {MAX_ARCHIVE_BYTES >> 20} MiB a file and {MAX_PART_BYTES >> 20} in all", total
+        if total > min(MAX_PART_BYTES, left):
+            limit = min(MAX_PART_BYTES, left) >> 20
+            return f"expected at most {limit} MiB in all, found more with {shown(name)}", total
         (into / name).parent.mkdir(parents=True, exist_ok=True)
         (into / name).write_bytes(content)
     return "", total
+
+
+def write_without_content(path: Path, most: int) -> None:
+    """Write a file that is larger than `most` bytes and takes no room: nobody reads it, and a note will name it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("wb") as file:
+        file.truncate(most + 1)
 
 
 def _name_problem(inside: list[tuple[str, Member]]) -> str:

@@ -12,6 +12,7 @@ import msgspec
 from grader.course.classroom.adjustments import Adjusted, CriterionDecision
 from grader.course.classroom.gradebook import Row, days, exactly, exercises_of, number
 from grader.grading.model.exercise import Outcome
+from grader.grading.reporting.escape import json_value
 from grader.grading.reporting.html.final_mark import CriterionMark, FinalMark, ScoreShown
 from grader.grading.reporting.json_report import CriterionData, ReportData
 from grader.runtime.model.dataclass import dataclass
@@ -41,7 +42,7 @@ def kept_mark(row: Row) -> KeptMark:
 
 def dump_mark(mark: KeptMark) -> bytes:
     """Encode a mark as JSON; invalid text in names is replaced."""
-    encoded = msgspec.json.encode(msgspec.to_builtins(mark, enc_hook=str))
+    encoded = msgspec.json.encode(json_value(msgspec.to_builtins(mark, enc_hook=str)))
     return msgspec.json.format(encoded) + b"\n"
 
 

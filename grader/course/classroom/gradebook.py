@@ -40,6 +40,7 @@ class Status(str, Enum):
     FAILED = "failed"
     NOT_RUN = "not run"
     MISSING = "nothing handed in"
+    EXCUSED = "excused"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +60,19 @@ class Row:
     late: str = ""  # how late it was, as the platform says; empty if that is not known
     outdated: bool = False  # whether the result belongs to different files or another rubric than the current ones
     twin_of: tuple[str, ...] = ()  # names of other submissions by the same person
+    namesakes: bool = False  # whether another row is shown by the same name
 
     @property
     def shown_name(self) -> str:
         """The person's name, or the label of the submission."""
         return self.person.name if self.person is not None else self.label
+
+    @property
+    def distinct_name(self) -> str:
+        """The name in a list of names: with an id where another row has the same name."""
+        ids = {} if self.person is None else self.person.platform_ids
+        own = self.name or next(iter(ids.values()), "")
+        return f"{self.shown_name} ({own})" if self.namesakes and own else self.shown_name
 
     @property
     def standing(self) -> str:
@@ -177,6 +186,8 @@ def make_gradebook(  # noqa: PLR0913  each comes from a different source
             late=late,
         )
     rows += [_missing(person, adjustments) for person in matching.missing]
+    count = Counter(row.shown_name for row in rows)
+    rows = [replace(row, namesakes=True) if count[row.shown_name] > 1 else row for row in rows]
     odd = [entry.name for entry in intake.entries if not entry.recognised]
     remarks = [*_late_remarks(rows), *_excess(rows, extra)]
     remarks += [f"named differently from the layout: {', '.join(odd)}"] if odd else []
@@ -189,7 +200,8 @@ def _late_remarks(rows: Sequence[Row]) -> Iterator[str]:
         if row.marked_late and not row.adjusted.days_late and not row.adjusted.ignored:
             how_much = f" ({row.late})" if row.late else ""
             given = f"`{row.name}: {{days_late: {late_days(row.late) or 'N'}}}`"
-            yield f"marked as late by the platform, no days given: {row.shown_name}{how_much}; in adjust.yaml: {given}"
+            who = f"{row.distinct_name}{how_much}"
+            yield f"marked as late by the platform, no days given: {who}; in adjust.yaml: {given}"
 
 
 def _excess(rows: Sequence[Row], extra: Fraction) -> Iterator[str]:
@@ -198,7 +210,7 @@ def _excess(rows: Sequence[Row], extra: Fraction) -> Iterator[str]:
         score = row.adjusted.override
         if score is not None and row.max_score is not None and score > row.max_score + extra:
             most = number(row.max_score + extra)
-            yield f"the score set for {row.shown_name}, {number(score)}, is above the maximum of {most} points"
+            yield f"the score set for {row.distinct_name}, {number(score)}, is above the maximum of {most} points"
 
 
 def _decided(report: ReportData | None, decision: Decision) -> tuple[Fraction | None, Mapping[str, CriterionDecision]]:
@@ -236,11 +248,12 @@ def decisions_for(
         if who in exact:
             continue
         meant = [entry for entry in entries if fold_handle(who) in _called(entry, matching.people.get(entry.name))]
-        absent = any(fold_handle(who) in _handles(person) for person in matching.missing)
+        absent = [person for person in matching.missing if fold_handle(who) in _handles(person)]
         if not meant and not absent:
             raise unknown_student(decision, who, [entry.name for entry in entries])
-        if len({_student(entry, matching) for entry in meant}) > 1:
-            raise several_students(decision, who, [entry.name for entry in meant])
+        if len({_student(entry, matching) for entry in meant}) + len(absent) > 1:
+            others = [_other_id(person, who) for person in absent]
+            raise several_students(decision, who, [*(entry.name for entry in meant), *others])
         for entry in meant:
             if entry.name in exact:
                 continue  # an entry for one submission takes precedence over an entry for its student
@@ -250,6 +263,12 @@ def decisions_for(
         if meant and all(entry.name in exact for entry in meant):
             raise decided_twice(decision, who, meant[0].name, meant[0].name)
     return {name: decision for name, (_, decision) in found.items()}
+
+
+def _other_id(person: Person, but: str) -> str:
+    """Return what names a person in a decision, but not this text."""
+    found = (text for text in (person.email, person.user, person.id) if text and fold_handle(text) != fold_handle(but))
+    return next(found, person.name)
 
 
 def _student(entry: HandedInEntry, matching: RosterMatch) -> tuple[str, ...]:
@@ -294,7 +313,9 @@ def _missing(person: Person, adjustments: Adjustments) -> Row:
     """Return the row of a person without a submission, who may still have been given a score."""
     called = _handles(person)
     decision = next((d for who, d in adjustments.students.items() if fold_handle(who) in called), Decision())
-    return Row("", person.name, person, Status.MISSING, adjusted=adjust(None, decision, adjustments))
+    adjusted = adjust(None, decision, adjustments)
+    status = Status.EXCUSED if adjusted.ignored else Status.MISSING
+    return Row("", person.name, person, status, adjusted=adjusted)
 
 
 COLUMNS = (

@@ -2,22 +2,42 @@
 
 from __future__ import annotations
 
+import filecmp
 import hashlib
+import itertools
 import os
 import re
 import shutil
 import unicodedata
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
-from grader.course.classroom.downloads import AUTO, PATTERNS, DownloadLayout, Named, layout_of, unpack_download
+from grader.course.classroom.downloads import (
+    AUTO,
+    FOLDERS,
+    MOODLE,
+    PATTERNS,
+    DownloadLayout,
+    Named,
+    is_program,
+    layout_of,
+    unpack_download,
+    write_without_content,
+)
 from grader.grading.submissions.archives import ARCHIVE_SUFFIXES
-from grader.grading.submissions.collected import is_skipped_file, is_skipped_folder, name_problem, why_skipped
+from grader.grading.submissions.collected import (
+    USUAL,
+    is_skipped_file,
+    is_skipped_folder,
+    name_problem,
+    why_skipped,
+)
 from grader.grading.submissions.submission import read_start
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, HarnessError, SubmissionError
+from grader.runtime.model.limits import MAX_ARCHIVE_BYTES
 from grader.runtime.model.wording import shown
 
 #: Longest name, in bytes of UTF-8, not counting the suffix that makes it unique.
@@ -52,8 +72,9 @@ def _mark(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:6]
 
 
-#: Largest file of a student in a folder shared with other students' files.
-MAX_FILE_BYTES = 64 << 20
+#: What makes a folder one with the results of a class.
+_OF_RESULTS = ("run.json", "students", "assets")
+_TWO_WAYS = "its name can be read in two ways, so it is in nobody's submission"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +91,7 @@ class HandedInEntry:
     problem: str = ""  # why it cannot be graded at all; empty if it can
     # The name without the suffix that makes it unique: that which it has in a class without others of this name
     base: str = ""
+    layout: str = FOLDERS  # of the download that it is in; one of those in `downloads`
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +101,9 @@ class Intake:
     entries: tuple[HandedInEntry, ...]  # the submissions, ordered by name
     layouts: tuple[tuple[str, str], ...]  # each source with its layout, as text
     strays: tuple[str, ...] = ()  # entries that are not submissions, with the reason; one line each
+
+
+_FOLDERS = DownloadLayout(FOLDERS)
 
 
 @dataclass(slots=True)
@@ -91,21 +116,25 @@ class _Found:
     path: Path
     named: Named
     problem: str = ""
+    layout: DownloadLayout = _FOLDERS
     files: list[tuple[str, Path]] = field(default_factory=list)
 
 
 _ByStudent = dict[tuple[str, ...], _Found]
 
 
-def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, pattern: str = "") -> Intake:
+def take_in(
+    sources: Sequence[Path], results: Path, *, layout: str = AUTO, pattern: str = "", wanted: Collection[str] = ()
+) -> Intake:
     """Find all submissions in folders and downloads, which are unpacked in the results folder.
 
-    A regular expression for names overrides the layout. Raises ClassError if a source cannot be used, or has no
-    submissions.
+    A regular expression for names overrides the layout. Wanted are the names of the files that exercises ask for.
+    Raises ClassError if a source cannot be used, or has no submissions.
     """
     found: list[_Found] = []
     strays: list[str] = []
     layouts: list[tuple[str, str]] = []
+    sources = list(_each_once(sources, strays))
     called = distinct_names([(source.resolve().name, str(source)) for source in sources])
     for source, own in zip(sources, called, strict=True):
         top, refused = _opened(source, results / "unpacked" / own, strays)
@@ -120,8 +149,47 @@ def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, patte
             hint = "name the folder that holds one folder or archive for each student"
             raise ClassError(f"{source}: expected submissions, found none", hint)
     names = distinct_names([(one.wish, one.own) for one in found])
-    entries = [_entry(one, name, results) for one, name in zip(found, names, strict=True)]
+    entries = [_entry(one, name, results, wanted, strays) for one, name in zip(found, names, strict=True)]
     return Intake(tuple(sorted(entries, key=lambda entry: entry.name)), tuple(layouts), tuple(strays))
+
+
+def check_places(sources: Sequence[Path], results: Path) -> None:
+    """Raise ClassError if results would be written among submissions, or submissions are read from the results."""
+    place = results.resolve()
+    for source in sources:
+        top = source.resolve()
+        if not source.is_dir():
+            continue
+        if top == place or (top in place.parents and place.parent != top):
+            hint = f"name a folder beside the submissions, for example -o {shown(str(source), 200)}-results"
+            raise ClassError(f"{results}: expected a folder for results, found that it is among the submissions", hint)
+        if any(top.is_relative_to(place / name) for name in ("students", "unpacked", "assets")):
+            hint = "name the folder or the download that the submissions come from"
+            raise ClassError(f"{source}: expected submissions, found a part of the results", hint)
+
+
+def _each_once(sources: Sequence[Path], strays: list[str]) -> Iterator[Path]:
+    """Yield each source once; the same folder again, and the same download under another name, become strays."""
+    kept: list[Path] = []
+    for source in sources:
+        same = next((other for other in kept if _is_same(source, other)), None)
+        if same is None:
+            kept.append(source)
+            yield source
+        else:
+            which = "" if str(same) == str(source) else f", first as {shown(str(same), 200)}"
+            strays.append(f"{shown(str(source), 200)}: given twice{which}, so it is counted once")
+
+
+def _is_same(source: Path, other: Path) -> bool:
+    if source.resolve() == other.resolve():
+        return True
+    if not source.is_file() or not other.is_file():
+        return False
+    try:
+        return filecmp.cmp(source, other, shallow=False)
+    except OSError:  # what cannot be read is reported when it is opened
+        return False
 
 
 def _opened(source: Path, into: Path, strays: list[str]) -> tuple[Path, Mapping[str, str]]:
@@ -143,6 +211,7 @@ def _layout(children: Sequence[Path], top: Path, wanted: str, pattern: str) -> D
 
 def _submissions(children: Sequence[Path], own: str, layout: DownloadLayout, strays: list[str]) -> _ByStudent:
     found: _ByStudent = {}
+    doubtful: list[tuple[tuple[str, ...], _Found]] = []
     for child in children:
         if child.is_symlink():
             strays.append(f"{shown(str(child), 200)}: a link, which is not followed")
@@ -151,11 +220,25 @@ def _submissions(children: Sequence[Path], own: str, layout: DownloadLayout, str
         if not child.is_dir() and not _is_archive(child) and not named.file:
             strays.append(f"{shown(str(child), 200)}: neither a folder nor an archive")
             continue
-        key = _student(child.name, named, layout)
-        one = found.setdefault(key, _found(child, label, own, named))
-        if one.path != child:  # another file of the same student: they form one submission
-            one.files = [*(one.files or [(one.named.file, one.path)]), (named.file, child)]
+        key, one = _student(child.name, named, layout), _found(child, label, own, named, layout)
+        if named.doubtful:
+            doubtful.append((key, one))
+        else:
+            _add(found, key, one)
+    certain = set(found)
+    for key, one in doubtful:
+        if layout.name == MOODLE or key in certain:
+            strays.append(f"{shown(str(one.path), 200)}: {_TWO_WAYS}")
+        else:
+            _add(found, key, one)
     return found
+
+
+def _add(found: _ByStudent, key: tuple[str, ...], new: _Found) -> None:
+    """Add a submission, or another file of the same student: they form one submission."""
+    one = found.setdefault(key, new)
+    if one is not new:
+        one.files = [*(one.files or [(one.named.file, one.path)]), (new.named.file, new.path)]
 
 
 def _read(layout: DownloadLayout, child: Path) -> tuple[Named, str]:
@@ -173,54 +256,90 @@ def _student(name: str, named: Named, layout: DownloadLayout) -> tuple[str, ...]
     return who if who and (named.file or layout.name in PATTERNS) else ("", name)
 
 
-def _found(path: Path, label: str, own: str, named: Named) -> _Found:
+def _found(path: Path, label: str, own: str, named: Named, layout: DownloadLayout) -> _Found:
     wish = "-".join(named.identity.values()) or label
     files = [(named.file, path)] if named.file else []
-    return _Found(f"{own}/{path.name}", wish if named.file else label, wish, path, named, files=files)
+    label = wish if named.file else label
+    return _Found(f"{own}/{path.name}", label, wish, path, named, layout=layout, files=files)
 
 
 def _refuse(found: _ByStudent, path: Path, own: str, layout: DownloadLayout, problem: str) -> None:
     """Refuse a whole submission because a part of it was not unpacked."""
     named = layout.read(path.name)
-    one = found.setdefault(_student(path.name, named, layout), _found(path, path.name, own, named))
+    one = found.setdefault(_student(path.name, named, layout), _found(path, path.name, own, named, layout))
     one.problem = problem
 
 
-def _entry(one: _Found, name: str, results: Path) -> HandedInEntry:
+def _entry(one: _Found, name: str, results: Path, wanted: Collection[str], strays: list[str]) -> HandedInEntry:
     path, problem = one.path, one.problem
     if one.files and not problem:
         path = results / "unpacked" / "together" / name
-        problem = _put_together(one.files, path)
+        path, problem = _put_together(one, path, wanted, strays)
     named = one.named
     return HandedInEntry(
-        name, one.label, path, named.identity, named.late, named.recognised, problem, safe_name(one.wish)
+        name,
+        one.label,
+        path,
+        named.identity,
+        named.late,
+        named.recognised,
+        problem,
+        safe_name(one.wish),
+        one.layout.name,
     )
 
 
-def _put_together(files: Sequence[tuple[str, Path]], into: Path) -> str:
-    """Copy the files of one student into a folder under their original names; return the problem, if any."""
-    counted = Counter(name for name, _ in files if name)
-    wrong = next((f"found {name_problem(name)}: {shown(name)}" for name, _ in files if name and name_problem(name)), "")
-    twice = next((f"found {shown(name)} twice" for name, count in counted.items() if count > 1), "")
-    if wrong or twice:
-        return f"expected files with different plain names, {wrong or twice}"
+def _put_together(one: _Found, into: Path, wanted: Collection[str], strays: list[str]) -> tuple[Path, str]:
+    """Copy the files of one student into a folder under their original names.
+
+    Returns what is graded, which is a single archive itself, and the problem, if any.
+    """
+    given = one.layout.original_names([name for name, _ in one.files], wanted)
     try:
         shutil.rmtree(into, ignore_errors=True)
         into.mkdir(parents=True)
-        for name, path in files:
+        for names, (_, path) in zip(given, one.files, strict=True):
             if path.is_dir():
-                shutil.copytree(path, into, symlinks=True, dirs_exist_ok=True)
-            else:
-                target = into / (name or path.name)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                target.write_bytes(read_start(path, MAX_FILE_BYTES, where=shown(str(path), 200)))
+                shutil.copytree(path, into, symlinks=True, dirs_exist_ok=True, copy_function=_copy)
+            for name in names if not path.is_dir() else ():
+                wrong = name_problem(name)
+                if wrong:
+                    strays.append(f"{shown(str(path), 200)}: {wrong}, so it is left out of its submission")
+                else:
+                    (into / name).parent.mkdir(parents=True, exist_ok=True)
+                    _copy(str(path), str(into / name))
+        only = next(iter(into.iterdir()), into) if len(one.files) == 1 else into
+        return only if _is_archive(only) else into, ""
     except SubmissionError as error:
-        return error.message
+        return into, error.message
     except shutil.Error:
-        return "expected plain files, found something that cannot be copied"
+        return into, "expected plain files, found something that cannot be copied"
     except OSError as error:
         raise HarnessError(f"{into}: the submission cannot be copied: {error.strerror}", "free some space") from None
-    return ""
+
+
+def _copy(source: str, target: str) -> str:
+    """Copy a file of a student, without the content of one that is too large to be graded.
+
+    Of two files of one name, a different program is a SubmissionError; of any other kind, both are kept.
+    """
+    path, wish = Path(source), Path(target)
+    size = path.stat().st_size
+    most = MAX_ARCHIVE_BYTES if _is_archive(path) else USUAL.file_bytes
+    content = read_start(path, most, where=shown(source, 200)) if size <= most else None
+    same = content is not None and wish.is_file() and wish.read_bytes() == content
+    if wish.exists() and not same:
+        if is_program(wish.name):
+            raise SubmissionError(
+                f"expected files with different names, found two different ones named {shown(wish.name)}"
+            )
+        numbers = (wish.with_name(f"{wish.stem} ({number}){wish.suffix}") for number in itertools.count(2))
+        wish = next(path for path in numbers if not path.exists())
+    if content is None:
+        write_without_content(wish, most)
+    elif not same:
+        wish.write_bytes(content)
+    return str(wish)
 
 
 def _children(folder: Path, strays: list[str]) -> Iterator[Path]:
@@ -236,7 +355,9 @@ def _children(folder: Path, strays: list[str]) -> Iterator[Path]:
         path = folder / name
         is_folder = path.is_dir()
         why = why_skipped(name, is_folder=is_folder)
-        if why:
+        if is_folder and all((path / inside).exists() for inside in _OF_RESULTS):
+            strays.append(f"{shown(str(path), 200)}: the results of a class, so it is not graded")
+        elif why:
             strays.append(f"{shown(str(path), 200)}: {why}, so it is not graded")
         elif not (is_skipped_folder(name) if is_folder else is_skipped_file(name)):
             yield path

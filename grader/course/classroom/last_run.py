@@ -25,6 +25,7 @@ class LastRun:
     options: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     adjustments: str = ""  # absolute path of the file of decisions that was applied; empty for none
     decisions: int = 0  # how many it held
+    sources: tuple[str, ...] = ()  # absolute paths of the folders and downloads that were graded
     schema: str = SCHEMA  # version of this format
 
 
@@ -38,8 +39,9 @@ def read_last_run(results: Path) -> LastRun:
     except OSError as error:
         raise ClassError(f"{path}: the options of the last run cannot be read: {error.strerror}") from None
     try:
-        last = msgspec.json.decode(data, type=LastRun)
-    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+        # A path need not be valid text: `json` keeps its bytes as lone surrogates, which msgspec's decoder rejects.
+        last = msgspec.convert(json.loads(data), LastRun)
+    except (msgspec.MsgspecError, RecursionError, ValueError) as error:
         raise _damaged(path, str(error)) from None
     if last.schema != SCHEMA:
         raise _damaged(path, f"schema {last.schema!r}")
@@ -53,6 +55,7 @@ def dump_last_run(last: LastRun) -> bytes:
         "options": {name: list(found) for name, found in last.options.items()},
         "adjustments": last.adjustments,
         "decisions": last.decisions,
+        "sources": list(last.sources),
     }
     return json.dumps(values, indent=2).encode() + b"\n"
 

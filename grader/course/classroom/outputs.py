@@ -36,7 +36,7 @@ _MOST = 10
 #: Suffixes of files that people open.
 _OPENED = (".csv", ".html")
 #: Statuses without a line of their own in the summary.
-_UNREMARKABLE = {Status.GRADED, Status.MISSING}
+_UNREMARKABLE = {Status.GRADED, Status.MISSING, Status.EXCUSED}
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,7 +240,7 @@ def _decisions(book: Gradebook) -> Iterator[str]:
     if decided:
         yield f"decisions ({len(decided)}):"
     for row, line in decided:
-        yield f"    {shown(row.shown_name, limit=120)} {shown(line, limit=600)}"
+        yield f"    {shown(row.distinct_name, limit=120)} {shown(line, limit=600)}"
 
 
 def _lists(book: Gradebook, not_replaced: Sequence[str]) -> Iterator[str]:
@@ -249,7 +249,8 @@ def _lists(book: Gradebook, not_replaced: Sequence[str]) -> Iterator[str]:
     yield from _list("not on the roster", matching.unmatched)
     yield from _list("matches several people on the roster", matching.ambiguous)
     yield from _list("several submissions of one person", twins)
-    yield from _list("nothing handed in", [person.name for person in matching.missing])
+    for status in (Status.MISSING, Status.EXCUSED):
+        yield from _list(status.value, [row.distinct_name for row in book.rows if row.status is status])
     yield from _list("not a submission", book.strays)
     yield from _list("results without a submission", book.foreign)
     yield from _list("a new attempt failed, the earlier result is kept", not_replaced)

@@ -50,7 +50,7 @@ def export_canvas(book: Gradebook, assignment: str, gradebook: Table | None) -> 
         found = _canvas_row(row, gradebook)
         if found is None or not found.get("ID", "").strip():
             where = "the roster" if gradebook is None else gradebook.path.name
-            left_out.append(f"{row.shown_name}: {where} has no Canvas number (column ID) for this person")
+            left_out.append(f"{row.distinct_name}: {where} has no Canvas number (column ID) for this person")
         else:
             rows.append([*(text_cell(found.get(name, "")) for name in CANVAS_COLUMNS), number(row.adjusted.score)])
     possible = _possible(gradebook, title) or number(max(maxima, default=None))
@@ -82,9 +82,9 @@ def export_moodle(book: Gradebook, users: Table) -> Export:
         found_row = row_of(row.person, users)
         value = "" if found_row is None else found_row[by_name[column.casefold()]].strip()
         if not value:
-            left_out.append(f"{row.shown_name}: nobody with this name, address or number in {users.path.name}")
+            left_out.append(f"{row.distinct_name}: nobody with this name, address or number in {users.path.name}")
         elif text_cell(value) != value:
-            left_out.append(f"{row.shown_name}: {column} looks like a formula of a spreadsheet")
+            left_out.append(f"{row.distinct_name}: {column} looks like a formula of a spreadsheet")
         else:
             rows.append([value, number(row.adjusted.score), text_cell(html.escape(feedback(row), quote=False))])
     return Export({"moodle.csv": table([column, "Grade", "Feedback"], rows)}, tuple(map(_line, left_out)))
@@ -178,7 +178,7 @@ def _canvas_row(row: Row, gradebook: Table | None) -> Mapping[str, str] | None:
     if gradebook is not None:
         return row_of(row.person, gradebook)
     person = row.person
-    return person.row if person is not None else None
+    return person.row if person is not None and person.canvas else None
 
 
 def _possible(gradebook: Table | None, title: str) -> str:

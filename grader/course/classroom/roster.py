@@ -7,11 +7,12 @@ import io
 import math
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from fractions import Fraction
 from pathlib import Path
 
+from grader.course.classroom.downloads import CANVAS, CLASSROOM50, GITHUB, MOODLE
 from grader.course.classroom.intake import HandedInEntry
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError
@@ -26,15 +27,33 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
     "name": ("name", "student", "student name", "full name", "fullname"),
     "first": ("first name", "first_name", "firstname", "given name", "given_name"),
     "last": ("last name", "last_name", "lastname", "surname", "family name", "family_name"),
-    "user": ("username", "user", "login", "github_username", "github username", "sis login id", "login id"),
+    "user": ("username", "user", "login", "sis login id", "login id"),
+    "github": ("github_username", "github username"),
     "email": ("email address", "email", "e-mail", "e-mail address"),
     "id": ("id number", "idnumber", "sis user id", "student id", "student_id", "student number", "sid"),
     "canvas": ("id",),
     "identifier": ("identifier",),
     "folder": ("folder", "submission", "directory"),
 }
-#: Columns that identify a person uniquely.
-_EXACT = ("folder", "user", "email", "id", "canvas", "identifier")
+#: Contents that identify a person uniquely. Each is compared with the same content alone: a participant number of
+#: Moodle may be the ID number of somebody else.
+_EXACT = ("folder", "user", "github", "email", "id", "canvas", "number", "identifier")
+#: Ids that one institution gives: two people of one name who differ in one of them are not the same person. A user name
+#: or an address may differ for one person, on two platforms.
+_INSTITUTIONAL = ("id", "canvas")
+#: Columns beside which `ID` is the number of an account in Canvas. Elsewhere it may be any number, and counts as both.
+_OF_CANVAS = frozenset({"sis user id", "sis login id", "section"})
+#: Group of a pattern -> the contents of columns that may hold it.
+_HELD_BY: Mapping[str, tuple[str, ...]] = {
+    "user": ("user", "github"),
+    "email": ("email", "identifier"),
+    "id": ("id", "canvas", "number", "identifier"),
+}
+#: The same for the layouts of platforms, whose names tell more.
+_HELD_BY_IN: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    MOODLE: {"id": ("identifier",)},
+    CANVAS: {"id": ("canvas", "number")},
+}
 # Moodle's grading worksheet says `Submitted for grading - 1 day 3 hours late` in this column.
 _STATUS = "status"
 _LATE = re.compile(r"((?:\d+\s+[a-z]+\s+)+)late\b", re.IGNORECASE)
@@ -58,11 +77,17 @@ class Person:
     user: str = ""  # user name on the platform; empty if the roster has none
     email: str = ""  # email address; empty if the roster has none
     id: str = ""  # number at the institution; empty if the roster has none
-    handles: frozenset[str] = frozenset()  # all ids that are unique to this person, normalised by `fold_handle`
+    # Content of a column -> the ids in it that are unique to this person, normalised by `fold_handle`
+    ids: Mapping[str, frozenset[str]] = field(default_factory=dict)
     names: frozenset[str] = frozenset()  # spellings of the name, without spaces and accents
     row: Mapping[str, str] | None = None  # column -> value on the roster; None for a person who is not on a roster
     canvas: str = ""  # number of the account in Canvas; empty if the roster has none
     surname: str = ""  # as the roster has it; empty if it does not tell the surname
+
+    @property
+    def handles(self) -> frozenset[str]:
+        """All ids that are unique to this person, whatever they are."""
+        return frozenset[str]().union(*self.ids.values())
 
     @property
     def platform_ids(self) -> dict[str, str]:
@@ -95,6 +120,7 @@ class Table:
     path: Path
     header: Sequence[str]
     rows: Sequence[Mapping[str, str]]  # column -> value
+    people: Sequence[Person]  # who each row is about; without ids and names if no column identifies people
 
 
 def read_table(path: Path) -> Table:
@@ -112,7 +138,9 @@ def read_table(path: Path) -> Table:
     if len(rows) > MAX_ROWS:
         raise ClassError(f"{path}: expected at most {MAX_ROWS} rows, found more")
     header = rows[0]
-    return Table(path, header, [dict(zip(header, [*row, *[""] * len(header)], strict=False)) for row in rows[1:]])
+    values = [dict(zip(header, [*row, *[""] * len(header)], strict=False)) for row in rows[1:]]
+    columns = columns_of(header)
+    return Table(path, header, values, [person_of(row, columns) for row in values])
 
 
 def read_roster(path: Path) -> list[Person]:
@@ -126,7 +154,7 @@ def read_roster(path: Path) -> list[Person]:
         known = listed([names[0] for names in COLUMNS.values()])
         found = listed([shown(name, 30) for name in table.header[:6]], "and")
         raise ClassError(f"{path}:1: expected a column {known}, found {found}", "name the columns in the first line")
-    return [person for row in table.rows if not _is_no_person(row) and (person := person_of(row, columns)).name]
+    return [person for person in table.people if person.name and not _is_no_person(person.row or {})]
 
 
 def columns_of(header: Sequence[str]) -> dict[str, list[str]]:
@@ -163,35 +191,60 @@ def person_of(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> P
     def value(kind: str) -> str:
         return next((row[name].strip() for name in columns.get(kind, ()) if row[name].strip()), "")
 
-    exact = [row[name] for kind in _EXACT for name in columns.get(kind, ()) if row[name].strip()]
-    numbers = [match[1] for text in exact if (match := _PARTICIPANT.fullmatch(text.strip()))]
+    exact = {kind: [row[name] for name in columns.get(kind, ()) if row[name].strip()] for kind in _EXACT}
+    exact["identifier"] += [match[1] for text in exact["identifier"] if (match := _PARTICIPANT.fullmatch(text.strip()))]
+    of_canvas = not _OF_CANVAS.isdisjoint(name.strip().casefold() for name in row)
+    if not of_canvas:
+        exact["number"] = exact.pop("canvas")
     first, last = value("first"), value("last")
     name = f"{first} {last}".strip() or _in_reading_order(value("name"))
     before, comma, _ = value("name").partition(",")
     return Person(
         surname=last or (before.strip() if comma else ""),
-        name=name or value("identifier") or next(iter(exact), "").strip(),
-        user=value("user"),
+        name=name or value("identifier") or next((text.strip() for texts in exact.values() for text in texts), ""),
+        user=value("user") or value("github"),
         email=value("email"),
-        id=value("id"),
-        canvas=value("canvas"),
-        handles=frozenset(map(fold_handle, [*exact, *numbers])),
+        id=value("id") or ("" if of_canvas else value("canvas")),
+        canvas=value("canvas") if of_canvas else "",
+        ids={kind: frozenset(map(fold_handle, texts)) for kind, texts in exact.items() if texts},
         names=frozenset(spellings(name)),
         row=row,
     )
 
 
 def row_of(person: Person | None, table: Table | None) -> Mapping[str, str] | None:
-    """Find the row of a person in a table by unique ids, then by name; None unless exactly one row matches."""
+    """Find the row of a person in a table by unique ids, then by name; None unless exactly one row matches.
+
+    Somebody of the same name with another number is another person.
+    """
     if person is None or table is None:
         return None
-    columns = columns_of(table.header)
-    handles = person.handles | {fold_handle(t) for t in (person.user, person.email, person.id) if t}
-    exact = [name for kind in ("email", "user", "id", "canvas", "identifier") for name in columns.get(kind, ())]
-    found = [r for r in table.rows if any(r[name].strip() and fold_handle(r[name]) in handles for name in exact)]
+    found = [other for other in table.people if _share_an_id(person, other)]
     if not found:
-        found = [r for r in table.rows if person_of(r, columns).names & person.names]
-    return found[0] if len(found) == 1 else None
+        namesakes = (other for other in table.people if other.names & person.names)
+        found = [other for other in namesakes if not _differ(person.ids, other.ids, _INSTITUTIONAL)]
+    return found[0].row if len(found) == 1 else None
+
+
+def _share_an_id(one: Person, other: Person) -> bool:
+    """Whether two people have an id of the same kind in common; an address is one wherever it stands."""
+    same = any(one.ids[kind] & other.ids[kind] for kind in one.ids.keys() & other.ids.keys() if kind != "folder")
+    return (
+        same
+        or _by_number(one, other)
+        or _by_number(other, one)
+        or any("@" in id_ for id_ in one.handles & other.handles)
+    )
+
+
+def _by_number(one: Person, other: Person) -> bool:
+    numbers = one.ids.get("number", frozenset[str]())
+    return any(numbers & other.ids.get(kind, frozenset[str]()) for kind in _INSTITUTIONAL)
+
+
+def _differ(one: Mapping[str, frozenset[str]], other: Mapping[str, frozenset[str]], kinds: Iterable[str]) -> bool:
+    """Whether both have ids of one of the kinds, and none in common."""
+    return any(kind in one and kind in other and not one[kind] & other[kind] for kind in kinds)
 
 
 def late_by(person: Person | None, worksheet: Table | None = None) -> str:
@@ -247,13 +300,13 @@ class RosterMatch:
 def match(entries: Sequence[HandedInEntry], roster: Sequence[Person] | None) -> RosterMatch:
     """Match submissions to people.
 
-    Unique ids (user name, number, email address, folder) take precedence over names. If several people match, none is
-    chosen. Without a roster, people are named after their submissions.
+    Unique ids (user name, number, email address, folder) take precedence over names, and each is compared with ids of
+    its kind. If several people match, none is chosen. Without a roster, people are named after their submissions.
     """
     if roster is None:
         people = {entry.name: _unknown(entry) for entry in entries}
         return RosterMatch(people, duplicates=_twice(entries))
-    found: dict[str, list[int]] = {entry.name: _candidates(entry, roster) for entry in entries}
+    found = _candidates(entries, roster)
     clear = {name: people[0] for name, people in found.items() if len(people) == 1}
     several: dict[int, list[str]] = {}
     for name, index in clear.items():
@@ -273,7 +326,18 @@ def _unknown(entry: HandedInEntry) -> Person:
     identity = entry.identity
     name = identity.get("name") or identity.get("user") or identity.get("email") or entry.label
     names = frozenset({fold_name(name)} - {""})
-    return Person(name, identity.get("user", ""), identity.get("email", ""), identity.get("id", ""), names=names)
+    ids = {kinds[0]: frozenset({text}) for kinds, text in _told(entry)}
+    number = identity.get("id", "")
+    return Person(
+        name=name,
+        user=identity.get("user", ""),
+        email=identity.get("email", ""),
+        # A platform's own number for a participant or an account is not the number at the institution.
+        id="" if entry.layout in _HELD_BY_IN else number,
+        canvas=number if entry.layout == CANVAS else "",
+        ids=ids,
+        names=names,
+    )
 
 
 def _twice(entries: Sequence[HandedInEntry]) -> tuple[tuple[str, ...], ...]:
@@ -285,24 +349,70 @@ def _twice(entries: Sequence[HandedInEntry]) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(names) for names in by_student.values() if len(names) > 1)
 
 
-def _candidates(entry: HandedInEntry, roster: Sequence[Person]) -> list[int]:
-    """Return the indices of the people that match an entry by the most reliable criterion that matches anyone."""
-    exact = {fold_handle(text) for kind, text in entry.identity.items() if kind != "name"} | {fold_handle(entry.label)}
-    found = [index for index, person in enumerate(roster) if person.handles & exact]
-    if found:
-        return found
-    names = {fold_name(entry.identity.get("name", entry.label))} - {""}
-    found = [index for index, person in enumerate(roster) if person.names & names]
-    return found or _by_ending(entry, roster)
-
-
-def _by_ending(entry: HandedInEntry, roster: Sequence[Person]) -> list[int]:
-    """Return the people whose user name ends the name of a clone; the longest user name wins."""
-    label = fold_handle(entry.label)
-    lengths = {
-        index: len(person.user)
-        for index, person in enumerate(roster)
-        if person.user and label.endswith(f"-{fold_handle(person.user)}")
+def _candidates(entries: Sequence[HandedInEntry], roster: Sequence[Person]) -> dict[str, list[int]]:
+    """Return name of an entry -> the indices of the people who match it by the most reliable criterion that does."""
+    exact = {entry.name: [i for i, person in enumerate(roster) if _is_exactly(entry, person)] for entry in entries}
+    # Names of columns do not tell whether their ids are those of this download; that somebody matches does.
+    shared = {
+        kind
+        for entry in entries
+        for index in exact[entry.name]
+        for kinds, text in _told(entry)
+        for kind in kinds
+        if text in roster[index].ids.get(kind, ())
     }
-    longest = max(lengths.values(), default=0)
-    return [index for index, length in lengths.items() if length == longest]
+    clones = _clones(entries, roster)
+    return {e.name: exact[e.name] or _named(e, roster, shared) or clones.get(e.name, []) for e in entries}
+
+
+def _told(entry: HandedInEntry) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield each unique id in the name of a submission, normalised, with the contents of columns that may hold it."""
+    held_by = {**_HELD_BY, **_HELD_BY_IN.get(entry.layout, {})}
+    for group, text in entry.identity.items():
+        if group in held_by:
+            yield held_by[group], fold_handle(text)
+
+
+def _is_exactly(entry: HandedInEntry, person: Person) -> bool:
+    """Whether a unique id matches: one that the name tells, or else whatever the whole name may be."""
+    label = fold_handle(entry.label)
+    if not entry.identity:
+        return label in person.handles
+    if label in person.ids.get("folder", ()):
+        return True
+    return any(text in ids for kinds, text in _told(entry) for ids in _held(entry, person, kinds))
+
+
+def _held(entry: HandedInEntry, person: Person, kinds: Sequence[str]) -> Iterator[frozenset[str]]:
+    """Yield the ids of a person that may be meant: at GitHub, its user name and no other, if the roster has it."""
+    if entry.layout in (GITHUB, CLASSROOM50) and "github" in person.ids:
+        kinds = ["github"]
+    yield from (person.ids[kind] for kind in kinds if kind in person.ids)
+
+
+def _named(entry: HandedInEntry, roster: Sequence[Person], shared: Collection[str]) -> list[int]:
+    """Return the people of the name, but for those who have another id of a kind by which this class is matched."""
+    name = entry.identity.get("name", "") if entry.identity else entry.label
+    names = {fold_name(name)} - {""}
+    told: dict[str, frozenset[str]] = {}
+    for kinds, text in _told(entry):
+        told |= {kind: told.get(kind, frozenset()) | {text} for kind in kinds}
+    return [i for i, p in enumerate(roster) if p.names & names and not _differ(told, p.ids, shared)]
+
+
+def _clones(entries: Sequence[HandedInEntry], roster: Sequence[Person]) -> dict[str, list[int]]:
+    """Return name of an entry -> the people whose user name follows what the names of several clones begin with.
+
+    `hw-mal-li` is not the clone of `li` where others begin with `hw-`: its user is called `mal-li`.
+    """
+    labels = {entry.name: fold_handle(entry.label) for entry in entries if "user" not in entry.identity}
+    users = {i: p.ids.get("github", p.ids.get("user", frozenset[str]())) for i, p in enumerate(roster)}
+    ends = {
+        name: [(label[: -len(user)], i) for i, ids in users.items() for user in ids if label.endswith(f"-{user}")]
+        for name, label in labels.items()
+    }
+    whole = [fold_handle(entry.label) for entry in entries]
+    proposed = {prefix for found in ends.values() for prefix, _ in found}
+    several = {prefix for prefix in proposed if sum(label.startswith(prefix) for label in whole) > 1}
+    shortest = {p for p in several if not any(p != other and p.startswith(other) for other in several)}
+    return {name: [index for prefix, index in found if prefix in shortest] for name, found in ends.items()}

@@ -72,7 +72,8 @@ def judgement(
     """Read the rubrics to judge by; raises RubricError for an unusable rubric or an unknown exercise."""
     request = GradeRequest("", every=True, exercises=chosen, rubrics=rubrics, draw=First())
     exercises = read_exercises(request, recorded=True)
-    return Judgement(tuple(exercises), chosen, rubrics, pictures, verify)
+    ids = tuple(exercise.id for exercise in exercises) if chosen else ()  # numbers and paths stand for them, too
+    return Judgement(tuple(exercises), ids, rubrics, pictures, verify)
 
 
 def rejudge(evidence: Evidence, how: Judgement) -> Report:
@@ -214,7 +215,7 @@ def _write(name: str, report: Report, wanted: Wanted) -> None:
         if output.path is not None:
             path = output.path / f"{name}{known(output.format).suffix}"
             path.parent.mkdir(parents=True, exist_ok=True)
-            write_report(report, Output(output.format, path), wanted.readers)
+            write_report(report, replace(output, path=path), wanted.readers)
 
 
 def _asked(evidence: Evidence, how: Judgement) -> list[Exercise]:

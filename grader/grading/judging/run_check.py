@@ -17,6 +17,7 @@ from grader.grading.model.wording import quote, span
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.extras import pip_install
 from grader.runtime.model.scenario import Scenario, is_launch_file
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Request, Response, Trace
@@ -156,7 +157,7 @@ def _for_what_is_lacking(
     hint = f"grade again where {lack.name} is installed, or leave the import out if the program does not need it"
     if lack.name in EXTRAS:
         text = f"{fault_place(lack.fault)}: {lack.name} comes with ROS 2 and is not installed where this was graded"
-        hint = f"grade again after pip install 'rclpy-grader[{EXTRAS[lack.name]}]', which brings {lack.name}"
+        hint = f"grade again after {pip_install(EXTRAS[lack.name])}, which brings {lack.name}"
     if lack.name.endswith(INTERFACES):
         hint = f"grade again with --interfaces and the folder of {lack.name}, which has its definitions"
     return Answer(problem=f"{text}, which is not the program's fault", hint=hint, fault=lack.fault)

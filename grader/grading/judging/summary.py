@@ -15,6 +15,7 @@ from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_pack
 from grader.grading.judging.judge_run import same_names, started, unheard
 from grader.grading.judging.values import as_number
 from grader.grading.model.report import Pace, Summary, TopicSummary
+from grader.runtime.model.extras import pip_install
 from grader.runtime.model.quantities import NS_PER_S, seconds
 from grader.runtime.model.trace import Fault, Message, Offer, Trace
 
@@ -67,7 +68,7 @@ def _hint(fault: Fault, trace: Trace, sources: Mapping[str, str]) -> str:
     if lack is None:
         return hint_for(fault, trace, text)
     if lack.name in EXTRAS:
-        return f"{lack.name} is not installed here: pip install 'rclpy-grader[{EXTRAS[lack.name]}]' brings it"
+        return f"{lack.name} is not installed here: {pip_install(EXTRAS[lack.name])} brings it"
     if lack.name.endswith(INTERFACES):
         return f"{lack.name} is not installed here: give the folder with its definitions as --interfaces"
     kind = "part" if "." in lack.name else "package"

@@ -168,7 +168,12 @@ class GradingOptions:
         "auto: the strongest sandbox that holds here; none: run the student's code without one.",
         kind=OptionKind.CHOICE,
         choices=SANDBOXES,
-        commands={GRADE: "", BATCH: _AS_IN_GRADE, VERIFY: "", OBSERVE: _AS_IN_GRADE},
+        commands={
+            GRADE: "",
+            BATCH: f"As in `grade`, but {ISOLATION} is not read.",
+            VERIFY: "",
+            OBSERVE: _AS_IN_GRADE,
+        },
         environment=ISOLATION,
         reads_environment=(GRADE, VERIFY, OBSERVE),  # what a class is graded in is said in the command
         kept=True,

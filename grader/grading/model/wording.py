@@ -13,6 +13,8 @@ from grader.runtime.model.quantities import seconds
 QUOTE_LENGTH = 120
 #: Memory address of an object in Python's repr; it differs in every run.
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]{6,16}\b")
+# A name of a file, module, program, node or parameter, as nearly everybody writes it.
+_NAME = re.compile(r"(?=.*\w)[\w./+~-]{1,80}…?", re.ASCII)
 
 
 def moment(t_ns: int) -> str:
@@ -39,6 +41,15 @@ def quote(text: str, length: int = QUOTE_LENGTH) -> str:
     """Return a student's text on one line, without memory addresses, cut to `length` characters."""
     line = _ADDRESS.sub("", " ".join(text[: 4 * length].split()))
     return line if len(line) <= length else line[: length - 1] + "…"
+
+
+def named(text: str, length: int = QUOTE_LENGTH) -> str:
+    """Return a student's word inside a sentence of the grader: as it is if it looks like a name, else in quotes.
+
+    Without quotes, words after a full stop would read as the grader's own.
+    """
+    line = quote(text, length)
+    return line if _NAME.fullmatch(line) else f"""'{line.replace("'", '"')}'"""
 
 
 def in_unit(unit: str) -> str:

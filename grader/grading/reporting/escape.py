@@ -39,8 +39,9 @@ _LINKED = re.compile(r"(?i)(?P<before>(?:https?|ftp|www|GH|:[a-z0-9_+-]{1,40}(?=
 _LISTED = re.compile(r"(?P<number>[0-9]{0,9})(?P<sign>[-+=.)]|:(?=-))")
 _BACKTICKS = re.compile("`+")
 
-# Characters that make spreadsheets read a cell as a formula; Excel also accepts the full-width forms.
-_FORMULA = re.compile(r" *[=+\-@\uff1d\uff0b\uff0d\uff20]")
+# Before characters that make spreadsheets read a cell as a formula; Excel also accepts the full-width forms. A
+# semicolon begins another cell where it separates lists, as in German or French: quotes around all do not count there.
+_FORMULA = re.compile(r"(?:^|(?<=;))(?=[ \"]*[=+\-@\uff1d\uff0b\uff0d\uff20])")
 # Lines that the GitHub Actions runner executes: the current form at the start of a line, the old one anywhere.
 _COMMAND = re.compile(r"^\s*:(?=:)|#(?=#\[)", re.MULTILINE)
 # In JSON inside HTML: what could end the script element or start a comment, and what old JavaScript rejects.
@@ -178,10 +179,10 @@ def xml_text(text: str, *, limit: int = LINES_LIMIT) -> str:
 def csv_cell(text: str, *, limit: int = LIMIT) -> str:
     """Return foreign text for a CSV cell that no spreadsheet reads as a formula.
 
-    A text that looks like a formula gets a leading apostrophe. Our own numbers do not need this; the CSV writer quotes.
+    A text that looks like a formula gets a leading apostrophe, and so does one behind a semicolon, which separates
+    cells in some countries. Our own numbers do not need this; the CSV writer quotes.
     """
-    line = shown(text, limit=limit)
-    return f"'{line}" if _FORMULA.match(line) else line
+    return _FORMULA.sub("'", shown(text, limit=limit))
 
 
 def json_value(value: object) -> Any:

@@ -19,7 +19,7 @@ from grader.runtime.model.limits import (
     MAX_PATH_BYTES,
     MAX_TOTAL_BYTES,
 )
-from grader.runtime.model.wording import first_of
+from grader.runtime.model.wording import first_of, shown
 
 #: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`.
 GENERATED_MARKERS = ("pyvenv.cfg", "COLCON_IGNORE")
@@ -154,6 +154,12 @@ class Collected:
     # Relative POSIX path and content; every path stays inside, and paths are unique
     files: tuple[tuple[str, bytes], ...]
     notes: tuple[str, ...] = ()  # sentences about skipped files
+
+
+def largest_of(files: Iterable[tuple[str, bytes]]) -> str:
+    """Describe the largest of some files, for somebody who has handed in too much."""
+    name, content = max(files, key=lambda file: len(file[1]))
+    return f"the largest file is {shown(name, 80)}, {len(content) / (1 << 20):.1f} MiB"
 
 
 @dataclass(slots=True)

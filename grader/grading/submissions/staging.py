@@ -18,6 +18,7 @@ from grader.grading.submissions.collected import (
     SubmissionLimits,
     is_skipped_file,
     is_skipped_folder,
+    largest_of,
 )
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError, SubmissionError
@@ -45,9 +46,9 @@ def collect_folder(folder: Path, *, into: Path, where: str, limits: SubmissionLi
             content = _content(top, relative, left, limits.file_bytes)
             if content is not None:
                 total += len(content)
-                if total > limits.total_bytes:
-                    raise _too_much(where, f"{limits.total_bytes >> 20} MiB in all")
                 files.append((relative, content))
+                if total > limits.total_bytes:
+                    raise _too_much(where, f"{limits.total_bytes >> 20} MiB in all", largest_of(files))
     finally:
         os.close(top)
     return Collected(tuple(files), left.notes())
@@ -145,9 +146,10 @@ class _Walk:
             os.close(descriptor)
 
 
-def _too_much(where: str, limit: str) -> SubmissionError:
+def _too_much(where: str, limit: str, remark: str = "") -> SubmissionError:
     hint = "name the folder that holds only your work"
-    return SubmissionError(f"{where}: expected at most {limit}, found more", hint)
+    found = f"found more; {remark}" if remark else "found more"
+    return SubmissionError(f"{where}: expected at most {limit}, {found}", hint)
 
 
 def _holds(descriptor: int, name: str) -> bool:

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
+from grader.runtime.model.wording import shown
 
 #: The packages that come with the grader.
 SHIPPED = Path(__file__).with_name("shipped")
@@ -33,6 +34,16 @@ MAXIMUM_BYTES = 64 * 1024
 MAXIMUM_FIELDS = 500
 MAXIMUM_ELEMENTS = 1_000_000
 MAXIMUM_DEPTH = 40
+#: Characters of a package's name and of the name of a type in lower case, `my_type`, which names of files begin with:
+#: ROS's generators and Python append up to 50, and a file name has 255 at most.
+MAXIMUM_PACKAGE_NAME = 100
+MAXIMUM_TYPE_NAME = 200
+#: Characters of the name of a field or constant: the most that DDS allows a member.
+MAXIMUM_MEMBER_NAME = 255
+#: Digits of a number that may be below 2**31.
+_MOST_DIGITS = 12
+#: Characters of a name or text that is shown.
+_SHOWN = 60
 
 _PACKAGE_NAME = re.compile(r"(?!.*__)(?!.*_\Z)[a-z][a-z0-9_]*", re.ASCII)
 _TYPE_NAME = re.compile(r"[A-Z][A-Za-z0-9]*", re.ASCII)
@@ -55,7 +66,7 @@ class DefinitionError(GraderError):
     """
 
     def __init__(self, package: str, file: str, line: int, problem: str, fix: str) -> None:
-        place = f"{package}/{file}" if file else package
+        place = shown(f"{package}/{file}" if file else package, 3 * _SHOWN)
         super().__init__(f"{place}{f', line {line}' if line else ''}: {problem}", fix)
         self.package = package
         self.file = file
@@ -148,6 +159,10 @@ class Interface:
             yield from section.fields
 
 
+def _quoted(text: str) -> str:
+    return f"'{shown(text, _SHOWN)}'"
+
+
 def _file(definition: DefinitionFile) -> str:
     return f"{definition.kind}/{definition.name}.{definition.kind}"
 
@@ -155,7 +170,8 @@ def _file(definition: DefinitionFile) -> str:
 def files_in(folders: Iterable[Path]) -> list[Path]:
     """The files of all packages in some folders, sorted: definitions and manifests."""
     patterns = (*(f"*.{kind}" for kind in KINDS), "package.xml")
-    return sorted({path for folder in folders for pattern in patterns for path in folder.rglob(pattern)})
+    found = {path for folder in folders for pattern in patterns for path in folder.rglob(pattern)}
+    return sorted(path for path in found if path.is_file())
 
 
 def find_packages(folder: Path) -> tuple[InterfacePackage, ...]:
@@ -213,9 +229,15 @@ def _package_name(home: Path) -> str:
             name = (ET.fromstring(text).findtext("name") or name).strip()  # noqa: S314 - without entities
         except ET.ParseError as error:
             raise DefinitionError(name, "package.xml", error.position[0], "it is not XML", "correct it") from None
+        except (ValueError, LookupError):  # an encoding that expat does not know
+            problem = "it is in an unknown encoding"
+            raise DefinitionError(name, "package.xml", 0, problem, "save it as UTF-8") from None
     if not _PACKAGE_NAME.fullmatch(name):
-        problem = f"{name!r} is not a valid package name"
+        problem = f"{_quoted(name)} is not a valid package name"
         raise DefinitionError(name, "", 0, problem, "use lower-case letters, digits and single underscores")
+    if len(name) > MAXIMUM_PACKAGE_NAME:
+        problem = f"{_quoted(name)} has more than {MAXIMUM_PACKAGE_NAME} characters"
+        raise DefinitionError(name, "", 0, problem, "choose a shorter name")
     if name in sys.stdlib_module_names or keyword.iskeyword(name):
         raise DefinitionError(name, "", 0, "Python has a module or word of this name", "choose another name")
     return name
@@ -244,7 +266,7 @@ def digest(packages: Collection[InterfacePackage]) -> str:
     for package in sorted(packages, key=lambda package: package.name):
         for definition in package.definitions:
             for part in (package.name, definition.kind, definition.name, definition.text):
-                encoded = part.encode()
+                encoded = part.encode("utf-8", "surrogatepass")  # a file name need not be valid text
                 made.update(len(encoded).to_bytes(8, "little") + encoded)
     return made.hexdigest()
 
@@ -288,7 +310,7 @@ def _unknown_type(interface: Interface, member: FieldOrConstant, known: Collecti
     if local and (same or bare):
         near = same[:1] or bare
     fix = f"did you mean {near[0].replace('/msg/', '/')}?" if near else "bring the package that defines it"
-    problem = f"no message {member.type.base.replace('/msg/', '/')} is known"
+    problem = f"no message {shown(member.type.base.replace('/msg/', '/'), _SHOWN)} is known"
     return DefinitionError(interface.package, interface.file, member.line, problem, fix)
 
 
@@ -327,10 +349,13 @@ def read_definition(package: str, definition: DefinitionFile) -> Interface:
     """Read one definition; types of other files are not looked up. Raises DefinitionError."""
     file = _file(definition)
     if not _TYPE_NAME.fullmatch(definition.name):
-        problem = f"{definition.name!r} is not a valid type name"
+        problem = f"{_quoted(definition.name)} is not a valid type name"
         raise DefinitionError(
             package, file, 0, problem, "begin with an upper-case letter, then only letters and digits"
         )
+    if len(definition.name) + sum(c.isupper() for c in definition.name) > MAXIMUM_TYPE_NAME:
+        problem = f"the name {_quoted(definition.name)} is too long for the files that are made of it"
+        raise DefinitionError(package, file, 0, problem, "choose a shorter name")
     sections: list[list[tuple[int, str]]] = [[]]
     for number, line in enumerate(definition.text.replace("\t", " ").splitlines(), start=1):
         if line.rstrip() == "---" and definition.kind != "msg":
@@ -362,11 +387,14 @@ class _Reader:
             type_ = self._type(type_text)
             rest = rest.lstrip()
             if not rest:
-                raise self._error(f"{text!r} has no name", "write a type and a name on each line")
+                raise self._error(f"{_quoted(text)} has no name", "write a type and a name on each line")
             if "=" in rest:
                 member, members = self._constant(type_, rest), constants
             else:
                 member, members = self._field(type_, rest), fields
+            if len(member.name) > MAXIMUM_MEMBER_NAME:
+                problem = f"the name {_quoted(member.name)} has more than {MAXIMUM_MEMBER_NAME} characters"
+                raise self._error(problem, "choose a shorter name")
             if member.name in members:
                 raise self._error(f"the name {member.name} is used twice", "choose another one")
             members[member.name] = member
@@ -380,13 +408,14 @@ class _Reader:
     def _type(self, text: str) -> FieldType:
         match = _TYPE.fullmatch(text)
         if match is None:
-            raise self._error(f"{text!r} is not a type", _FIX_TYPE)
+            raise self._error(f"{_quoted(text)} is not a type", _FIX_TYPE)
         base, bound, size = match["base"], match["bound"], match["size"]
         if bound is not None and base not in {"string", "wstring"}:
-            raise self._error(f"{base} cannot have a greatest length", f"write {base} or {base}[<={bound}]")
+            name = shown(base, _SHOWN)
+            raise self._error(f"{name} cannot have a greatest length", f"write {name} or {name}[<={bound}]")
         for number in (bound, size):
-            if number is not None and not 0 < int(number[:12]) < 2**31:
-                raise self._error(f"a length of {number} is not possible", "write a length from 1 on")
+            if number is not None and (len(number) > _MOST_DIGITS or not 0 < int(number) < 2**31):
+                raise self._error(f"a length of {shown(number, _SHOWN)} is not possible", "write a length from 1 on")
         array = "" if not match["array"] else "unbounded" if size is None else "bounded" if match["limit"] else "fixed"
         return FieldType(self._base(base), int(bound) if bound else None, array, int(size or 0))
 
@@ -400,16 +429,16 @@ class _Reader:
         near = difflib.get_close_matches(base, (*PRIMITIVES, "float64", "int32"), n=1, cutoff=0.6)
         usual = {"int": "int32", "float": "float32", "double": "float64", "boolean": "bool", "str": "string"}.get(base)
         fix = f"did you mean {usual or near[0]}?" if usual or near else _FIX_TYPE
-        raise self._error(f"{base!r} is not a type", fix)
+        raise self._error(f"{_quoted(base)} is not a type", fix)
 
     def _field(self, type_: FieldType, rest: str) -> FieldOrConstant:
         name, _, default = rest.partition(" ")
         if not _PACKAGE_NAME.fullmatch(name):
             raise self._error(
-                f"{name!r} is not a valid field name", "use lower-case letters, digits and single underscores"
+                f"{_quoted(name)} is not a valid field name", "use lower-case letters, digits and single underscores"
             )
         if keyword.iskeyword(name):
-            raise self._error(f"{name!r} is a word of Python", "choose another name")
+            raise self._error(f"{_quoted(name)} is a word of Python", "choose another name")
         return FieldOrConstant(
             type_, name, self._default(type_, default.strip()) if default.strip() else None, self._line
         )
@@ -419,7 +448,7 @@ class _Reader:
         name = name.rstrip()
         if not _CONSTANT_NAME.fullmatch(name):
             raise self._error(
-                f"{name!r} is not a valid constant name", "use upper-case letters, digits and single underscores"
+                f"{_quoted(name)} is not a valid constant name", "use upper-case letters, digits and single underscores"
             )
         if not type_.primitive or type_.array or type_.string_bound:
             raise self._error("a constant cannot have this type", "use a number, a bool or a string")
@@ -431,7 +460,7 @@ class _Reader:
         if not type_.array:
             return self._value(type_.base, text, type_.string_bound)
         if not (text.startswith("[") and text.endswith("]")):
-            raise self._error(f"{text!r} is not a list", "write the default as [1, 2, 3]")
+            raise self._error(f"{_quoted(text)} is not a list", "write the default as [1, 2, 3]")
         parts = (
             self._strings(text[1:-1]) if "string" in type_.base else [each.strip() for each in text[1:-1].split(",")]
         )
@@ -449,7 +478,7 @@ class _Reader:
         while position < len(text.rstrip()):
             match = pattern.match(text, position)
             if match is None:
-                raise self._error(f"[{text}] is not a list of strings", 'write ["one", "two"]')
+                raise self._error(f"{_quoted(f'[{text}]')} is not a list of strings", 'write ["one", "two"]')
             parts.append(match[1])
             position = match.end()
         return parts
@@ -457,7 +486,7 @@ class _Reader:
     def _value(self, base: str, text: str, bound: int | None) -> Value:
         if base == "bool":
             if text.lower() not in {"true", "false", "1", "0"}:
-                raise self._error(f"{text!r} is not a bool", "write true or false")
+                raise self._error(f"{_quoted(text)} is not a bool", "write true or false")
             return text.lower() in {"true", "1"}
         if base in {"string", "wstring"}:
             return self._string(text, bound)
@@ -470,7 +499,7 @@ class _Reader:
         except ValueError:
             number = high + 1
         if not low <= number <= high:
-            raise self._error(f"{text!r} is not of type {base}", f"write a whole number from {low} to {high}")
+            raise self._error(f"{_quoted(text)} is not of type {base}", f"write a whole number from {low} to {high}")
         return number
 
     def _float(self, text: str) -> float:
@@ -479,7 +508,7 @@ class _Reader:
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            raise self._error(f"{text!r} is not a number", "write a number such as 0.5")
+            raise self._error(f"{_quoted(text)} is not a number", "write a number such as 0.5")
         return number
 
     def _string(self, text: str, bound: int | None) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import sys
+import tempfile
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,12 @@ from grader.runtime.interfaces.definitions import (
     digest,
     find_packages,
 )
+from grader.runtime.model.errors import GraderError
+from grader.runtime.model.wording import shown
+
+#: Characters of an exception that a note shows.
+_CAUSE = 200
+_PLAIN = InterfacePackage("plain_msgs", (DefinitionFile("msg", "Plain", "int32 value\n"),))
 
 
 def main() -> None:
@@ -35,8 +42,30 @@ def main() -> None:
     try:
         answer = answer_to(Path(request["submission"]), Path(request["into"]), others, request)
     except DefinitionError as error:
-        answer = {"packages": {}, "folder": "", "problems": [f"{error.message}; {error.hint}"]}
+        answer = _failed(f"{error.message}; {error.hint}")
+    except MemoryError:
+        raise
+    except Exception as error:
+        # Names and values that ROS's generators or the file system do not take: no list of them can be complete.
+        if not _builds_others(Path(request["into"]), request):
+            raise
+        cause = shown(f"{type(error).__name__}: {error}", _CAUSE)
+        answer = _failed(f"the interface definitions of the submission are not used: building them ended with {cause}")
     sys.stdout.write(json.dumps(answer))
+
+
+def _failed(problem: str) -> dict[str, Any]:
+    return {"packages": {}, "folder": "", "problems": [problem]}
+
+
+def _builds_others(into: Path, request: Mapping[str, list[str]]) -> bool:
+    """Whether a plain package can be built here, so that what failed are the definitions and not the machine."""
+    try:
+        with tempfile.TemporaryDirectory(dir=into) as cache:
+            build([_PLAIN], Path(cache), [*map(Path, request["share"])])
+    except (GraderError, OSError):
+        return False
+    return True
 
 
 def answer_to(

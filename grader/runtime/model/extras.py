@@ -8,6 +8,15 @@ import sys
 
 from grader.runtime.model.errors import EnvironmentFault
 
+#: What pip installs the grader from: until there is a release, a clone in the current folder. `.ci/release --switch`
+#: changes it, as it does on all pages.
+PACKAGE = "./rclpy-grader"
+
+
+def pip_install(extra: str) -> str:
+    """Return the command that adds an extra, for reports, which do not depend on the machine they are made on."""
+    return f"pip install '{PACKAGE}[{extra}]'"
+
 
 def require(what: str, library: str, extra: str) -> None:
     """Raise EnvironmentFault, with the command to install it, if the library of an optional extra is missing."""

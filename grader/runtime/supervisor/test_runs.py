@@ -25,6 +25,7 @@ from typing import Any, TypeVar
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault, HarnessError
+from grader.runtime.model.extras import pip_install
 from grader.runtime.model.quantities import NS_PER_S, duration
 from grader.runtime.model.scenario import RubricTest
 from grader.runtime.model.trace import ClockKind, Observation, Tested, Trace
@@ -102,7 +103,7 @@ def record_tests(
 
 def _ask_for_pytest() -> None:
     if importlib.util.find_spec("pytest") is None:
-        hint = "pip install 'rclpy-grader[tests]', or pip install pytest"
+        hint = f"{pip_install('tests')}, or pip install pytest"
         raise EnvironmentFault("the rubric has tests for pytest, which is not installed", hint)
 
 

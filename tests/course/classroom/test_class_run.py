@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
+import os
 import shutil
+import tarfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,10 +16,15 @@ from typing import Any
 import pytest
 from class_samples import GRADING, FakeScheduler, course, grade, hand_in, scores
 
+from grader.course.classroom import class_run
+from grader.course.classroom.final_marks import load_mark
 from grader.course.classroom.gradebook import Status
-from grader.course.classroom.outputs import Graded
+from grader.course.classroom.last_run import read_last_run
+from grader.course.classroom.outputs import Graded, Platforms, render_summary
 from grader.course.classroom.store import SEED_KEY, State, Store, open_store
+from grader.course.classroom.watching import Watcher
 from grader.grading.app.seeds import SeedKey
+from grader.grading.reporting.html.final_mark import FinalMark
 from grader.runtime.model.errors import ClassError, HarnessError
 
 
@@ -229,3 +237,117 @@ def test_a_seed_for_everybody_needs_no_key(tmp_path: Path) -> None:
     grade(course(tmp_path / "in", tmp_path / "out", grading=replace(GRADING, seed=5)), scheduler)
     assert seeds(scheduler) == {"ada": 5}
     assert not (tmp_path / "out" / SEED_KEY).exists()
+
+
+#: A name in Latin-1, as a zip from Windows gives a folder on Linux.
+LATIN_1 = os.fsdecode("M\xfcller".encode("latin-1"))
+
+
+@pytest.mark.parametrize("layout", ["{}", "{}_1_assignsubmission_file_", "hw-{}"])
+def test_a_name_in_another_encoding_stops_nobody(tmp_path: Path, layout: str) -> None:
+    """Everybody after it in the class has a mark, in whatever layout; the next run goes on from there."""
+    source = tmp_path / "hw-submissions"
+    for name in ("ada", LATIN_1, "zoe"):
+        hand_in(source, **{layout.format(name): 7})
+    wanted = course(source, tmp_path / "out", platforms=Platforms(gradescope=True))
+    for done_before in (0, 3):
+        graded = grade(wanted)
+        assert (graded.kept_before, graded.remarks) == (done_before, ())
+        marks = [load_mark(path.read_bytes()) for path in sorted((tmp_path / "out" / "students").glob("*/mark.json"))]
+        assert [mark and mark.adjusted.score for mark in marks] == [7, 7, 7]
+        assert [mark and "\ufffd" in mark.student for mark in marks] == [False, True, False]
+        assert f"written: {tmp_path}/out/gradescope.csv" in render_summary(graded)
+
+
+def test_a_download_with_a_name_in_another_encoding(tmp_path: Path) -> None:
+    """The name of a member of a tar archive is bytes, too."""
+    with tarfile.open(tmp_path / "hw.tar", "w") as archive:
+        for name in ("ada", LATIN_1, "zoe"):
+            info = tarfile.TarInfo(f"{name}/score.py")
+            info.size = 1
+            archive.addfile(info, io.BytesIO(b"7"))
+    assert list(scores(grade(course(tmp_path / "hw.tar", tmp_path / "out"))).values()) == [7, 7, 7]
+    assert len(list((tmp_path / "out" / "students").glob("*/mark.json"))) == 3
+
+
+def test_folders_in_another_encoding_are_graded_again(tmp_path: Path) -> None:
+    """What the next run repeats is read as it was written: folders of class and results, and paths of options."""
+    hand_in(tmp_path / LATIN_1, ada=10)
+    wanted = course(tmp_path / LATIN_1, tmp_path / f"out-{LATIN_1}", options={"roster": (f"/x/{LATIN_1}.csv",)})
+    for _ in range(2):
+        assert scores(grade(wanted)) == {"ada": 10}
+    assert read_last_run(wanted.results).options == wanted.options
+
+
+def test_a_row_that_cannot_be_written_stops_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The remark names the submission; its mark is in the gradebook."""
+
+    def fails_for_bob(page: str, mark: FinalMark) -> str:
+        if mark.student == "bob":
+            raise UnicodeEncodeError("utf-8", "\udcfc", 0, 1, "surrogates not allowed")
+        return f"{page}{mark.student}"
+
+    monkeypatch.setattr(class_run, "with_final_mark", fails_for_bob)
+    hand_in(tmp_path / "in", ada=10, bob=7, cleo=5)
+    graded = grade(course(tmp_path / "in", tmp_path / "out"))
+    assert scores(graded) == {"ada": 10, "bob": 7, "cleo": 5}
+    assert [remark.partition(",")[0] for remark in graded.remarks] == ["the pages of bob do not show the final mark"]
+    pages = sorted((tmp_path / "out" / "students").glob("*/report.html"))
+    assert [page.read_text(encoding="utf-8") for page in pages] == ["ada", "cleo"]
+    assert graded.remarks[0] in json.loads((tmp_path / "out" / "batch.json").read_bytes())["remarks"]
+
+
+TWINS = "name,student id\nMaria Schmidt,11\nMaria Schmidt,12\nEve Ill,13\nZoe,14\n"
+
+
+def decided(tmp_path: Path, text: str) -> dict[str, Any]:
+    """Write a roster and decisions, and return the options with them."""
+    (tmp_path / "roster.csv").write_text(TWINS, encoding="utf-8")
+    (tmp_path / "adjust.yaml").write_text(f"students:\n{text}", encoding="utf-8")
+    return {"roster": tmp_path / "roster.csv", "adjustments": tmp_path / "adjust.yaml"}
+
+
+def test_people_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    """By the name of the submission, wherever a list has names only."""
+    hand_in(tmp_path / "in", **{"11": 4, "12": 7, "14": 5})
+    regraded(tmp_path, **decided(tmp_path, "  '14': {comment: good}\n"))
+    marks = "  '11': {score: 9, reason: r}\n  '14': {score: 6, reason: r}\n"
+    graded = regraded(tmp_path, **decided(tmp_path, marks))[1]
+    assert graded.moved == ("Maria Schmidt (11) 4 -> 9", "Zoe 5 -> 6")
+    assert "    Maria Schmidt (11) 4 -> 9" in render_summary(graded)
+
+
+def test_who_is_excused_has_not_handed_in_nothing(tmp_path: Path) -> None:
+    """Neither on the terminal, nor in the counts, nor on the page."""
+    hand_in(tmp_path / "in", **{"14": 5})
+    graded = regraded(tmp_path, **decided(tmp_path, "  Eve Ill: {ignore: ill}\n"))[1]
+    summary = render_summary(graded)
+    assert "nothing handed in (2): Maria Schmidt (11), Maria Schmidt (12)\n" in summary
+    assert "excused (1): Eve Ill\n" in summary
+    assert (graded.book.count(Status.MISSING), graded.book.count(Status.EXCUSED)) == (2, 1)
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "Excused" in page
+
+
+def test_a_decision_by_a_number_of_two_people_is_asked_for(tmp_path: Path) -> None:
+    """Also where one of them has handed in nothing: nobody gets the points of the other."""
+    source = tmp_path / "in"
+    for name in ("Zoe_12_assignsubmission_file_", "Eve Ill_8_assignsubmission_file_"):
+        hand_in(source, **{name: 5})
+    with pytest.raises(ClassError, match=r"expected one student, found 2 for `12`") as error:
+        regraded(tmp_path, **decided(tmp_path, "  '12': {score: 9, reason: r}\n"))
+    assert error.value.hint == "name one of the submissions: `zoe-12` or `Maria Schmidt`"
+
+
+def test_results_of_another_class_are_not_replaced_in_silence(tmp_path: Path) -> None:
+    """A warning names where they came from, once."""
+    for place, name in (("one", "ada"), ("two", "bob")):
+        hand_in(tmp_path / place, **{name: 5})
+    said: list[str] = []
+    for source in ("one", "one", "two", "two"):
+        wanted = course(tmp_path / source, tmp_path / "out")
+        class_run.grade_class(wanted, Watcher(lambda line: None), said.append, FakeScheduler())
+    assert said == [
+        f"{tmp_path}/out holds 1 result of another class, of {tmp_path}/one: they stay, but gradebook and page show "
+        "this class; name another folder with -o to keep both"
+    ]

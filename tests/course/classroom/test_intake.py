@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import shutil
 import stat
 import sys
 import tarfile
@@ -15,9 +16,11 @@ from typing import Any
 
 import pytest
 
+from grader.course.classroom import downloads
 from grader.course.classroom.downloads import AUTO
-from grader.course.classroom.intake import HandedInEntry, Intake, take_in
-from grader.runtime.model.errors import ClassError
+from grader.course.classroom.intake import HandedInEntry, Intake, check_places, take_in
+from grader.grading.submissions.submission import collect_submission
+from grader.runtime.model.errors import ClassError, SubmissionError
 from grader.runtime.model.limits import MAX_ARCHIVE_BYTES
 
 PY = b"print('hello')\n"
@@ -105,6 +108,47 @@ def test_results_in_the_folder_of_submissions_are_none_of_them(tmp_path: Path) -
     assert names(take_in([class_], class_ / "out")) == ["ada"]
 
 
+@pytest.mark.parametrize("place", ["class", "class/ada/out", "class/ada/deeper/out"])
+def test_results_are_not_written_among_submissions(tmp_path: Path, place: str) -> None:
+    """Everybody's programs would be in somebody's submission, and the results themselves be graded."""
+    class_ = put(tmp_path / "class", "ada/a.py", "bob/b.py")
+    with pytest.raises(ClassError, match="expected a folder for results, found that it is among the submissions"):
+        check_places([class_], tmp_path / place)
+    check_places([class_], class_ / "out")
+    check_places([class_], tmp_path)
+
+
+@pytest.mark.parametrize("place", ["students", "unpacked/hw"])
+def test_results_are_not_submissions(tmp_path: Path, place: str) -> None:
+    """A part of the results folder is no class."""
+    put(tmp_path / "out" / place, "ada/a.py")
+    with pytest.raises(ClassError, match="expected submissions, found a part of the results"):
+        check_places([tmp_path / "out" / place], tmp_path / "out")
+
+
+def test_results_of_another_run_are_not_graded(tmp_path: Path) -> None:
+    """They may lie beside the submissions."""
+    class_ = put(tmp_path / "class", "ada/a.py", "old/run.json", "old/students/ada/report.json", "old/assets/x.js")
+    intake = found(tmp_path, class_)
+    assert names(intake) == ["ada"]
+    assert intake.strays == (f"{class_}/old: the results of a class, so it is not graded",)
+
+
+def test_a_source_counts_once(tmp_path: Path) -> None:
+    """However it is named, and a download also as a copy."""
+    class_ = put(tmp_path / "class", "ada/a.py", "bob/b.py")
+    (tmp_path / "link").symlink_to(class_)
+    archive = zipped(tmp_path / "hw.zip", {"cleo/c.py": PY, "dan/d.py": PY})
+    shutil.copy(archive, tmp_path / "hw (1).zip")
+    intake = found(tmp_path, class_, class_, tmp_path / "link", archive, tmp_path / "hw (1).zip")
+    assert names(intake) == ["ada", "bob", "cleo", "dan"]
+    assert [stray.partition(": ")[2] for stray in intake.strays] == [
+        "given twice, so it is counted once",
+        f"given twice, first as {class_}, so it is counted once",
+        f"given twice, first as {archive}, so it is counted once",
+    ]
+
+
 def test_a_link_is_not_followed(tmp_path: Path) -> None:
     """It may lead to somebody else's work."""
     class_ = put(tmp_path / "class", "ada/a.py")
@@ -183,7 +227,87 @@ def test_canvas(tmp_path: Path) -> None:
     ada, bob = intake.entries
     assert (dict(ada.identity), ada.late) == ({"name": "lovelaceada", "id": "1001"}, False)
     assert contents(ada) == ["odom_subscriber.py", "velocity_publisher.py"]
-    assert (dict(bob.identity), bob.late, contents(bob)) == ({"name": "rossbob", "id": "1002"}, True, ["hw.zip"])
+    assert (dict(bob.identity), bob.late, bob.path.name) == ({"name": "rossbob", "id": "1002"}, True, "hw.zip")
+
+
+@pytest.mark.parametrize(
+    ("handed_in", "files"),
+    [
+        (("x.py", "photo-1.png", "photo-2.png"), ["photo-1.png", "photo-2.png", "x.py"]),
+        (("x.py", "x-1.py"), ["x-1.py", "x.py"]),
+        (("x-1.py", "x-2.py"), ["x-1.py", "x-2.py"]),
+        (("x-3.py", "helper-1.py"), ["helper.py", "x.py"]),
+        (("x.py", "lab-1.py"), ["lab-1.py", "x.py"]),  # an exercise asks for this name
+        (("x.py", "map-1.yaml"), ["map-1.yaml", "map.yaml", "x.py"]),  # the program may open either
+        (("x.py", "Figure-1.png", "Figure.png"), ["Figure-1.png", "Figure.png", "x.py"]),
+    ],
+)
+def test_numbers_that_students_give_their_files(tmp_path: Path, handed_in: tuple[str, ...], files: list[str]) -> None:
+    """Canvas adds one to what is handed in again; nobody is refused because of them, and no wanted name is lost."""
+    named = {f"doejane_11_{20 + number}_{name}": PY for number, name in enumerate(handed_in)}
+    archive = zipped(tmp_path / "hw.zip", {**named, "rossbob_12_9_x.py": PY})
+    jane, _ = take_in([archive], tmp_path / "out", wanted=("x.py", "lab-1.py")).entries
+    assert (jane.problem, contents(jane)) == ("", files)
+
+
+def test_files_of_one_name(tmp_path: Path) -> None:
+    """Of two programs nobody knows which is meant, unless they are the same; pictures are numbered."""
+
+    def jane(**others: bytes) -> HandedInEntry:
+        files = {f"doejane_11_{number}_x.{kind[:3]}": data for number, (kind, data) in enumerate(others.items())}
+        archive = zipped(tmp_path / "hw.zip", {**files, "rossbob_12_9_x.py": PY})
+        return found(tmp_path, archive).entries[0]
+
+    assert jane(py_=PY, png1=b"1", png2=b"2").problem == ""
+    assert contents(jane(png1=b"1", png2=b"2", png3=b"2")) == ["x (2).png", "x (3).png", "x.png"]
+
+
+def test_two_programs_of_one_name_are_refused(tmp_path: Path) -> None:
+    """Also where they lie in two folders of one participant; the same program twice is one."""
+    class_ = put(tmp_path / "class", "Bob_2_assignsubmission_file_/b.py")
+    for name in ("Ada_1_assignsubmission_file_", "Ada_1_assignsubmission_onlinetext_"):
+        put(class_, f"{name}/x.py")
+    assert [(e.problem, contents(e)) for e in found(tmp_path, class_).entries] == [("", ["x.py"]), ("", ["b.py"])]
+    (class_ / "Ada_1_assignsubmission_file_" / "x.py").write_bytes(b"other")
+    ada, bob = found(tmp_path, class_).entries
+    assert (ada.problem, bob.problem) == (
+        "expected files with different names, found two different ones named x.py",
+        "",
+    )
+
+
+@pytest.mark.parametrize("ending", ["", "_"])
+def test_a_display_name_with_words_of_the_platform_moves_no_file(tmp_path: Path, ending: str) -> None:
+    """The folder of a participant ends at the last of Moodle's words."""
+    evil = f"NAME A_4711_assignsubmission_file_x_9_assignsubmission_file{ending}"
+    class_ = put(tmp_path / "class", f"NAME A_4711_assignsubmission_file{ending}/x.py", f"{evil}/x.py")
+    (class_ / evil / "x.py").write_bytes(b"evil")
+    intake = found(tmp_path, class_)
+    assert {entry.identity["id"]: (entry.path / "x.py").read_bytes() for entry in intake.entries} == {
+        "4711": PY,
+        "9": b"evil",
+    }
+
+
+@pytest.mark.parametrize(
+    ("files", "kept"),
+    [
+        # Moodle without folders: participant 9 calls itself like the beginning of the name of another file
+        (("A_47_assignsubmission_file_x.py", "A_47_assignsubmission_file_b_9_assignsubmission_file_x.py"), {"47": 1}),
+        (("B_46_assignsubmission_file_x.py", "A_47_assignsubmission_file_b_9_assignsubmission_file_x.py"), {"46": 1}),
+        # Canvas: somebody calls himself `doejane_11`, and a student hands in a file with a number in front
+        (("doejane_11_21_x.py", "doejane_11_2002_77_x.py"), {"11": 1}),
+        (("doejane_11_21_1_x.py", "doejane_11_22_2_notes.txt", "rossbob_12_9_x.py"), {"11": 2, "12": 1}),
+    ],
+)
+def test_a_file_that_two_students_may_have_handed_in_is_in_no_submission_of_another(
+    tmp_path: Path, files: tuple[str, ...], kept: dict[str, int]
+) -> None:
+    """It is named instead."""
+    intake = found(tmp_path, zipped(tmp_path / "hw.zip", dict.fromkeys(files, PY)))
+    assert {entry.identity["id"]: len(contents(entry)) for entry in intake.entries} == kept
+    assert len(intake.strays) == len(files) - sum(kept.values())
+    assert all("can be read in two ways" in stray for stray in intake.strays)
 
 
 def test_clones_of_github_classroom(tmp_path: Path) -> None:
@@ -282,11 +406,57 @@ def test_what_is_bad_in_a_folder_around_everything_spoils_nobody_else(tmp_path: 
     assert again == intake
 
 
-def test_a_bad_file_of_a_student_refuses_all_of_that_student(tmp_path: Path) -> None:
-    """A part of the work would get a part of the marks."""
-    files = {"lovelaceada_1_2_a.py": PY, "lovelaceada_1_3_b.bin": bytes(MAX_ARCHIVE_BYTES + 1), "rossbob_2_4_a.py": PY}
-    ada, bob = found(tmp_path, zipped(tmp_path / "hw.zip", files)).entries
-    assert ("MiB a file" in ada.problem, bob.problem) == (True, "")
+@pytest.mark.parametrize("size", [9 << 20, MAX_ARCHIVE_BYTES + 1])
+def test_a_large_file_is_left_out_in_each_way_of_handing_in(tmp_path: Path, size: int) -> None:
+    """With the note that it gets in a folder which is graded by itself."""
+    bag = bytes(size)
+    folder = put(tmp_path / "folder" / "ada", "x.py")
+    (folder / "bag.db3").write_bytes(bag)
+    zipped(put(tmp_path / "zips", "bob/x.py") / "ada.zip", {"x.py": PY, "bag.db3": bag})
+    sources = [
+        tmp_path / "folder",
+        tmp_path / "zips",
+        zipped(tmp_path / "plain.zip", {"ada/x.py": PY, "ada/bag.db3": bag, "bob/x.py": PY}),
+        zipped(tmp_path / "inner.zip", {"ada.zip": (tmp_path / "zips/ada.zip").read_bytes(), "bob/x.py": PY}),
+        zipped(
+            tmp_path / "moodle.zip",
+            {
+                "ada_1_assignsubmission_file_/x.py": PY,
+                "ada_1_assignsubmission_file_/bag.db3": bag,
+                "Bob_2_assignsubmission_file_/x.py": PY,
+            },
+        ),
+        zipped(
+            tmp_path / "flat.zip",
+            {
+                "ada_1_assignsubmission_file_x.py": PY,
+                "ada_1_assignsubmission_file_bag.db3": bag,
+                "Bob_2_assignsubmission_file_x.py": PY,
+            },
+        ),
+        zipped(tmp_path / "canvas.zip", {"ada_1_2_x.py": PY, "ada_1_3_bag.db3": bag, "rossbob_2_4_x.py": PY}),
+    ]
+    for source in sources:
+        ada = next(entry for entry in found(tmp_path, source).entries if entry.name.startswith("ada"))
+        assert ada.problem == ""
+        (tmp_path / "scratch").mkdir(exist_ok=True)
+        collected = collect_submission(str(ada.path), ("x.py",), tmp_path / "scratch")
+        assert ([name for name, _ in collected.files], collected.notes) == (
+            ["x.py"],
+            ("not copied: bag.db3 (larger than 8 MiB)",),
+        ), source
+    used = sum(path.stat().st_blocks * 512 for path in (tmp_path / "out").rglob("*.db3"))
+    assert used < size  # nothing but a size is kept of what nobody reads
+
+
+def test_an_archive_that_is_too_large_is_refused_as_by_itself(tmp_path: Path) -> None:
+    """The limit of an archive is larger than that of a file in it."""
+    noise = os.urandom(MAX_ARCHIVE_BYTES + 1)
+    archive = zipped(tmp_path / "hw.zip", {"ada.zip": noise, "bob/x.py": PY})
+    ada, bob = found(tmp_path, archive).entries
+    with pytest.raises(SubmissionError, match=r"ada\.zip: expected at most 64 MiB, found more"):
+        collect_submission(str(ada.path), ("x.py",), tmp_path)
+    assert bob.problem == ""
 
 
 def test_a_pipe_in_a_folder_that_is_put_together_refuses_that_student(tmp_path: Path) -> None:
@@ -309,11 +479,12 @@ def test_a_member_of_nobody_is_named(tmp_path: Path, bad: str) -> None:
     assert not list(tmp_path.rglob("evil*"))
 
 
-def test_one_student_cannot_fill_the_disk(tmp_path: Path) -> None:
-    """What is too large is refused by itself, counted while it is unpacked."""
-    archive = zipped(tmp_path / "hw.zip", {"ada/a.bin": bytes(MAX_ARCHIVE_BYTES + 1), "bob/b.py": PY})
-    ada, bob = found(tmp_path, archive).entries
-    assert "MiB a file" in ada.problem
+def test_one_student_cannot_fill_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is too large is refused by itself, counted while it is unpacked; the message names where that was."""
+    monkeypatch.setattr(downloads, "MAX_PART_BYTES", 2 << 20)
+    files = {f"ada/{number}.bin": bytes(1 << 20) for number in range(3)}
+    ada, bob = found(tmp_path, zipped(tmp_path / "hw.zip", {**files, "bob/b.py": PY})).entries
+    assert ada.problem == "expected at most 2 MiB in all, found more with ada/2.bin"
     assert bob.problem == ""
 
 

@@ -6,8 +6,21 @@ from pathlib import Path
 
 import pytest
 
+from grader.course.classroom.downloads import CANVAS as CANVAS_LAYOUT
+from grader.course.classroom.downloads import FOLDERS
+from grader.course.classroom.downloads import GITHUB as GITHUB_LAYOUT
+from grader.course.classroom.downloads import MOODLE as MOODLE_LAYOUT
 from grader.course.classroom.intake import HandedInEntry, safe_name
-from grader.course.classroom.roster import Person, RosterMatch, late_by, late_days, match, read_roster, read_table
+from grader.course.classroom.roster import (
+    Person,
+    RosterMatch,
+    late_by,
+    late_days,
+    match,
+    read_roster,
+    read_table,
+    row_of,
+)
 from grader.runtime.model.errors import ClassError
 
 CANVAS = """Student,ID,SIS User ID,SIS Login ID,Section,Homework (12345)
@@ -33,8 +46,8 @@ def roster(tmp_path: Path, text: str, encoding: str = "utf-8") -> list[Person]:
     return read_roster(tmp_path / "roster.csv")
 
 
-def entry(label: str, **identity: str) -> HandedInEntry:
-    return HandedInEntry(safe_name(label), label, Path(label), identity)
+def entry(label: str, layout: str = FOLDERS, **identity: str) -> HandedInEntry:
+    return HandedInEntry(safe_name(label), label, Path(label), identity, layout=layout)
 
 
 def who(matching: RosterMatch) -> dict[str, str]:
@@ -60,14 +73,17 @@ def test_github_classroom_knows_people_by_what_the_course_calls_them(tmp_path: P
 
 def test_canvas_entries_go_by_number(tmp_path: Path) -> None:
     """And by the name without spaces where there is no number of Canvas."""
-    people = roster(tmp_path, CANVAS)
-    found = match([entry("x", name="lovelaceada", id="1001"), entry("y", name="rossbob", id="0")], people)
-    assert who(found) == {"x": "Ada Lovelace", "y": "Bob Ross"}
+    people = roster(tmp_path, CANVAS.replace("1002", ""))
+    entries = [
+        entry("x", CANVAS_LAYOUT, name="lovelaceada", id="1001"),
+        entry("y", CANVAS_LAYOUT, name="rossbob", id="0"),
+    ]
+    assert who(match(entries, people)) == {"x": "Ada Lovelace", "y": "Bob Ross"}
 
 
 def test_moodle_entries_go_by_participant(tmp_path: Path) -> None:
     """The download has the number alone, the worksheet a word before it."""
-    found = match([entry("x", name="Somebody", id="657694")], roster(tmp_path, MOODLE))
+    found = match([entry("x", MOODLE_LAYOUT, name="Somebody", id="657694")], roster(tmp_path, MOODLE))
     assert who(found) == {"x": "Bob Ross"}
     assert [person.name for person in found.missing] == ["Ada Lovelace"]
 
@@ -75,8 +91,106 @@ def test_moodle_entries_go_by_participant(tmp_path: Path) -> None:
 def test_clones_go_by_user(tmp_path: Path) -> None:
     """Also where the layout does not know the prefix: the longest user name at the end counts."""
     people = roster(tmp_path, CLASSROOM50)
-    found = match([entry("ros-hw-ada", user="ada"), entry("ros-hw-bob-ross")], people)
+    found = match([entry("ros-hw-ada", GITHUB_LAYOUT, user="ada"), entry("ros-hw-bob-ross")], people)
     assert who(found) == {"ros-hw-ada": "Ada Lovelace", "ros-hw-bob-ross": "Bob Ross"}
+
+
+GIT = "username,name\nli,Li Wei\neveho,Eve Ho\nho,Ho Chi\n"
+
+
+@pytest.mark.parametrize(
+    ("clones", "people"),
+    [
+        (("hw-li", "hw-mal-li", "hw-eveho"), {"hw-li": "Li Wei", "hw-eveho": "Eve Ho"}),
+        (("hw-mal-li", "hw-eveho", "hw-ho"), {"hw-eveho": "Eve Ho", "hw-ho": "Ho Chi"}),
+        (("hw-mal-li", "hw-mal-ho", "hw-eveho", "hw-x"), {"hw-eveho": "Eve Ho"}),
+        (("hw-mal-li", "hw-zoe-ho"), {}),
+        (("hw-mal-li",), {}),
+    ],
+)
+@pytest.mark.parametrize("layout", [GITHUB_LAYOUT, FOLDERS])
+def test_the_end_of_a_user_name_is_not_the_user(
+    tmp_path: Path, layout: str, clones: tuple[str, ...], people: dict[str, str]
+) -> None:
+    """A stranger is on no roster, whoever else handed in, and also where the layout does not know the prefix."""
+    entries = [
+        entry(name, layout, user=name.removeprefix("hw-")) if layout == GITHUB_LAYOUT else entry(name)
+        for name in clones
+    ]
+    found = match(entries, roster(tmp_path, GIT))
+    assert who(found) == people
+    assert set(found.unmatched) == {*clones} - {*people}
+    assert found.duplicates == found.ambiguous == ()
+
+
+@pytest.mark.parametrize("column", ["ID number", "Username", "Student ID", "Email address"])
+def test_a_number_is_compared_with_numbers_of_its_kind(tmp_path: Path, column: str) -> None:
+    """The participant number that Moodle gives one student may be the ID number of another."""
+    people = roster(tmp_path, f"Identifier,Full name,{column}\nParticipant 1,Ada,77\nParticipant 77,Bob,5\n")
+    found = match(
+        [entry("x", MOODLE_LAYOUT, name="Bob", id="77"), entry("y", MOODLE_LAYOUT, name="Eve", id="5")], people
+    )
+    assert (who(found), found.unmatched) == ({"x": "Bob"}, ("y",))
+    people = roster(tmp_path, f"Full name,{column}\nAda,77\nBob,5\n")
+    assert who(match([entry("x", MOODLE_LAYOUT, name="Bob", id="77")], people)) == {"x": "Bob"}
+
+
+def test_the_number_of_an_account_in_canvas_is_no_number_of_the_institution(tmp_path: Path) -> None:
+    """Canvas counts its accounts; a table of one's own has one column of numbers, whatever they are."""
+    entries = [entry("x", CANVAS_LAYOUT, name="eve", id="77")]
+    own = "ID,SIS User ID,Student\n1,77,Ada\n77,2,Bob\n"
+    assert who(match(entries, roster(tmp_path, own))) == {"x": "Bob"}
+    assert who(match(entries, roster(tmp_path, own.replace("\n77,", "\n78,")))) == {}
+    assert who(match(entries, roster(tmp_path, "id,name\n1,Ada\n77,Bob\n"))) == {"x": "Bob"}
+
+
+def test_a_number_of_a_platform_is_not_that_of_the_institution(tmp_path: Path) -> None:
+    """Marks are uploaded by ids of their kind, with a roster of one's own and without one."""
+    entries = [entry("x", MOODLE_LAYOUT, name="Bob", id="77"), entry("y", CANVAS_LAYOUT, name="eve", id="78")]
+    people = match(entries, None).people
+    assert [people[name].platform_ids for name in ("x", "y")] == [{}, {"canvas": "78"}]
+    (own,) = roster(tmp_path, "id,name\n77,Bob\n")
+    assert own.platform_ids == {"id": "77"}
+    (theirs,) = roster(tmp_path, "ID,SIS User ID,Student\n77,s1,Bob\n")
+    assert theirs.platform_ids == {"canvas": "77", "id": "s1"}
+
+
+def test_a_namesake_with_another_number_is_somebody_else(tmp_path: Path) -> None:
+    """Where the numbers of roster and download are of one kind, as others of the class show."""
+    people = roster(tmp_path, CANVAS)
+    ada, namesake = (entry(i, CANVAS_LAYOUT, name=n, id=i) for i, n in (("1001", "lovelaceada"), ("7", "rossbob")))
+    assert (who(match([ada, namesake], people)), match([ada, namesake], people).unmatched) == (
+        {"1001": "Ada Lovelace"},
+        ("7",),
+    )
+    other_numbers = roster(tmp_path, "id,name\ns1,Ada Lovelace\ns2,Bob Ross\n")
+    assert who(match([ada, namesake], other_numbers)) == {"1001": "Ada Lovelace", "7": "Bob Ross"}
+
+
+def test_a_user_of_github_is_looked_for_among_users_of_github(tmp_path: Path) -> None:
+    """Anybody can register a name there that is a user name of the university."""
+    people = roster(tmp_path, "username,github_username,name\nada,countess,Ada\nbob,bobross,Bob\neve,,Eve\n")
+    entries = [entry(f"hw-{user}", GITHUB_LAYOUT, user=user) for user in ("ada", "countess", "eve")]
+    assert who(match(entries, people)) == {"hw-countess": "Ada", "hw-eve": "Eve"}
+
+
+@pytest.mark.parametrize(
+    ("table", "username"),
+    [
+        ("Username,ID number,Full name\nada,5,Ada\n77,6,Bob\n", "ada"),  # the number of one is the user of another
+        ("Username,ID number,Full name\n77,6,Ada\n", None),  # only a namesake is there
+        ("Username,Email address\n77,b@x.edu\nx,ADA@x.edu\n", "x"),
+        ("Username,Full name\n77,Bob\nx,Ada\n", "x"),
+    ],
+)
+def test_a_person_is_found_in_another_table(tmp_path: Path, table: str, username: str | None) -> None:
+    """By what is unique, of its kind; else by the name, unless a number says that it is somebody else."""
+    ada = roster(tmp_path, "name,student id,email\nAda,77,ada@x.edu\n")[0]
+    if "ada,5" in table:
+        ada = roster(tmp_path, "name,student id\nAda,5\n")[0]
+    (tmp_path / "users.csv").write_text(table, encoding="utf-8")
+    row = row_of(ada, read_table(tmp_path / "users.csv"))
+    assert (None if row is None else row["Username"]) == username
 
 
 @pytest.mark.parametrize("label", ["ada@x.edu", "ADA", "Ada Lovelace", "lovelace ada", "Adá Lovelace"])

@@ -238,3 +238,26 @@ def test_verifying_says_the_same_of_sound_evidence(tmp_path: Path) -> None:
     verified = grade("--verify", tmp_path)
     assert verified.stdout == grade(tmp_path).stdout
     assert verified.stderr == "verified: the recordings show what was judged: 3 submissions\n"
+
+
+@pytest.mark.parametrize("word", ["1", "velocity_publisher", "exercise_1"])
+def test_an_exercise_is_named_as_for_grading(tmp_path: Path, word: str) -> None:
+    """By its number or folder as well; the report is that of its id."""
+    kept_run(tmp_path / "kept", velocity_run(velocity_trace(rate_hz=10)))
+    printed = grade(tmp_path / "kept", "--exercise", word)
+    assert printed.exit_code == 1, printed.output
+    by_id = rejudge.judgement(("velocity_publisher",), ())
+    assert rejudge.judgement((word,), ()).chosen == by_id.chosen == ("velocity_publisher",)
+
+
+def test_a_verbose_text_shows_everything(tmp_path: Path) -> None:
+    """On the terminal, and in the files of a class."""
+    kept_class(tmp_path / "class")
+    short, long = (grade(tmp_path / "class" / "bob" / "evidence", *v).output for v in ((), ("-v",)))
+    assert "-v shows everything" in short
+    assert len(long.splitlines()) > len(short.splitlines())
+    sizes = []
+    for name, v in (("short", ()), ("long", ("-v",))):
+        grade(tmp_path / "class", "-o", f"text={tmp_path / name}", *v)
+        sizes.append((tmp_path / name / "bob.txt").stat().st_size)
+    assert sizes[0] < sizes[1]

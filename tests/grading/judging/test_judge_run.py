@@ -351,7 +351,11 @@ def test_a_file_that_cannot_start_costs_one_line(kind: FaultKind, text: str, sai
 
 @pytest.mark.parametrize(
     ("module", "hint"),
-    [("cv2", "pip install 'rclpy-grader[opencv]'"), ("matplotlib", "'rclpy-grader[plots]'"), ("tf2_kdl", "tf2_kdl is")],
+    [
+        ("cv2", "pip install './rclpy-grader[opencv]'"),
+        ("matplotlib", "'./rclpy-grader[plots]'"),
+        ("tf2_kdl", "tf2_kdl is"),
+    ],
 )
 def test_what_a_desktop_of_ros_has_costs_nothing_where_it_is_not_installed(module: str, hint: str) -> None:
     """The criteria are undecided, with what to install."""

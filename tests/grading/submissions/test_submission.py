@@ -298,7 +298,12 @@ def test_the_copy_is_readable_by_every_user(work: Path, into: Path) -> None:
         ("files", 3, [f"{n}.py" for n in range(4)], "expected at most 3 files, found more"),
         ("entries", 3, [f"d{n}/x.py" for n in range(2)], "expected at most 3 entries, found more"),
         ("depth", 2, ["a/b/c/x.py"], "expected at most 2 folders inside each other, found more"),
-        ("total_bytes", 1 << 20, ["a.py", "b.py"], "expected at most 1 MiB in all, found more"),
+        (
+            "total_bytes",
+            1 << 20,
+            ["a.py", "b.py"],
+            "expected at most 1 MiB in all, found more; the largest file is a.py, 0.6 MiB",
+        ),
     ],
 )
 def test_a_limit_exceeded_is_one_clear_error(

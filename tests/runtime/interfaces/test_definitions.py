@@ -1,5 +1,6 @@
 """Reading definitions: what is found, what is understood, and what is refused with place and fix."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from grader.runtime.interfaces.definitions import (
     FieldType,
     InterfacePackage,
     digest,
+    files_in,
     find_packages,
     read,
     read_definition,
@@ -185,3 +187,53 @@ def test_too_many_definitions_are_refused() -> None:
 
 def test_unknown_types_are_no_matter_for_a_single_definition() -> None:
     read_definition("a", DefinitionFile("msg", "Foo", "b/Bar c\n"))
+
+
+#: What names and values of a package end with: a problem that names them, never another exception.
+ODD: dict[str, tuple[str, str, str]] = {
+    # what is odd -> package.xml, file, text
+    "a type of 220 characters": ("", "msg/" + "Ab" * 110 + ".msg", "int32 a\n"),
+    "a type that is long in lower case": ("", "msg/" + "AbC" * 41 + ".msg", "int32 a\n"),
+    "a package of 120 characters": (f"<package><name>{'p' * 120}</name></package>", "msg/Foo.msg", "int32 a\n"),
+    "a package of 60,000 characters": (f"<package><name>{'p' * 60_000}</name></package>", "msg/Foo.msg", "int32 a\n"),
+    "a file in Latin-1": ("", "msg/" + os.fsdecode(b"S\xe4y") + ".msg", "int32 a\n"),
+    "a field of 12,000 characters": ("", "msg/Foo.msg", "int32 " + "a" * 12_000 + "\n"),
+    "a constant of 12,000 characters": ("", "msg/Foo.msg", "int32 " + "A" * 12_000 + "=1\n"),
+    "a type of a field of 12,000 characters": ("", "msg/Foo.msg", "A" * 12_000 + " a\n"),
+    "a length of 5,000 digits": ("", "msg/Foo.msg", f"int32[{'0' * 10}1{'0' * 5000}] a\n"),
+    "a value of 50,000 digits": ("", "msg/Foo.msg", f"int32 A={'9' * 50_000}\n"),
+    "a list that is none": ("", "msg/Foo.msg", f"string[] a [{'x' * 9_000}\n"),
+    "an unknown encoding": ("<?xml version='1.0' encoding='x-none'?><package/>", "msg/Foo.msg", "int32 [\n"),
+    "a manifest of zeros": ("\0" * 99, "msg/Foo.msg", "int32 a\n"),
+}
+
+
+def digested_and_read(folder: Path) -> None:
+    """Do what is done with the packages of a submission before they are built."""
+    found = find_packages(folder)
+    digest(found)
+    read(found, INSTALLED)
+
+
+@pytest.mark.parametrize(("manifest", "file", "text"), ODD.values(), ids=ODD)
+def test_whatever_is_odd_in_a_package_is_a_mistake_with_a_place(
+    tmp_path: Path, manifest: str, file: str, text: str
+) -> None:
+    """The sentence is short and valid text, and says what to do."""
+    write(tmp_path, f"foo_msgs/{file}", text)
+    if manifest:
+        write(tmp_path, "foo_msgs/package.xml", manifest)
+    with pytest.raises(DefinitionError) as caught:
+        digested_and_read(tmp_path)
+    message = caught.value.message
+    message.encode()
+    assert len(message) < 400
+    assert caught.value.hint
+
+
+def test_a_folder_with_the_name_of_a_definition_is_none(tmp_path: Path) -> None:
+    """Nor is one that is called like a manifest."""
+    (tmp_path / "foo" / "msg" / "Foo.msg").mkdir(parents=True)
+    (tmp_path / "foo" / "package.xml").mkdir()
+    assert files_in([tmp_path]) == []
+    assert find_packages(tmp_path) == ()

@@ -18,6 +18,7 @@ from grader.grading.judging.diagnosis.wiring import (
     variable_of,
 )
 from grader.grading.judging.source import Loop, Source, chain, covers, first_line, last_name, subtree, text_of
+from grader.grading.model.wording import named
 from grader.runtime.model.trace import FaultKind
 
 _EXITS = ("exit", "quit", "_exit")
@@ -145,7 +146,7 @@ def _published_wrongly(crash: Crash) -> Clue | None:
 
 @crash_rule(r"Parameter\(s\) already declared: \['([\w./]+)'", in_file=False, priority=5030)
 def _declared_twice(crash: Crash) -> Clue | None:
-    return Clue(f"the parameter {crash.found[1][:60]} is declared twice: remove one declare_parameter")
+    return Clue(f"the parameter {named(crash.found[1], 60)} is declared twice: remove one declare_parameter")
 
 
 @crash_rule(r"undeclared parameter\(s\): ([\w./]+)", in_file=False, priority=5040)

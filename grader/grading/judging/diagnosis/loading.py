@@ -18,7 +18,7 @@ from grader.grading.judging.diagnosis.names import (
 from grader.grading.judging.diagnosis.rules import Clue, Crash, crash_rule
 from grader.grading.judging.source import Source, chain, covers, last_name
 from grader.grading.model.exercise import Location
-from grader.grading.model.wording import quote
+from grader.grading.model.wording import named, quote
 from grader.runtime.model.submission import EXPORT_NOTEBOOK
 from grader.runtime.model.trace import Fault, FaultKind, StartWay
 
@@ -235,20 +235,21 @@ def _ros_1(crash: Crash) -> Clue | None:
 @crash_rule(r"^ModuleNotFoundError: No module named '([\w.]+)'", in_file=False, priority=1080)
 def _missing_module(crash: Crash) -> Clue | None:
     wanted = crash.found[1][:80]
+    called = named(wanted, 80)
     known = [*MODULES, *PACKAGES, *PLAIN_MODULES, "numpy"]
     near = closest(wanted, known, 0.8)
     if near and near.count(".") == wanted.count("."):
-        return Clue(f"the module is called {near}, not {wanted}")
+        return Clue(f"the module is called {near}, not {called}")
     if wanted.startswith("rclpy."):
-        hint = f"there is no {wanted}; the class Node is in rclpy.node"
+        hint = f"there is no {called}; the class Node is in rclpy.node"
         return Clue(hint) if wanted.lower() == "rclpy.node" else None
     if wanted.endswith(_MESSAGE_ENDINGS) or _gives_messages(crash.case.source, wanted):
         listed = ", ".join(PACKAGES[:5])
-        hint = f"the package {wanted} is not installed here: hand in its folder, grade with --interfaces"
+        hint = f"the package {called} is not installed here: hand in its folder, grade with --interfaces"
         return Clue(f"{hint} FOLDER, or use messages from the standard packages: {listed}, ...")
     if "." in wanted:
         return None
-    return Clue(f"{wanted} is neither in the submission nor installed here: hand it in, or do without it")
+    return Clue(f"{called} is neither in the submission nor installed here: hand it in, or do without it")
 
 
 def _gives_messages(source: Source, module: str) -> bool:
@@ -264,7 +265,7 @@ def _gives_messages(source: Source, module: str) -> bool:
 def _cannot_import(crash: Crash) -> Clue | None:
     name, partially, module = crash.found.groups()
     if partially:
-        hint = f"{module} is only partly imported at this point: two files import each other"
+        hint = f"{named(module, 60)} is only partly imported at this point: two files import each other"
         return Clue(f"{hint}, or one of your files has the name of a module")
     near = closest(name, MODULES.get(module, ()), 0.7)
     begun = [n for n in MODULES.get(module, ()) if n.rstrip("0123456789") == name]
@@ -282,7 +283,7 @@ def _cannot_import(crash: Crash) -> Clue | None:
 @crash_rule(r"^FileNotFoundError: \[Errno 2\] No such file or directory: '([^']+)'", in_file=False, priority=1100)
 def _missing_file(crash: Crash) -> Clue | None:
     path, source = crash.found[1], crash.source
-    name = quote(path, 60)
+    name = named(path, 60)
     if any(last_name(n.func) in _STARTERS and covers(n, crash.line) for n in source.all(ast.Call)):
         return Clue(f"the program {name} is not installed where submissions run: do without it")
     if path.startswith("/"):
@@ -296,5 +297,5 @@ def _missing_file(crash: Crash) -> Clue | None:
 
 @crash_rule(r"partially initialized module '(\w+)' has no attribute", in_file=False, priority=1110)
 def _shadowed_module(crash: Crash) -> Clue | None:
-    hint = f"one of your files has the name of the module {crash.found[1]} and is imported instead: rename it"
-    return Clue(hint)
+    module = named(crash.found[1], 60)
+    return Clue(f"one of your files has the name of the module {module} and is imported instead: rename it")
