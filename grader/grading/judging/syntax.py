@@ -104,7 +104,7 @@ def _row(node: ast.AST, numbers: dict[type, int]) -> Any:
     if kind.placed:
         row += (node.lineno, node.col_offset, node.end_lineno, node.end_col_offset)  # type: ignore[attr-defined]
     for field in kind.fields:
-        value = getattr(node, field.name, None)
+        value: Any = getattr(node, field.name, None)
         if field.of is None:
             row.append([_plain(v) for v in value] if field.many else _plain(value))
         elif field.many:

@@ -80,7 +80,7 @@ def test_no_encoding_costs_more_than_its_size(encoding: str) -> None:
     """Only those of editors, and some of other systems, are decoded; a program in any other is suspicious."""
     content = f"# -*- coding: {encoding} -*-\n".encode() + b"x = '-abc'\n" * 20_000
     found, calls = counted(lambda: read_here(content))
-    assert calls <= MOST_CALLS
+    assert calls <= MOST_CALLS + CALLS_OF_A_NODE * found.nodes
     if encoding in ("utf-8", "utf-8-unix", "latin-1", "latin-1-dos", "iso-8859-15", "cp1252", "windows-1252"):
         assert UNREADABLE not in found.row["reaches"]
     else:
