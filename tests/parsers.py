@@ -10,6 +10,15 @@ PACKAGE = Path(__file__).resolve().parent.parent / "grader"
 #: Module or function -> what it parses. A module stands for everything in it.
 PARSERS: Mapping[str, str] = {
     **dict.fromkeys(("ast.parse", "ast.literal_eval", "compile", "tokenize", "symtable", "codeop", "libcst"), "Python"),
+    # functions of the grader that parse what they are given, wherever they are called
+    **dict.fromkeys(
+        (
+            *("grader.runtime.host.packages.parse", "grader.runtime.host.packages.parsed"),
+            *("grader.runtime.programs.inert.read", "grader.grading.judging.source.parsed"),
+        ),
+        "Python",
+    ),
+    "codecs": "text in any encoding",
     **dict.fromkeys(("exec", "eval", "runpy", "code.InteractiveInterpreter"), "Python that runs"),
     **dict.fromkeys(("json.load", "json.loads", "json.JSONDecoder", "json.tool"), "JSON"),
     **dict.fromkeys(("tomllib", "tomli"), "TOML"),

@@ -47,6 +47,8 @@ def test_the_page_lists_every_parser() -> None:
         ("import struct\nstruct.unpack('I', x)\n", {"binary"}),
         ("import re\nre.fullmatch(x, y)\n", {"regular expressions"}),
         ("import re\nre.escape(x)\n", set()),
+        ("from grader.runtime.programs.inert import read\nread(x)\n", {"Python"}),
+        ("import codecs\ncodecs.decode(x, y)\n", {"text in any encoding"}),
     ],
 )
 def test_a_parser_is_found_by_its_import_or_call(tmp_path: Path, code: str, kinds: set[str]) -> None:
@@ -56,8 +58,15 @@ def test_a_parser_is_found_by_its_import_or_call(tmp_path: Path, code: str, kind
     assert parsers_of(path) == kinds
 
 
-def test_nothing_in_the_grader_reads_project_files_outside_of_the_contained_process() -> None:
-    """Only that process knows TOML, INI files, and how to evaluate setup.py and CMakeLists.txt; nobody imports it."""
+#: The modules of the contained process that read a submission, which no other process imports.
+CONTAINED = (
+    *("submission_reader", "program_reader", "project_reader", "setup_files", "cmake_files"),
+    *("reaching", "revealing"),
+)
+
+
+def test_nothing_in_the_grader_reads_a_submission_outside_of_the_contained_process() -> None:
+    """Only that process knows TOML, INI files, setup.py, CMakeLists.txt, and what programs reach for."""
     found = all_parsers()
     assert {module for module, kinds in found.items() if "INI or templates" in kinds} == {
         "grader/grading/submissions/project_reader.py",
@@ -65,6 +74,20 @@ def test_nothing_in_the_grader_reads_project_files_outside_of_the_contained_proc
     }
     for path in PACKAGE.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
-        own = path.name in ("project_reader.py", "setup_files.py", "cmake_files.py")
-        known = r"^\s*(from|import) .*\b(project_reader|setup_files|cmake_files)\b"
-        assert own or not re.search(known, text, re.MULTILINE), path
+        known = rf"^\s*(from|import) .*\b({'|'.join(CONTAINED)})\b"
+        assert path.stem in CONTAINED or not re.search(known, text, re.MULTILINE), path
+
+
+def test_no_trusted_process_parses_the_programs_of_students() -> None:
+    """Neither to run them, nor to explain them. Who writes a row that is not listed here has to say why."""
+    page = PAGE.read_text(encoding="utf-8")
+    trusted = page[page.index("## In the worker") : page.index("## Nothing of a student")]
+    parse = {
+        module
+        for module, kinds, _ in _ROW.findall(trusted)
+        if {"Python", "text in any encoding"} & set(kinds.split(", "))
+    }
+    assert parse == {
+        "grader/runtime/worker/bare_start.py",  # in the worker, which has a sandbox
+        "grader/course/similarity/finding.py",  # splits texts into tokens
+    }

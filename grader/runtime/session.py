@@ -134,7 +134,8 @@ class RecordingSession:
 
         budget = budget or RealTimeBudget()
         # What no interpreter can run needs no worker.
-        known = {key: trace for key, job in jobs.items() if (trace := trace_without_run(job.plan)) is not None}
+        needless = {key: trace_without_run(job.plan, job.programs) for key, job in jobs.items()}
+        known = {key: trace for key, trace in needless.items() if trace is not None}
         to_run = {key: job for key, job in jobs.items() if key not in known}
         first = [Job(job.title, replace(job.plan, stop_when_unfit=clock == AUTO), budget) for job in to_run.values()]
         traces: dict[Key, Trace] = {}

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from grader.runtime.model.quantities import MIB, NS_PER_S
-from grader.runtime.usage import families, last_pid, threads_starved_ns, usage
+from grader.runtime.usage import families, last_pid, peak_bytes, restart_peak, threads_starved_ns, usage
 
 WAIT = "import sys; sys.stdout.write('x'); sys.stdout.flush(); sys.stdin.read()"
 
@@ -105,3 +105,15 @@ def test_waiting_for_a_processor_is_seen(run: Callable[[str], subprocess.Popen[b
     while sum(threads_starved_ns(families([parent.pid])[parent.pid] - {parent.pid}).values()) < 50_000_000:
         assert time.monotonic() < deadline
         os.sched_yield()
+
+
+def test_the_peak_of_one_task_is_not_that_of_the_next() -> None:
+    """Where the kernel forgets it when it is told to, as in a process of one's own."""
+    restart_peak()
+    before = peak_bytes()
+    held = b"x" * (100 * MIB)
+    most = peak_bytes()
+    assert most >= before + 90 * MIB
+    del held
+    restart_peak()
+    assert peak_bytes() < most - 90 * MIB

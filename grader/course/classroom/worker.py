@@ -35,7 +35,7 @@ from grader.runtime.files import write_whole
 from grader.runtime.model.errors import GraderError, SubmissionError
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.session import RecordingSession, open_session
-from grader.runtime.usage import families, usage
+from grader.runtime.usage import families, peak_bytes, restart_peak, usage
 
 PAGE, EVIDENCE = "report.html", "evidence"
 #: Files for students, with what the rubric lets them see on the day of grading.
@@ -101,6 +101,8 @@ def attempt(task: Task, progress: Progress, grade: Grade, ended_s: Callable[[], 
     `ended_s` returns processor time that the kernel does not count as used by this process and its descendants.
     """
     started, before_s = time.perf_counter(), _processor_s() + ended_s()
+    restart_peak()
+    children_before = _children_peak_bytes()
     try:
         status = _graded(task, progress, grade)
     except SubmissionError as error:
@@ -112,7 +114,7 @@ def attempt(task: Task, progress: Progress, grade: Grade, ended_s: Callable[[], 
     except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
         status = _failed(task, f"the grader failed: {type(error).__name__}: {error}")
     duration_s, processor_s = time.perf_counter() - started, _processor_s() + ended_s() - before_s
-    used = {"processor_s": round(processor_s, 3), "peak_bytes": float(_peak_bytes())}
+    used = {"processor_s": round(processor_s, 3), "peak_bytes": float(_peak_since(children_before))}
     return replace(status, duration_s=round(duration_s, 3), usage=used)
 
 
@@ -192,9 +194,18 @@ def _processor_s() -> float:
     return usage(families([os.getpid()])[os.getpid()]).processor_ns / NS_PER_S
 
 
-def _peak_bytes() -> int:
-    """Return the most memory so far of this process or one that it has waited for."""
-    return 1024 * max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+def _peak_since(children_before: int) -> int:
+    """Return the most memory of this process since `restart_peak`, or of one that it has waited for meanwhile.
+
+    The kernel tells the largest of all processes that were waited for: one counts if it is larger than all before it,
+    so that the peak of a submission is never shown as that of a later one.
+    """
+    children = _children_peak_bytes()
+    return max(peak_bytes(), children if children > children_before else 0)
+
+
+def _children_peak_bytes() -> int:
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss << 10
 
 
 def _send(message: Mapping[str, object]) -> None:

@@ -167,7 +167,7 @@ def prepared(
         if unrecorded:
             prefixes, problems = session.install_shares(submission.root, submission.projects, Path(prefix))
             submission = replace(submission, notes=(*submission.notes, *problems))
-        reaches = read_reaches(submission.root)
+        reaches = read_reaches(submission.root, submission.programs)
         folders, own_hashes = provided.folders, not HASHES.isdisjoint(reaches)
         jobs = plan_jobs(request, unrecorded, submission, recordings, seed, folders, prefixes, own_hashes=own_hashes)
         tests = plan_tests(
@@ -288,6 +288,7 @@ def plan_jobs(  # noqa: PLR0913  each comes from a different stage
                 interfaces=tuple(map(str, interfaces)),
                 prefixes=prefixes,
             ),
+            programs=submission.programs,
         )
         for exercise in exercises
         for scenario in exercise.scenarios

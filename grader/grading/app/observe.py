@@ -14,7 +14,7 @@ from grader.grading.app.seeds import PRACTICE
 from grader.grading.judging.summary import summarise
 from grader.grading.judging.values import student_endpoints
 from grader.grading.model.report import Summary
-from grader.grading.submissions.sources import source_text
+from grader.grading.submissions.sources import read_files
 from grader.runtime.interface_packages import provide
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
@@ -91,7 +91,9 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         installed = session.folder / "installed"
         prefixes, _ = session.install_shares(submission.root, submission.projects, installed)
         plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)
-        trace = session.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
+        trace = session.record(
+            {scenario.id: Job("observing", plan, programs=submission.programs)}, request.clock, progress
+        )[scenario.id]
         sources = _sources(trace, submission)
     if trace.harness_problem:
         raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")
@@ -104,8 +106,7 @@ def _sources(trace: Trace, submission: Submission) -> dict[str, str]:
     named = {fault.file for fault in trace.faults()} | {start.file for start in trace.starts}
     named |= {file.found for file in submission.files.values() if file.found}
     # the paths are those of staged files: a process cannot name others
-    texts = {name: source_text(submission.root / name) for name in sorted(named) if name}
-    return {name: text for name, text in texts.items() if text is not None}
+    return dict(read_files(submission, sorted(filter(None, named))))
 
 
 def undisturbed(request: ObserveRequest, names: Sequence[str]) -> Scenario:

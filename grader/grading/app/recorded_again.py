@@ -109,7 +109,10 @@ def _recorded(session: RecordingSession, recordings: Recordings, number: int) ->
                 }
                 for (exercise, scenario), trace in traces.items()
             ]
-            return [*lines, {"number": number, "sources": dict(ready.run.sources)}]
+            return [
+                *lines,
+                {"number": number, "sources": {name: str(text) for name, text in ready.run.sources.items()}},
+            ]
     except GraderError as error:
         return [{"number": number, "problem": error.message, "hint": error.hint}]
 

@@ -35,6 +35,7 @@ from grader.grading.reporting.formats import known
 from grader.grading.reporting.json_report import ReportData, dumps, report_to_json
 from grader.grading.reporting.rejudged import RejudgedResult, ReportChange, change
 from grader.grading.rubrics.draws import First
+from grader.grading.submissions.sources import read_texts
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ALL_MET, NOT_ALL_MET, UNDECIDED, UNUSABLE, EvidenceError, GraderError
 
@@ -87,11 +88,16 @@ def again(evidence: Evidence, how: Judgement) -> tuple[list[Exercise], Run]:
     kept = evidence.manifest.run
     request = request_of(kept.request, submission=kept.path, seed=kept.seed, rubrics=how.rubrics)
     exercises = _as_recorded(_asked(evidence, how), request)
-    run = run_of(evidence, exercises, verify=how.verify)
+    run = _with_trees(run_of(evidence, exercises, verify=how.verify))
     if how.chosen:
         request = replace(request, exercises=how.chosen)
     same = replace(run.reproduce, command=command_words(request, kept.seed))
     return exercises, replace(run, reproduce=same, notes=(*run.notes, *_not_judged_again(exercises)))
+
+
+def _with_trees(run: Run) -> Run:
+    """Return a kept run whose texts have trees, which a contained process makes if one of them is looked at."""
+    return replace(run, sources=read_texts(run.sources))
 
 
 def _not_judged_again(exercises: Sequence[Exercise]) -> Iterator[str]:
@@ -111,7 +117,7 @@ def judged_again(evidence: Evidence, exercises: Sequence[Exercise], request: Gra
 
     `played` is the digest of the recordings that exercises play.
     """
-    run = run_from(evidence.manifest, exercises, kept_traces(evidence, exercises))
+    run = _with_trees(run_from(evidence.manifest, exercises, kept_traces(evidence, exercises)))
     given = Reproduction(
         command=command_words(request, run.seed),
         rubrics=run.reproduce.rubrics,

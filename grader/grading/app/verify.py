@@ -23,6 +23,7 @@ from grader.grading.evidence.store import Evidence, open_evidence, run_of
 from grader.grading.judging.repetition import events, first_difference
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.verification import ConditionState, Difference, LeftOutScenario, Place, Tried, Verification
+from grader.grading.submissions.sources import read_texts
 from grader.grading.submissions.submission import collect_submission, stage_collected
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EvidenceError, HarnessError
@@ -175,7 +176,7 @@ def _record_first(folder: Path, subjects: Sequence[_Subject], isolation: str, pr
             problem = "" if trace.clock_reason else trace.harness_problem
             one.first[_key(line)] = _First(packed, len(events(trace)), problem, trace.clock_reason)
         elif "sources" in line:
-            one.sources = line["sources"]
+            one.sources = read_texts(line["sources"])
         else:
             one.problem = str(line["problem"])
     return used

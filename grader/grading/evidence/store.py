@@ -287,7 +287,7 @@ def _manifest(
             )
             for e in exercises
         ),
-        sources=dict(run.sources),
+        sources={name: str(text) for name, text in run.sources.items()},
         interfaces=kept.KeptInterfaces(run.interfaces, run.offered, dict(run.definitions)),
     )
 

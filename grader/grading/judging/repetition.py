@@ -60,7 +60,7 @@ def first_difference(first: Trace, other: Trace, sources: Mapping[str, str]) -> 
         )
     if not is_comparable(first):
         return None
-    found = _first_event(events(first), events(other), {name: read(name, text) for name, text in sources.items()})
+    found = _first_event(events(first), events(other), sources)
     if found is not None:
         return found
     for kind, name, value in _FACTS:
@@ -95,13 +95,14 @@ def _shortened(value: object) -> str:
 
 
 def _first_event(
-    first: Sequence[Observation], other: Sequence[Observation], sources: Mapping[str, Source]
+    first: Sequence[Observation], other: Sequence[Observation], sources: Mapping[str, str]
 ) -> Difference | None:
     for index, (one, two) in enumerate(zip_longest(first, other)):
         if _key(one) != _key(two):
             kind = _kind(first, other, index)
-            process, place = _place(one or two, sources)
-            cause = _cause(one, two, sources.get(process))
+            trees = {name: read(name, text) for name, text in sources.items()}
+            process, place = _place(one or two, trees)
+            cause = _cause(one, two, trees.get(process))
             return Difference(kind, index + 1, one, two, process, place.file, place.line, cause)
     return None
 

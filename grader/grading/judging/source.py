@@ -1,4 +1,7 @@
-"""A student's file as a syntax tree; reading any text, however strange, raises nothing."""
+"""A student's file as a syntax tree; reading any text, however strange, raises nothing.
+
+The trees of what students handed in are made by a contained process; only texts of an author's tests are parsed here.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,21 @@ import ast
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from grader.grading.model.exercise import Location
-from grader.grading.model.wording import quote
+from grader.grading.judging.syntax import MOST_DEPTH, MOST_NODES, children, measured, tree_of
 from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.submission import SourceText
+
+if TYPE_CHECKING:
+    from grader.grading.model.exercise import Location
 
 #: Longer files are not parsed, in characters: student nodes are far shorter.
 LONGEST_SOURCE = 100_000
-#: Files with more syntax nodes are not parsed either.
-MOST_NODES = 12_000
 #: Longest quotation of code inside a hint, in characters.
 CODE_LENGTH = 70
+#: Where a node keeps its dotted name.
+_CHAIN = "_chain"
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 Loop = ast.While | ast.For
 Scope = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
@@ -126,6 +132,8 @@ class Source:
 
     def place(self, node: ast.AST) -> Location:
         """Return the place where a node begins."""
+        from grader.grading.model.exercise import Location  # noqa: PLC0415 - the contained process needs no places
+
         return Location(self.file, first_line(node))
 
     def line(self, number: int) -> str:
@@ -134,6 +142,8 @@ class Source:
 
     def code(self, node: ast.AST, length: int = CODE_LENGTH) -> str:
         """Return the source code of a node on one line, cut to `length` characters."""
+        from grader.grading.model.wording import quote  # noqa: PLC0415 - as above
+
         first, last = first_line(node), last_line(node)
         rows = [self.line(n)[: 4 * CODE_LENGTH].encode() for n in range(first, min(last, first + 4) + 1)]
         if not rows:
@@ -192,22 +202,38 @@ class Source:
 
 
 def read(file: str, text: str) -> Source:
-    """Return a parsed file; one that cannot be parsed, or is too long, has only lines."""
+    """Return a file as a tree; one that cannot be parsed, or is too long or too deep, has only lines.
+
+    Args:
+        file: Its name.
+        text: A `SourceText`, whose tree is known, or the text of an author's own test.
+    """
     lines = tuple(text[:LONGEST_SOURCE].split("\n"))
-    tree = _parsed(text) if len(text) <= LONGEST_SOURCE else None
+    tree = _kept(text) if isinstance(text, SourceText) else parsed(text)
+    return Source(file, lines) if tree is None else source_of(file, lines, tree)
+
+
+def _kept(text: SourceText) -> ast.Module | None:
+    """Return the tree of a text, which is made once."""
+    if text.kept is None:
+        told = text.tree
+        text.kept = (None if told is None else tree_of(told),)
+    (tree,) = text.kept if isinstance(text.kept, tuple) else (None,)
+    return tree
+
+
+def source_of(file: str, lines: Sequence[str], tree: ast.Module) -> Source:
+    """Return a file whose tree is within the limits of size and depth."""
     parents: dict[ast.AST, ast.AST] = {}
     nodes: list[ast.AST] = []
-    waiting: list[ast.AST] = [tree] if tree is not None else []
-    while waiting and len(parents) <= MOST_NODES:
+    waiting: list[ast.AST] = [tree]
+    while waiting:
         node = waiting.pop()
         if hasattr(node, "lineno"):
             nodes.append(node)
-        for child in ast.iter_child_nodes(node):
-            if not isinstance(child, (ast.expr_context, ast.operator, ast.unaryop, ast.cmpop, ast.boolop)):
-                parents[child] = node
-                waiting.append(child)
-    if tree is None or waiting:
-        return Source(file, lines)
+        for child in children(node):
+            parents[child] = node
+            waiting.append(child)
     nodes.sort(key=_place)
     index: dict[type[ast.AST], list[Any]] = {}
     for node in nodes:
@@ -249,13 +275,18 @@ def _place(node: ast.AST) -> tuple[int, int, int]:
     return first_line(node), getattr(node, "col_offset", 0), -last_line(node)
 
 
-def _parsed(text: str) -> ast.Module | None:
+def parsed(text: str) -> ast.Module | None:
+    """Return the tree of a text; None if it cannot be parsed, or is too long or too deep."""
+    if len(text) > LONGEST_SOURCE:
+        return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the student's invalid escapes must not warn here
         try:
-            return ast.parse(text.removeprefix("\ufeff"))
+            tree = ast.parse(text.removeprefix("\ufeff"))
         except (SyntaxError, ValueError, RecursionError, MemoryError, OverflowError):
             return None
+    count, depth = measured(tree)
+    return tree if count <= MOST_NODES and depth <= MOST_DEPTH else None
 
 
 def first_line(node: ast.AST) -> int:
@@ -281,20 +312,25 @@ def last_name(node: ast.AST | None) -> str:
 
 
 def chain(node: ast.AST | None) -> str:
-    """Return a dotted name with `()` for calls: `self.get_logger().info`; empty if it starts with anything else."""
-    parts: list[str] = []
-    while True:
-        if isinstance(node, ast.Attribute):
-            parts.append("." + node.attr)
-            node = node.value
-        elif isinstance(node, ast.Call):
-            parts.append("()")
-            node = node.func
-        elif isinstance(node, ast.Name):
-            parts.append(node.id)
-            return "".join(reversed(parts))
+    """Return a dotted name with `()` for calls: `self.get_logger().info`; empty if it starts with anything else.
+
+    Each node keeps its own: a long chain is asked for once for every link.
+    """
+    inner: list[ast.Attribute | ast.Call] = []
+    name: str | None = None
+    while name is None:
+        if isinstance(node, (ast.Attribute, ast.Call)):
+            name = node.__dict__.get(_CHAIN)
+            if name is None:
+                inner.append(node)
+                node = node.value if isinstance(node, ast.Attribute) else node.func
         else:
-            return ""
+            name = node.id if isinstance(node, ast.Name) else ""
+    for link in reversed(inner):
+        if name:
+            name += f".{link.attr}" if isinstance(link, ast.Attribute) else "()"
+        link.__dict__[_CHAIN] = name
+    return name
 
 
 def argument(call: ast.Call, place: int, name: str) -> ast.expr | None:

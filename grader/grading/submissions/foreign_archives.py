@@ -177,7 +177,7 @@ def _vint(data: bytes, at: int) -> tuple[int, int]:
 
 def _run(told: dict[str, object], archive: BinaryIO, out: BinaryIO, real_s: float) -> int:
     try:
-        return run_contained("grader.grading.submissions.unpacker", told, archive, out, real_s)
+        return run_contained("grader.grading.submissions.unpacker", told, archive, out, real_s, installed=True)
     except subprocess.TimeoutExpired:
         return -1
     except OSError as error:

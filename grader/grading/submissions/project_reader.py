@@ -1,14 +1,9 @@
-"""Reads the project files of ROS packages, as a process of its own that can do nothing else.
+"""Reads the project files of ROS packages, in the contained process that can do nothing else.
 
-Usage: python -m grader.grading.submissions.project_reader LIMITS < JSON. What it reads was made by students, so the
-process
-gives up all privileges, files and networks first; its memory, processor time and output are limited (LIMITS, as for
-`confine`). The input is a list of packages, each an object of `files`, the bytes of its project files as Latin-1 by
-name, and `names`, the paths of all files below its folder. For each package it writes a line as soon as it is read, so
-that what ends the process costs no package before it: a JSON object of `name` (null if none is given), `scripts`,
-`data_files` (null if not known), `programs` that are installed as they are, each with its file and whether it is made
-executable, names of programs that CMake builds as `built`, `imported` folders, `unread`, whether there may be other
-programs, and `problems`, pairs of a file and one of `PROBLEMS`.
+Of each package it tells `name` (null if none is given), `scripts`, `data_files` (null if not known), `programs` that
+are installed as they are, each with its file and whether it is made executable, names of programs that CMake builds as
+`built`, `imported` folders, `unread`, whether there may be other programs, and `problems`, pairs of a file and one of
+`PROBLEMS`.
 
 No code of a student is imported or run: setup.py is only parsed.
 """
@@ -19,18 +14,13 @@ import ast
 import codecs
 import configparser
 import importlib
-import json
-import os
 import posixpath
 import re
-import sys
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
 from grader.grading.submissions.cmake_files import Contents, contents_of
 from grader.grading.submissions.setup_files import LimitError, given_to_setup
-from grader.runtime.contained import confine
 
 #: Why a file was not read: it is not valid in its format, or reading it would take too much.
 INVALID, TOO_COSTLY = "invalid", "too costly"
@@ -43,23 +33,10 @@ ENCODINGS = ("ascii", "latin-1", "iso8859-15", "cp1252", "utf-8-sig")
 Value = TypeVar("Value")
 
 
-def main(limits: dict[str, Any]) -> int:
-    """Read the packages of standard input, and write what is found to standard output."""
+def prepare() -> Any:
+    """Load what a confined process could not; return the module that reads TOML, None before Python 3.11."""
     for name in ENCODINGS:
         codecs.lookup(name)
-    tomllib = _tomllib()
-    text = sys.stdin.buffer.read()
-    warnings.simplefilter("ignore")  # a warning would want to show the line of a file
-    confine(limits)
-    for package in json.loads(text):
-        files = {name: content.encode("latin-1") for name, content in package["files"].items()}
-        sys.stdout.write(json.dumps(described(files, package["names"], tomllib)) + "\n")
-        sys.stdout.flush()
-    return 0
-
-
-def _tomllib() -> Any:
-    """Return the module that reads TOML; None before Python 3.11, which has none."""
     try:
         return importlib.import_module("tomllib")
     except ImportError:
@@ -187,7 +164,3 @@ def _ini_scripts(text: Any) -> list[str]:
         elif section == "console_scripts":
             found.append(line)
     return found
-
-
-if __name__ == "__main__":
-    os._exit(main(json.loads(sys.argv[1])))

@@ -1,38 +1,28 @@
-"""Finds the ROS packages of a submission; a process of its own reads their files, and every answer of it is checked."""
+"""Finds the ROS packages of a submission; a contained process reads their files, and every answer of it is checked."""
 
 from __future__ import annotations
 
-import json
-import os
 import posixpath
 import re
-import stat
-import subprocess
-import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from grader.grading.submissions.collected import name_problem
-from grader.runtime.contained import run_contained
-from grader.runtime.model.errors import HarnessError
+from grader.grading.submissions.contained_reader import Answer, Asked, Tell, content_of, first_line, told_by_process
 from grader.runtime.model.limits import MAX_FILES, MAX_NAME_BYTES, MAX_PATH_BYTES
 from grader.runtime.model.projects import Project
 from grader.runtime.model.wording import first_of
 from grader.runtime.programs.executables import CMAKE_LISTS, files_below, project_folders
 
-MODULE = "grader.grading.submissions.project_reader"
 #: The files of a package that are read.
 FILES = ("package.xml", "setup.py", "setup.cfg", "pyproject.toml", CMAKE_LISTS)
 #: The one to name if the process ended while it read a package.
 _COSTLIEST_FIRST = ("setup.py", CMAKE_LISTS, "pyproject.toml", "setup.cfg")
 #: Larger files are not read, in bytes: those of real packages have some thousands.
 MOST_BYTES = 256 << 10
-#: Limits of the process that reads: memory and output in bytes, processor time in seconds. The files of a real package
-#: take it a tenth of a second, most of it for its own start.
-MEMORY_BYTES, OUTPUT_BYTES, PROCESSOR_S = 320 << 20, 8 << 20, 10
 #: The most packages of a submission, and bytes of all their files together: courses hand in a handful.
 MOST_PACKAGES, TOTAL_BYTES = 50, 4 << 20
 #: The most files setup.cfg of Python packages in a CMake package that are read.
@@ -52,29 +42,7 @@ _PROBLEMS = {
 }
 
 
-def told_by_process(asked: bytes, output_bytes: int = OUTPUT_BYTES) -> bytes:
-    """Return what the process that reads says of some packages, in lines of JSON; `project_reader` has the formats.
-
-    Raises:
-        HarnessError: The process cannot be started, or the machine is too busy for it.
-    """
-    limits = {"memory": MEMORY_BYTES, "output": output_bytes, "processor": PROCESSOR_S}
-    with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as out:
-        given.write(asked)
-        given.seek(0)
-        try:
-            run_contained(MODULE, limits, given, out)
-        except subprocess.TimeoutExpired:
-            raise HarnessError("project files: the machine was too busy to read them", "try again later") from None
-        except OSError as error:
-            raise HarnessError(f"project files: they cannot be read: {error.strerror}", "free some memory") from None
-        out.seek(0)
-        return out.read(output_bytes)
-
-
-def read_projects(
-    root: Path, tell: Callable[[bytes], bytes] = told_by_process
-) -> tuple[tuple[Project, ...], tuple[str, ...]]:
+def read_projects(root: Path, tell: Tell = told_by_process) -> tuple[tuple[Project, ...], tuple[str, ...]]:
     """Return the packages of a submission, outermost first, and notes on what could not be read.
 
     A submission without packages costs nothing. Whatever a file holds, it costs at most what the limits say, and
@@ -87,81 +55,81 @@ def read_projects(
     Raises:
         HarnessError: The files cannot be read, or the machine is too busy for it.
     """
-    folders = project_folders(root)
-    if not folders:
+    packages, asked = Packages(root), Asked()
+    if not packages.folders:
         return (), ()
-    problems: dict[tuple[str, str], None] = {}
-    asked, left = [], TOTAL_BYTES
-    for folder in folders[:MOST_PACKAGES]:
-        files = {}
-        for name in FILES:
-            content = _content(folder / name, min(MOST_BYTES, left))
-            if content is None:
-                problems["large", _relative(folder / name, root)] = None
-            elif content:
-                files[name] = content.decode("latin-1")
-                left -= len(content)
-        lists = CMAKE_LISTS in files or b"glob" in _bytes(files, "setup.py")
-        names = [*islice(files_below(folder), MAX_FILES)] if lists else []
-        if b"SCRIPTS_DESTINATION" in _bytes(files, CMAKE_LISTS):  # the console scripts of a Python package in this one
-            below = [name for name in names if name.endswith("/setup.cfg")][:MOST_CONFIGURATIONS]
-            contents = {name: _content(folder / name, min(MOST_BYTES, left)) for name in below}
-            files |= {name: content.decode("latin-1") for name, content in contents.items() if content}
-        asked.append({"files": files, "names": names})
-    found = []
-    answers = _answers(tell(json.dumps(asked).encode()))
-    for number, folder in enumerate(folders[:MOST_PACKAGES]):
-        place = _relative(folder, root)
-        first = next((name for name in _COSTLIEST_FIRST if name in asked[number]["files"]), "package.xml")
-        answer = answers[number] if number < len(answers) else {"problems": [[first, "unread"]]}
-        project, wrong = _checked(answer, place, folder.name)
-        found.append(_with_programs(project, answer, folder))
-        for file, problem in wrong:
-            problems[problem, posixpath.join(place, file)] = None
-    notes = list(_notes(problems))
-    if len(folders) > MOST_PACKAGES:
-        notes.append(f"only the first {MOST_PACKAGES} packages were read, of {len(folders)}")
-    return tuple(found), tuple(notes)
+    packages.ask(asked)
+    return packages.told(Answer(tell(asked.input())))
 
 
-def _bytes(files: Mapping[str, str], name: str) -> bytes:
-    return files.get(name, "").encode("latin-1")
+class Packages:
+    """The packages of a submission, whose files the process is asked to read.
+
+    Args:
+        root: The staged submission.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.folders = project_folders(root)
+        self._root = root
+        self._left = TOTAL_BYTES
+        self._numbers: dict[Path, int] = {}  # file -> the number of its content; packages may lie in each other
+        self._files: list[dict[str, int]] = []
+        self._problems: dict[tuple[str, str], None] = {}
+
+    def ask(self, asked: Asked) -> None:
+        """Add the files of the packages to those that are asked for."""
+        names: dict[str, None] = {}
+        for folder in self.folders[:MOST_PACKAGES]:
+            contents = {name: self._added(folder / name, asked) for name in FILES}
+            cmake, setup = contents[CMAKE_LISTS], contents["setup.py"]
+            lists = bool(cmake) or b"glob" in setup
+            below = [*islice(files_below(folder), MAX_FILES)] if lists else []
+            place = _relative(folder, self._root)
+            names |= dict.fromkeys(posixpath.join(place, name) for name in below)
+            if b"SCRIPTS_DESTINATION" in cmake:  # the console scripts of a Python package in this one
+                inner = [name for name in below if name.endswith("/setup.cfg")][:MOST_CONFIGURATIONS]
+                contents |= {name: self._added(folder / name, asked) for name in inner}
+            files = {name: self._numbers[folder / name] for name, content in contents.items() if content}
+            self._files.append(files)
+            asked.packages.append({"folder": place, "files": files, "lists": lists})
+        asked.names = names
+
+    def _added(self, path: Path, asked: Asked) -> bytes:
+        """Return the content of a file, empty if it is not there or too large; it is read and counted once."""
+        if path in self._numbers:
+            return asked.content(self._numbers[path])
+        content = content_of(path, min(MOST_BYTES, self._left))
+        if content is None:
+            self._problems["large", _relative(path, self._root)] = None
+        if content:
+            self._left -= len(content)
+            self._numbers[path] = asked.add(content)
+        return content or b""
+
+    def told(self, answer: Answer) -> tuple[tuple[Project, ...], tuple[str, ...]]:
+        """Return the packages as the process says what their files hold, and notes."""
+        found, problems = [], dict(self._problems)
+        ended = False
+        for number, folder in enumerate(self.folders[:MOST_PACKAGES]):
+            place = _relative(folder, self._root)
+            row = None if ended else answer.row()
+            ended = row is None
+            first = next((name for name in _COSTLIEST_FIRST if name in self._files[number]), "package.xml")
+            told: Mapping[str, Any] = {"problems": [[first, "unread"]]} if row is None else row
+            project, wrong = _checked(told, place, folder.name)
+            found.append(_with_programs(project, told, folder))
+            for file, problem in wrong:
+                problems[problem, posixpath.join(place, file)] = None
+        notes = list(_notes(problems))
+        if len(self.folders) > MOST_PACKAGES:
+            notes.append(f"only the first {MOST_PACKAGES} packages were read, of {len(self.folders)}")
+        return tuple(found), tuple(notes)
 
 
 def _relative(path: Path, root: Path) -> str:
     relative = path.relative_to(root).as_posix()
     return "" if relative == "." else relative
-
-
-def _content(path: Path, most: int) -> bytes | None:
-    """Return the bytes of a plain file, empty if there is none; None if there are more than allowed."""
-    try:
-        with open(path, "rb", opener=_without_waiting) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                return b""
-            content = file.read(most + 1)
-    except OSError:
-        return b""
-    return content if len(content) <= most else None
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    """Open a file without blocking on a pipe."""
-    return os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC)
-
-
-def _answers(told: bytes) -> list[dict[str, Any]]:
-    """Return what the process said of each package, as far as it came."""
-    found = []
-    for line in told.split(b"\n")[:-1]:
-        try:
-            answer = json.loads(line)
-        except (ValueError, RecursionError):
-            break
-        if not isinstance(answer, dict):
-            break
-        found.append(answer)
-    return found
 
 
 def _checked(answer: Mapping[str, Any], place: str, folder_name: str) -> tuple[Project, list[tuple[str, str]]]:
@@ -198,7 +166,7 @@ def _with_programs(project: Project, answer: Mapping[str, Any], folder: Path) ->
         name, file, runs = row[0], _normal(row[1]), row[2]
         if not file or _SCRIPT.fullmatch(name) is None or name in (".", ".."):
             continue
-        first = _first_line(folder / file)
+        first = first_line(folder / file, _START_BYTES)
         if first.startswith("#!") and "python" not in first:
             foreign.append(name)
         elif file.endswith(".py") or first.startswith("#!"):
@@ -217,16 +185,6 @@ def _with_programs(project: Project, answer: Mapping[str, Any], folder: Path) ->
         unread=answer.get("unread", (folder / CMAKE_LISTS).is_file()) is True,
         by_cmake=(folder / CMAKE_LISTS).is_file(),
     )
-
-
-def _first_line(path: Path) -> str:
-    try:
-        with open(path, "rb", opener=_without_waiting) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                return ""
-            return file.read(_START_BYTES).partition(b"\n")[0].decode("latin-1")
-    except OSError:
-        return ""
 
 
 def _strings(value: Any) -> list[str]:

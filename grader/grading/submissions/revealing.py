@@ -11,12 +11,12 @@ import re
 from collections.abc import Iterator
 
 from grader.grading.judging.source import Source, chain
+from grader.grading.submissions.answers import ORDER
 
 #: Modules with functions that are replaced in virtual time.
 REPLACED = frozenset(
     ("time", "datetime", "threading", "queue", "asyncio", "select", "selectors", "signal", "sched", "random", "rclpy")
 )
-ORDER = "the order of a set"
 #: Functions that go through their argument in order, and methods that do; `sorted`, `len`, `sum`, `min`, `max`, `any`
 #: and `all` give the same for every order, but for rounding.
 _IN_ORDER = frozenset(("list", "tuple", "iter", "enumerate", "str", "repr", "zip", "next", "map", "filter", "print"))
@@ -27,8 +27,9 @@ _TEXTS = frozenset(("str", "repr", "format", "print", "ascii"))
 _CLASSES = frozenset(("date", "datetime", "time", "timedelta", "timezone", "tzinfo"))
 #: Attributes of modules that ordinary programs read.
 _ORDINARY = frozenset(("__version__", "__file__"))
-#: A field of a format that reads an attribute, such as `{0.__code__}` or `{f.real}`.
-_FIELD = re.compile(r"\{[^{}:!]*?[.\[]([A-Za-z_]\w*)[^{}]*\}")
+#: A field of a format, and what it reads, such as `{0.__code__}` or `{f.real}`. Both patterns take linear time.
+_FIELD = re.compile(r"\{([^{}]*)\}")
+_READ = re.compile(r"[.\[]([A-Za-z_]\w*)")
 
 
 def shown_functions(source: Source) -> Iterator[str]:
@@ -72,7 +73,8 @@ def read_attributes(source: Source) -> Iterator[str]:
     """Yield the attributes that fields of formats and patterns of `match` read."""
     for node in source.all(ast.Constant):
         if isinstance(node.value, str) and "{" in node.value:
-            yield from _FIELD.findall(node.value)
+            for field in _FIELD.findall(node.value):
+                yield from _READ.findall(re.split("[:!]", field, maxsplit=1)[0])
     for pattern in source.all(ast.MatchClass):
         yield from pattern.kwd_attrs
 
@@ -104,24 +106,30 @@ def _uses_order(node: ast.AST, names: frozenset[str]) -> bool:
 
 def _is_set(node: ast.expr, names: frozenset[str]) -> bool:
     """Return whether an expression is a set that is not empty, or a name that is given nothing but sets."""
-    if isinstance(node, (ast.Set, ast.SetComp)):
-        return True
-    if isinstance(node, ast.Call) and chain(node.func) in ("set", "frozenset"):
-        return bool(node.args)
-    if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.BitOr, ast.BitAnd, ast.Sub, ast.BitXor)):
-        return _is_set(node.left, names) or _is_set(node.right, names)
-    return chain(node) in names
+    waiting = [node]
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, ast.BinOp) and isinstance(one.op, (ast.BitOr, ast.BitAnd, ast.Sub, ast.BitXor)):
+            waiting += (one.right, one.left)
+        elif isinstance(one, ast.Call) and chain(one.func) in ("set", "frozenset"):
+            if one.args:
+                return True
+        elif isinstance(one, (ast.Set, ast.SetComp)) or chain(one) in names:
+            return True
+    return False
 
 
 def _set_names(source: Source) -> frozenset[str]:
     """Return the names, such as `seen` or `self.seen`, that are given nothing but sets."""
-    given: dict[str, list[ast.expr]] = {}
+    given: dict[str, dict[ast.expr, None]] = {}
     for node in source.nodes:
         if isinstance(node, (ast.Assign, ast.AnnAssign, ast.NamedExpr)) and node.value is not None:
             for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
-                given.setdefault(chain(target), []).append(node.value)
+                given.setdefault(chain(target), {})[node.value] = None
     given.pop("", None)
-    return frozenset(name for name, values in given.items() if all(_makes_set(value) for value in values))
+    values_given = dict.fromkeys(value for values in given.values() for value in values)
+    sets = {value: _makes_set(value) for value in values_given}
+    return frozenset(name for name, values in given.items() if all(sets[value] for value in values))
 
 
 def _makes_set(node: ast.expr) -> bool:

@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
 from grader.grading.submissions.collected import Collected
+from grader.grading.submissions.contents import Contents, read_contents
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.staging import collect_folder, read_start, write_files
 from grader.runtime.model.errors import SubmissionError
@@ -106,8 +107,10 @@ def stage_collected(
 ) -> Submission:
     """Write files that were read, here or on another machine, and find the wanted ones; raises HarnessError."""
     digest = write_files(collected, into)
-    projects, problems = read_projects(into) if wanted else ((), ())  # without, it is staged for its digest alone
-    programs = executables(into, projects)
+    likely = {name for one in wanted for last in [one.rpartition("/")[2]] for name in (last, f"{last}.py")}
+    # without wanted files, it is staged for its digest alone
+    contents = read_contents(into, likely | set(meant.values())) if wanted else Contents((), {}, ())
+    projects, programs = contents.projects, executables(into, contents.projects)
     files = {
         name: _look_for_executable(name, into, projects, programs, collected.files, wanted)
         if "/" in name and name not in meant
@@ -121,8 +124,9 @@ def stage_collected(
         root=into,
         digest=digest,
         files=files,
-        notes=(*several, *_unrunnable(files.values(), projects), *collected.notes, *problems),
+        notes=(*several, *_unrunnable(files.values(), projects), *collected.notes, *contents.notes),
         projects=projects,
+        programs=contents.programs,
     )
 
 

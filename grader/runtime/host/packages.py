@@ -65,7 +65,7 @@ def parse(path: str) -> ast.Module:
         return parsed(source.read(), path)
 
 
-def parsed(text: bytes, path: str) -> ast.Module:
+def parsed(text: bytes, path: str = "file") -> ast.Module:
     """Parse the text of a file, as `parse` does."""
     before, null, _ = text.partition(b"\0")
     if null:  # Python's own error has no line number
@@ -187,16 +187,19 @@ def _offers_main(tree: ast.Module) -> bool:
     if main is None or (isinstance(main, ast.FunctionDef) and _must_be_given(main.args)):
         return False
     guards = [s for s in _top_level(tree.body) if is_guard(s)]
-    others = [s for s in tree.body if not never_true(s) and not any(guard in ast.walk(s) for guard in guards)]
+    others = [s for s in tree.body if not never_true(s) and set(guards).isdisjoint(ast.walk(s))]
     return not calls(others, "main") and (not guards or calls(guards, "main"))
 
 
 def _top_level(statements: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
     """Yield the statements that may run when a module is imported, including those in `if` and `try`."""
-    for statement in statements:
+    waiting = [*reversed(statements)]
+    while waiting:  # a long `elif` is as deep as it is long
+        statement = waiting.pop()
         yield statement
         if isinstance(statement, (ast.If, ast.Try)):
-            yield from _top_level([*statement.body, *statement.orelse, *getattr(statement, "finalbody", ())])
+            inner = (*statement.body, *statement.orelse, *getattr(statement, "finalbody", ()))
+            waiting += reversed(inner)
 
 
 def _defines_main(statement: ast.stmt) -> bool:

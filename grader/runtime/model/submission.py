@@ -2,12 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field
 from pathlib import Path
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.projects import Project
+
+
+class SourceText(str):
+    """The text of a student's file, with the syntax tree that a contained process made of it.
+
+    Args:
+        text: The text.
+        tree: The tree as JSON, or what returns it; None if Python cannot parse the text, or it is too long or too deep
+            to be examined.
+    """
+
+    __slots__ = ("_tree", "kept")
+
+    def __new__(cls, text: str, tree: bytes | Callable[[], bytes | None] | None = None) -> SourceText:
+        """Join a text and its tree."""
+        made = super().__new__(cls, text)
+        made._tree = tree
+        made.kept = None
+        return made
+
+    _tree: bytes | Callable[[], bytes | None] | None
+    kept: object  # what a reader has made of the tree
+
+    @property
+    def tree(self) -> bytes | None:
+        """The tree as JSON; None if there is none."""
+        return self._tree() if callable(self._tree) else self._tree
+
+    def __reduce__(self) -> tuple[type, tuple[str, bytes | None]]:
+        """Return what a copy in another process is made of."""
+        return type(self), (str(self), self.tree)
+
+
+@dataclass(frozen=True, slots=True)
+class CompileError:
+    """Why Python cannot compile a file, as its parser says it."""
+
+    type: str
+    message: str
+    line: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """What the contained process found in one Python file of a submission."""
+
+    text: SourceText | None = None  # None if it cannot be decoded, or is too long
+    inert: bool = False  # whether it holds only comments, texts and `pass`, so that running it does nothing
+    error: CompileError | None = None
+    reaches: tuple[str, ...] = ()  # the names by which it reaches into its process, without duplicates
+    told: bool = True  # whether its text is here, if it has any: not all are kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +87,7 @@ class Submission:
     files: Mapping[str, StudentFile] = field(default_factory=dict)  # wanted file name -> the file that was found for it
     notes: tuple[str, ...] = ()  # sentences about the files that readers must know
     projects: tuple[Project, ...] = ()  # its ROS packages, outermost first
+    programs: Mapping[str, Program] = field(default_factory=dict)  # path inside the submission -> its Python file
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Says whether a file holds anything to run, judged by its text."""
+"""Says whether a file holds anything to run, or why Python cannot compile it."""
 
 from __future__ import annotations
 
@@ -12,22 +12,18 @@ from grader.runtime.host.packages import parsed
 from grader.runtime.model.limits import MAX_PARSED_BYTES
 
 
-def is_runnable(path: Path) -> bool:
-    """Return whether running a file may do anything, judged by its text; True in doubt."""
-    found = read(path)
-    return not (isinstance(found, SyntaxError) or is_inert(found))
+def read(content: bytes | str) -> ast.Module | SyntaxError | None:
+    """Return what a file holds, or why Python cannot compile it; None if only a process should find out.
 
-
-def read(path: Path) -> ast.Module | SyntaxError | None:
-    """Return what a file holds, or why Python cannot compile it; None if only a process should find out."""
+    Only a contained process asks this about what students wrote.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # as error, a warning about a string would be a syntax error
         try:
-            text = text_of(path)
-            return None if text is None else parsed(text, str(path))
+            return parsed(content) if isinstance(content, bytes) else ast.parse(content)
         except SyntaxError as error:
             return error
-        except (OSError, ValueError, RecursionError, MemoryError):
+        except (ValueError, RecursionError, MemoryError, OverflowError):
             return None
 
 

@@ -215,7 +215,7 @@ def version_for(text: bytes, question: str) -> Version | None:
         given.write(text)
         given.seek(0)
         try:
-            run_contained(MODULE, LIMITS, given, out)
+            run_contained(MODULE, LIMITS, given, out, installed=True)
         except subprocess.TimeoutExpired:
             raise HarnessError(f"{question} is not known: the machine was too busy to read it", "try again") from None
         except OSError as error:

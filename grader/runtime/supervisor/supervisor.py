@@ -33,6 +33,7 @@ from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import NS_PER_S, size
 from grader.runtime.model.scenario import is_launch_file
+from grader.runtime.model.submission import Program
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Trace
 from grader.runtime.recording.codec import to_json
 from grader.runtime.ros_installation import PythonRuntime
@@ -478,12 +479,16 @@ class ForkedWorker(WorkerProcess):
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A plan with a title for progress messages, and the real-time budget that it shares; unlimited by default."""
+    """A plan with a title for progress messages, and the real-time budget that it shares; unlimited by default.
+
+    `programs` is what is known of the submission's Python files, by path.
+    """
 
     title: str
     plan: Plan
     budget: RealTimeBudget = field(default_factory=RealTimeBudget, compare=False)
     parallel: bool = False  # on the wall clock, whether other jobs like it may be recorded at the same time
+    programs: Mapping[str, Program] = field(default_factory=dict, compare=False)
 
 
 class Recorder:

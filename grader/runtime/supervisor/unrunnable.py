@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from grader.runtime.host.packages import PackageLayout, layout_of
 from grader.runtime.model.scenario import is_launch_file
+from grader.runtime.model.submission import Program
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, GraphSnapshot, Mark, Start, StartWay, Trace
 from grader.runtime.plan import Plan
-from grader.runtime.programs.inert import is_inert, read
 from grader.runtime.worker.ending import ending, reported_fault
 from grader.runtime.worker.notes import Places
 
+#: A file of which nothing is known: only a process finds out.
+_UNKNOWN = Program()
 
-def trace_without_run(plan: Plan) -> Trace | None:
-    """Return what a run of the plan would record of its processes; None if any of them has to be run."""
+
+def trace_without_run(plan: Plan, programs: Mapping[str, Program]) -> Trace | None:
+    """Return what a run of the plan would record of its processes; None if any of them has to be run.
+
+    Args:
+        plan: The plan.
+        programs: What a contained process found in the Python files, by path.
+    """
     places = Places(Path(plan.root))
     starts_ns = dict(plan.starts_ns)
     long = [(name, problem) for name, _ in plan.processes if (problem := plan.start_of(name).problem)]
@@ -24,16 +33,12 @@ def trace_without_run(plan: Plan) -> Trace | None:
     ends: list[Fault | Mark] = []
     starts: list[Start] = []
     for name, file in plan.processes:
-        found, start_ns = read(Path(plan.root, file)), starts_ns.get(name, 0)
-        if isinstance(found, SyntaxError):
-            said = {
-                "code": "syntax_error",
-                "type": type(found).__name__,
-                "message": str(found.msg),
-                "line": found.lineno,
-            }
+        found, start_ns = programs.get(file, _UNKNOWN), starts_ns.get(name, 0)
+        if found.error is not None:
+            error = found.error
+            said = {"code": "syntax_error", "type": error.type, "message": error.message, "line": error.line}
             ends.append(reported_fault(name, start_ns, {**said, "file": file}, plan.limits, places))
-        elif is_inert(found) and not start_ns and _is_script(plan, name, file):
+        elif found.inert and not start_ns and _is_script(plan, name, file):
             starts.append(Start(name, file, StartWay.SCRIPT, arguments=plan.start_of(name).words))
             ends.append(ending(name, 0, {"code": 0}, plan, places, stopped=False))
         else:

@@ -123,12 +123,17 @@ def _parsed(path: Path) -> ast.Module | None:
 
 def _starts(statement: ast.stmt) -> bool:
     """Return whether a top-level statement may run the program, as opposed to only preparing it."""
-    if isinstance(statement, ast.Expr):
-        return isinstance(statement.value, ast.Call) and _root(statement.value.func) not in _SETTING_UP
-    if isinstance(statement, ast.If) and never_true(statement):
-        return any(map(_starts, statement.orelse))
-    inner = (part for name in ("body", "orelse", "finalbody") for part in getattr(statement, name, []))
-    return not isinstance(statement, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)) and any(map(_starts, inner))
+    waiting = [statement]
+    while waiting:  # a long `elif` is as deep as it is long
+        one = waiting.pop()
+        if isinstance(one, ast.Expr):
+            if isinstance(one.value, ast.Call) and _root(one.value.func) not in _SETTING_UP:
+                return True
+        elif isinstance(one, ast.If) and never_true(one):
+            waiting += one.orelse
+        elif not isinstance(one, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+            waiting += (part for name in ("body", "orelse", "finalbody") for part in getattr(one, name, []))
+    return False
 
 
 def _root(node: ast.expr) -> str:

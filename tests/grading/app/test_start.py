@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.grading.app import start
 from grader.grading.app.bags import read_given, read_recordings
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest
@@ -54,10 +55,13 @@ def test_an_exercise_may_be_named_as_its_task_sheet_or_its_file(name: str, id_: 
 
 
 def test_what_holds_no_file_to_run_is_graded_without_a_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The names show it before anything is started."""
+    """But for the one that reads it: names show it before anything is started, or texts before anything is run."""
+    started = subprocess.Popen.__init__
 
-    def refuse(*_: object, **__: object) -> None:
-        pytest.fail("a process was started")
+    def refuse(*given: object, **options: object) -> None:
+        if "grader.grading.submissions.submission_reader" not in str(given):
+            pytest.fail("a process was started")
+        started(*given, **options)  # type: ignore[arg-type, misc]
 
     find_ros()  # once for each process, perhaps by asking another one
     monkeypatch.setattr(subprocess.Popen, "__init__", refuse)
@@ -67,6 +71,7 @@ def test_what_holds_no_file_to_run_is_graded_without_a_process(tmp_path: Path, m
         report = grade(GradeRequest(str(place), isolation="none"), lambda _: None)
         assert {v.outcome for e in report.exercises for v in e.verdicts} == {Outcome.NOT_MET, Outcome.BLOCKED}
     (tmp_path / "velocity_publisher.py").write_text("import rclpy\n\ndef main()\n    rclpy.init()\n")
+    monkeypatch.setattr(start, "may_run", lambda *_: False)  # a worker would be started early, and not be used
     report = grade(GradeRequest(str(tmp_path), isolation="none"), lambda _: None)
     first = report.exercises[0].verdicts[0]
     assert "SyntaxError" in first.reason

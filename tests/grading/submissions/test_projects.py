@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 from places import TESTS
 
-from grader.grading.submissions import projects
-from grader.grading.submissions.projects import read_projects, told_by_process
+from grader.grading.submissions import contained_reader, projects
+from grader.grading.submissions.contained_reader import told_by_process
+from grader.grading.submissions.projects import read_projects
 from grader.runtime.model.projects import Project
 from grader.runtime.programs.executables import executables, find_executable
 from grader.runtime.programs.shares import install_shares
@@ -291,10 +292,46 @@ def test_files_that_collide_or_never_end_are_noted(tmp_path: Path, ros: RosInsta
     shutil.rmtree(tmp_path / "two")
 
 
+def test_files_of_packages_in_each_other_are_read_and_counted_once(tmp_path: Path) -> None:
+    """Eighteen packages around ten large files hand the process these files and their names once."""
+    folder, large = tmp_path, b"\xff" * projects.MOST_BYTES
+    for _ in range(18):
+        folder /= "inner"
+        folder.mkdir()
+        (folder / "package.xml").write_text("<name>own</name>")
+        (folder / "CMakeLists.txt").write_text("install(PROGRAMS a DESTINATION SCRIPTS_DESTINATION)")
+    for number in range(10):
+        (folder / f"p{number}").mkdir()
+        (folder / f"p{number}" / "setup.cfg").write_bytes(large)
+    for number in range(500):
+        (folder / f"{'n' * 200}{number}").touch()
+    asked: list[bytes] = []
+
+    def tell(given: bytes) -> bytes:
+        asked.append(given)
+        return b""
+
+    read_projects(tmp_path, tell)
+    (given,) = asked
+    assert given.count(large) == 10
+    assert given.count(b"n" * 200) == 500
+    assert len(given) < projects.TOTAL_BYTES
+
+
+def test_more_than_the_total_is_not_read(tmp_path: Path) -> None:
+    """However many packages it lies in, and the note names the files that are too much."""
+    for number in range(20):
+        (tmp_path / f"p{number:02}").mkdir()
+        (tmp_path / f"p{number:02}" / "package.xml").write_bytes(b" " * projects.MOST_BYTES)
+    asked: list[bytes] = []
+    read_projects(tmp_path, lambda given: asked.append(given) or b"")
+    assert projects.TOTAL_BYTES <= len(asked[0]) < projects.TOTAL_BYTES + 10_000
+
+
 def test_the_limits_leave_room_for_honest_files() -> None:
     """The process that reads an ordinary package is far from its limits of memory and time."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert read_projects(TESTS / "packages" / "workspace")[1] == ()
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = (after.ru_utime + after.ru_stime) - (used.ru_utime + used.ru_stime)
-    assert spent < projects.PROCESSOR_S / 2
+    assert spent < contained_reader.PROCESSOR_S / 2

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from hostile import record
 
-from grader.runtime.model.trace import OutputLine
+from grader.grading.submissions.sources import read_programs
+from grader.runtime.model.trace import OutputLine, Trace
 from grader.runtime.plan import Plan
 from grader.runtime.session import RecordingSession
 from grader.runtime.supervisor.unrunnable import trace_without_run
@@ -38,11 +39,16 @@ def _plan(folder: Path, *names: str) -> Plan:
     return Plan("alone", processes, str(folder), "ab" * 32, 10_000_000_000, "", 60_000_000_000, "virtual")
 
 
+def _known(plan: Plan) -> Trace | None:
+    """Return what is known of a run by what the contained process found in the files."""
+    return trace_without_run(plan, read_programs(Path(plan.root))[0])
+
+
 @pytest.mark.parametrize("name", BROKEN | INERT)
 def test_the_trace_is_the_one_that_a_run_records(name: str, session: RecordingSession, tmp_path: Path) -> None:
     """All but the text that Python prints, which the report takes from the fault."""
     run = record(session, tmp_path / "in", (BROKEN | INERT)[name])
-    known = trace_without_run(_plan(tmp_path / "in", "a.py"))
+    known = _known(_plan(tmp_path / "in", "a.py"))
     assert known is not None
     assert known.observations == tuple(o for o in run.observations if not isinstance(o, OutputLine))
     assert known.observations
@@ -53,7 +59,7 @@ def test_the_trace_is_the_one_that_a_run_records(name: str, session: RecordingSe
 def test_what_can_be_compiled_or_not_be_read_is_run(name: str, tmp_path: Path) -> None:
     """Only a process can tell what happens then."""
     (tmp_path / "a.py").write_text(ACCEPTED[name])
-    assert trace_without_run(_plan(tmp_path, "a.py")) is None
+    assert _known(_plan(tmp_path, "a.py")) is None
 
 
 @pytest.mark.parametrize("beside", ["__init__.py", "setup.py"])
@@ -61,21 +67,21 @@ def test_an_empty_file_of_a_package_is_run(beside: str, tmp_path: Path) -> None:
     """How it is started, and with what, only a process finds out."""
     for name in ("a.py", beside):
         (tmp_path / name).write_text("")
-    assert trace_without_run(_plan(tmp_path, "a.py")) is None
+    assert _known(_plan(tmp_path, "a.py")) is None
 
 
 def test_an_empty_file_that_starts_late_is_run(tmp_path: Path) -> None:
     """Its start is an event of the scenario."""
     (tmp_path / "a.py").write_text("")
-    assert trace_without_run(replace(_plan(tmp_path, "a.py"), starts_ns=(("a.py", 5),))) is None
+    assert _known(replace(_plan(tmp_path, "a.py"), starts_ns=(("a.py", 5),))) is None
 
 
 def test_a_scenario_is_run_if_any_of_its_files_can_be(tmp_path: Path) -> None:
     """The other node may earn points; two broken ones cannot."""
     for name, text in (("a.py", "("), ("b.py", ")"), ("c.py", "x = 1")):
         (tmp_path / name).write_text(text)
-    both = trace_without_run(_plan(tmp_path, "a.py", "b.py"))
+    both = _known(_plan(tmp_path, "a.py", "b.py"))
     assert both is not None
     assert [fault.process for fault in both.faults()] == ["a.py", "b.py"]
-    assert trace_without_run(_plan(tmp_path, "a.py", "c.py")) is None
-    assert trace_without_run(_plan(tmp_path, "a.py", "gone.py")) is None
+    assert _known(_plan(tmp_path, "a.py", "c.py")) is None
+    assert _known(_plan(tmp_path, "a.py", "gone.py")) is None

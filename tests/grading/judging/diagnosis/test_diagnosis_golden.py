@@ -32,7 +32,6 @@ from grader.grading.judging.judge_run import undiagnosed
 from grader.grading.model.exercise import Outcome
 from grader.grading.model.report import ExerciseReport, Verdict
 from grader.grading.rubrics.builtin import builtin_exercises
-from grader.grading.submissions.sources import source_text
 from grader.runtime.model.trace import Start, StartWay, Trace
 
 HERE = Path(__file__).parent
@@ -392,7 +391,7 @@ OTHERWISE = [
 def right_programs(file: str) -> dict[str, str]:
     """The graded files of that name among the correct submissions."""
     found = sorted(path for folder in folders_in("correct", "threads") for path in folder.rglob(file))
-    return {p.parent.name: text for p in found if (text := source_text(p)) is not None}
+    return {path.parent.name: path.read_text(encoding="utf-8") for path in found}
 
 
 @pytest.mark.slow
