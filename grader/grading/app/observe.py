@@ -9,11 +9,13 @@ from pathlib import Path
 from grader.grading.app.bags import observed, recordings_of
 from grader.grading.app.grade import Progress
 from grader.grading.app.inputs import NamedSimulation, SentMessages, messages, simulated
+from grader.grading.app.interfaces import types_in
 from grader.grading.app.programs import find_targets, stage
 from grader.grading.app.seeds import PRACTICE
 from grader.grading.judging.summary import summarise
 from grader.grading.judging.values import student_endpoints
 from grader.grading.model.report import Summary
+from grader.grading.rubrics.simulations import offered_by
 from grader.grading.submissions.sources import source_text
 from grader.runtime.interface_packages import provide
 from grader.runtime.model.dataclass import dataclass
@@ -63,12 +65,13 @@ def observe(request: ObserveRequest, progress: Progress) -> Summary:
         GraderError: Nobody subscribes to a topic of a message to send, or it does not fit the type.
     """
     watched = watch(request, progress)
+    scenario = undisturbed(request, watched.processes)
     if request.sent:
         types = {end.topic: end.type for end in student_endpoints(watched.trace, "subscription")}
         sent = messages(request.sent, types, request.duration_ns / NS_PER_S, request.interfaces)
-        scenario = undisturbed(request, watched.processes)
         watched = watch(request, progress, replace(scenario, stimuli=(*scenario.stimuli, *sent)))
-    return summarise(watched.trace, watched.processes, watched.isolation, watched.sources)
+    served = [service for one in offered_by(scenario.stimuli) for service in one.serves]
+    return summarise(watched.trace, watched.processes, watched.isolation, watched.sources, served)
 
 
 def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None = None) -> Watched:
@@ -87,7 +90,7 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         submission = stage(targets, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, recordings=recordings, clock=clock)
-        provided = provide(session, submission, course=request.interfaces)
+        provided = provide(session, submission, course=request.interfaces, text=types_in([scenario]))
         installed = session.folder / "installed"
         prefixes, _ = session.install_shares(submission.root, submission.projects, installed)
         plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)
@@ -95,7 +98,7 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         sources = _sources(trace, submission)
     if trace.harness_problem:
         raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")
-    trace = replace(trace, notes=(*known.notes, *trace.notes))
+    trace = replace(trace, notes=(*known.notes, *submission.notes, *trace.notes))
     return Watched(trace, tuple(names), session.isolation.name, sources)
 
 

@@ -83,6 +83,24 @@ def test_texts_and_arrays_are_described() -> None:
     assert told["lengths"]["xs"] == [1, 5]
 
 
+def test_booleans_are_described() -> None:
+    """By their different values, in order of appearance, also those of arrays; JSON has them, too."""
+    said = [
+        Message(n * NS_PER_S, "/t", FLOAT, {"data": n > 1, "on": True, "deep": {"off": False}, "all": [False, n > 2]})
+        for n in range(4)
+    ]
+    summary = summarise(a_trace(GraphSnapshot(0, ("/a",), (an_end("publisher"),)), *said), ["a.py"], "none")
+    text = render_summary(summary)
+    assert [line.strip() for line in text.splitlines() if line.startswith("    ")][2:] == [
+        "data: false, true",
+        "on: true",
+        "deep.off: false",
+        "all: 2 elements, false, true",
+    ]
+    (told,) = json.loads(summary_to_json(summary))["topics"]
+    assert told["flags"] == {"data": [False, True], "on": [True], "deep.off": [False], "all[]": [False, True]}
+
+
 def test_whole_numbers_are_shown_in_full() -> None:
     """The seconds of a stamp differ in their last digits."""
     graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
