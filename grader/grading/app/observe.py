@@ -22,11 +22,11 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.limits import MOST_LAUNCHED, Limits
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.scenario import Scenario, Span, is_launch_file
+from grader.runtime.model.scenario import RunOptions, Scenario, Span, is_launch_file
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.trace import Trace
-from grader.runtime.plan import plan_scenario
-from grader.runtime.session import Job, open_session, planned_clock
+from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.plan import Plan, plan_scenario
+from grader.runtime.session import AUTO, VIRTUAL, Job, RecordingSession, open_session, planned_clock
 from grader.runtime.stimuli import RecordedStream
 
 #: When a given recording starts playing; before that the nodes receive nothing of it.
@@ -46,6 +46,7 @@ class ObserveRequest:
     interfaces: tuple[Path, ...] = ()  # folders with interface packages
     simulations: tuple[NamedSimulation, ...] = ()  # participants that react to what the programs publish
     sent: SentMessages = field(default_factory=dict)  # messages to send to them
+    launch_arguments: tuple[tuple[str, str], ...] = ()  # name and value, for the launch files among the programs
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,11 +96,29 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         prefixes, _ = session.install_shares(submission.root, submission.projects, installed)
         plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)
         trace = session.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
+        if trace.harness_problem and trace.clock is ClockKind.WALL and request.clock == AUTO:
+            trace = _in_virtual_time(session, scenario, plan, trace, progress)
         sources = _sources(trace, submission)
     if trace.harness_problem:
         raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")
     trace = replace(trace, notes=(*known.notes, *submission.notes, *trace.notes))
     return Watched(trace, tuple(names), session.isolation.name, sources)
+
+
+#: What is true of the summary of programs that virtual time does not suit, where the machine is too busy for the other
+#: clock: nothing is judged by it.
+_TOO_BUSY = "recorded in virtual time, which hides how slow a program is, because this machine is too busy for the wall"
+
+
+def _in_virtual_time(
+    session: RecordingSession, scenario: Scenario, plan: Plan, held_up: Trace, progress: Progress
+) -> Trace:
+    """Return a whole recording in virtual time where there is none on the wall clock, with the reason; or that one."""
+    whole = session.record({scenario.id: Job("observing in virtual time", plan)}, VIRTUAL, progress)[scenario.id]
+    if whole.harness_problem:
+        return held_up
+    why = f": {held_up.clock_reason}" if held_up.clock_reason else ""
+    return replace(whole, notes=(f"{_TOO_BUSY} clock{why}", *whole.notes))
 
 
 def _sources(trace: Trace, submission: Submission) -> dict[str, str]:
@@ -117,4 +136,6 @@ def undisturbed(request: ObserveRequest, names: Sequence[str]) -> Scenario:
     stimuli = (*simulated(request.simulations, request.interfaces), *played)
     launched = sum(map(is_launch_file, names)) * MOST_LAUNCHED
     limits = Limits(participants=Limits().participants + len(names) + launched)
-    return Scenario("observed", tuple(names), Span(request.duration_ns), stimuli, limits=limits)
+    options = RunOptions(launch_arguments=request.launch_arguments)
+    run = tuple((name, options) for name in names if is_launch_file(name) and request.launch_arguments)
+    return Scenario("observed", tuple(names), Span(request.duration_ns), stimuli, limits=limits, run=run)

@@ -70,6 +70,9 @@ def _hint(fault: Fault, trace: Trace, sources: Mapping[str, str]) -> str:
     started_as = next((start.file for start in trace.starts if start.process == fault.process), fault.process)
     text = sources.get(fault.file or started_as, "")
     lack = lacking_package(replace(trace, observations=(fault,)), [fault.process], {fault.process: text})
+    missing = fault.said(r"^RuntimeError: Required launch argument '(\w{1,80})' was not provided")
+    if missing is not None:
+        return f"give it a value: --launch-argument {missing[1]}:=VALUE"
     if lack is None:
         return hint_for(fault, trace, text)
     if lack.name in EXTRAS:

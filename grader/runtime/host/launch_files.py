@@ -31,6 +31,8 @@ DEEPEST = 20
 MOST_CHARACTERS = 200
 #: Names this similar to a package of the submission are taken for a misspelling of it.
 SIMILARITY = 0.8
+#: So similar are the parts in which a misspelling and the name differ; `orion` and `robot` are not.
+ALIKE = 0.7
 _TRUE, _FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
 
 
@@ -132,8 +134,10 @@ def meant_by(package: str, known: Iterable[str]) -> str:
     `my_turtlesim`, `turtlebot3_gazebo` and `turtlebot4_gazebo`.
     """
     for near in difflib.get_close_matches(package, list(known), n=3, cutoff=SIMILARITY):
-        one, other = ({*re.sub(r"[0-9]", "", name).split("_")} for name in (package, near))
-        if not (one <= other or other <= one):
+        one, other = (re.sub(r"[0-9]", "", name).split("_") for name in (package, near))
+        # What both share, such as `description`, makes them no more alike.
+        mine, theirs = ("_".join(part for part in a if part not in b) for a, b in ((one, other), (other, one)))
+        if mine and theirs and difflib.SequenceMatcher(None, mine, theirs).ratio() >= ALIKE:
             return near
     return ""
 

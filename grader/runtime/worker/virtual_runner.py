@@ -313,10 +313,13 @@ def unfit(students: Sequence[NodeProcess], seen: Sequence[Observation], *, full:
         return next((_with_place(UNSETTLED[s.unsettled], hung.get(s.name)) for s in unsettled), "")
     if full:
         return ""
-    hiding = [s.workload for s in students if s.workload is not None and s.workload.delay.hides]
+    hiding = [(s.name, s.workload) for s in students if s.workload is not None and s.workload.delay.hides]
     if not hiding:
         return ""
-    return OUTSIDE if any(workload.waited_ns > workload.used_ns for workload in hiding) else BUSY
+    waiting = [name for name, workload in hiding if workload.waited_ns > workload.used_ns]
+    reason = OUTSIDE if waiting else BUSY
+    # Of several programs, people have to know which one it is.
+    return reason if len(students) == 1 else f"{(waiting or [name for name, _ in hiding])[0]}: {reason}"
 
 
 def _with_place(reason: str, fault: Fault | None) -> str:

@@ -15,7 +15,7 @@ import pytest
 
 from grader.runtime.host import launch_names
 from grader.runtime.host.faults import Describer
-from grader.runtime.host.launch_files import describe
+from grader.runtime.host.launch_files import describe, meant_by
 from grader.runtime.worker.notes import left_out_sentence, left_out_words
 
 IMPORTS = """
@@ -266,6 +266,15 @@ def test_a_misspelt_package_is_told(described: Callable[..., Described], package
     """A name with a part or a number more may be that of another package."""
     nodes, _ = described(f"Node(package='{package}', executable='talker')")
     assert [node["near"] for node in nodes] == [near]
+
+
+@pytest.mark.parametrize(
+    ("package", "meant"),
+    [("orion5_description", ""), ("robto_description", "robot_description"), ("robot_descripton", "robot_description")],
+)
+def test_a_part_that_two_packages_share_makes_them_no_more_alike(package: str, meant: str) -> None:
+    """Only what differs counts."""
+    assert meant_by(package, ["robot_description", "robot"]) == meant
 
 
 #: Lines of a launch file that end its evaluation, and what is left out then.
