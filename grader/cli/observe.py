@@ -22,7 +22,7 @@ from grader.runtime.model.errors import ALL_MET
     "launch_arguments",
     metavar="NAME:=VALUE",
     multiple=True,
-    help="An argument for the launch files among the programs, as `ros2 launch` takes it; may be repeated.",
+    help="An argument for the launch files among them, as `ros2 launch` takes it; repeatable.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
 def command(  # noqa: PLR0913  one parameter an option

@@ -537,7 +537,7 @@ class GroupAction(Action):
 class TimerAction(Action):
     """Actions that are done later."""
 
-    def __init__(self, *, period: Any, actions: Iterable[Any], **more: Any) -> None:
+    def __init__(self, *, period: Any, actions: Iterable[Any], cancel_on_shutdown: Any = True, **more: Any) -> None:
         super().__init__(**more)
         self.period, self.actions = period, list(actions)
 

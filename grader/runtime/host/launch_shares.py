@@ -12,6 +12,10 @@ from collections.abc import Mapping, Sequence
 
 #: Larger files are linked, and cannot be written to. Launch files write small ones, such as worlds and parameters.
 MOST_COPIED = 256 << 10
+#: The most bytes that are copied for all packages; the rest is linked. A process may have 16 MiB in a folder.
+MOST_BYTES = 4 << 20
+#: The least that a file takes there.
+BLOCK = 4 << 10
 
 
 class Shares:
@@ -26,6 +30,7 @@ class Shares:
     def __init__(self, packages: Mapping[str, str], prefixes: Sequence[str] = (), prefix: str = "") -> None:
         self._packages, self._prefixes, self._prefix = packages, [one for one in prefixes if one], prefix
         self._made: set[str] = set()
+        self._left = MOST_BYTES
 
     def share_of(self, package: str) -> str:
         """Return the share folder of a package of the submission."""
@@ -35,7 +40,7 @@ class Shares:
         if package not in self._made:
             self._made.add(package)
             for folder in (self._packages[package], *self._installed_of(package)):
-                _lay_out(folder, place)
+                self._lay_out(folder, place)
         return place
 
     def prefix_of(self, package: str) -> str:
@@ -66,20 +71,21 @@ class Shares:
     def _installed_of(self, package: str) -> list[str]:
         return [os.path.join(prefix, "share", package) for prefix in self._prefixes]
 
-
-def _lay_out(folder: str, place: str) -> None:
-    """Copy the files of a folder to a place where they are missing; large ones are linked."""
-    for here, _, files in os.walk(folder):
-        there = os.path.normpath(os.path.join(place, os.path.relpath(here, folder)))
-        try:
-            os.makedirs(there, exist_ok=True)
-        except OSError:  # a file is where the folder should be
-            continue
-        for name in files:
-            source, target = os.path.join(here, name), os.path.join(there, name)
-            if os.path.lexists(target) or not os.path.isfile(source):
+    def _lay_out(self, folder: str, place: str) -> None:
+        """Copy the files of a folder to a place where they are missing; large ones are linked, and those beyond a limit."""
+        for here, _, files in os.walk(folder):
+            there = os.path.normpath(os.path.join(place, os.path.relpath(here, folder)))
+            try:
+                os.makedirs(there, exist_ok=True)
+            except OSError:  # a file is where the folder should be
                 continue
-            if os.path.getsize(source) > MOST_COPIED:
-                os.symlink(source, target)
-            else:
-                shutil.copyfile(source, target)
+            for name in files:
+                source, target = os.path.join(here, name), os.path.join(there, name)
+                if os.path.lexists(target) or not os.path.isfile(source):
+                    continue
+                size = max(BLOCK, os.path.getsize(source))
+                if size > min(MOST_COPIED, self._left):
+                    os.symlink(source, target)
+                else:
+                    self._left -= size
+                    shutil.copyfile(source, target)

@@ -10,7 +10,7 @@ from typing import Any, cast
 import pytest
 from places import GRADE, ROOT, SHARED, TESTS
 
-from grader.grading.app import observe as module
+from grader.grading.app import observe as observing
 from grader.grading.app.inputs import read_simulations
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.judging.summary import summarise
@@ -411,10 +411,10 @@ def test_where_the_machine_is_too_busy_for_the_wall_clock_virtual_time_is_shown(
     """With the reason, and what it may hide; nothing is judged by a summary."""
     session, scenario = Recorder(problem), Scenario("observed", ("a.py",), Span(NS_PER_S))
     held_up = replace(a_trace(), clock=ClockKind.WALL, clock_reason="a.py: it works", harness_problem="too busy")
-    found = module._in_virtual_time(cast("Any", session), scenario, cast("Any", None), held_up, quiet)
+    found = observing._in_virtual_time(cast("Any", session), scenario, cast("Any", None), held_up, quiet)
     assert session.clocks == ["virtual"]
     assert found == held_up if problem else found.clock is ClockKind.VIRTUAL
-    assert problem or found.notes == (f"{module._TOO_BUSY} clock: a.py: it works",)
+    assert problem or found.notes == (f"{observing._TOO_BUSY} clock: a.py: it works",)
 
 
 @pytest.mark.ros

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 import textwrap
 from collections.abc import Callable
@@ -376,6 +377,11 @@ def test_a_class_takes_what_that_of_ros_takes(described: Callable[..., Described
     if needed:
         with pytest.raises(TypeError, match="missing"):
             described("Kind()", before=imported)
+    every = [one.name for one in signature.parameters.values() if one.kind not in GATHERED]
+    # 1 is no name, no path and no condition, and no action.
+    with pytest.raises(Exception, match=r"\S") as raised:
+        described(f"Kind({''.join(f'{one}=1, ' for one in every)}), 5", before=imported)
+    assert not re.search("unexpected keyword|positional argument", str(raised.value))
 
 
 def test_arguments_may_be_given_by_their_names(described: Callable[..., Described]) -> None:
