@@ -72,7 +72,7 @@ class Shares:
         return [os.path.join(prefix, "share", package) for prefix in self._prefixes]
 
     def _lay_out(self, folder: str, place: str) -> None:
-        """Copy the files of a folder to a place where they are missing; large ones are linked, and those beyond a limit."""
+        """Copy the files of a folder to a place where they are missing; what is large or beyond the limit is linked."""
         for here, _, files in os.walk(folder):
             there = os.path.normpath(os.path.join(place, os.path.relpath(here, folder)))
             try:
