@@ -181,8 +181,8 @@ def stage(targets: Sequence[Target], into: Path) -> Submission:
             if root == workspace and workspace != package:
                 needed = into / "needed"
                 needed.mkdir()
-                if (submission := _stage_needed(targets, package, workspace, needed)) is not None:
-                    return replace(submission, notes=(*notes, *submission.notes))
+                if (part := _stage_needed(targets, package, workspace, needed)) is not None:
+                    return replace(part, notes=(*notes, *part.notes))
                 notes = (*notes, f"without the packages beside it: {error.message}")
             if root == folder and (len(files) > 1 or files[0] is None):
                 if len({target.folder for target in targets}) > 1:

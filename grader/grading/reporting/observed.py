@@ -80,9 +80,9 @@ def _contents(topic: TopicSummary) -> Iterator[str]:
         if values != ("",):
             some = ", ".join(f'"{shown(value, limit=TEXT_LIMIT)}"' for value in values[:SHOWN_TEXTS])
             yield f"{shown(name)}: {some}{f' and {count - SHOWN_TEXTS} more' if count > SHOWN_TEXTS else ''}"
-    for name, flags in topic.flags.items():
+    for name, seen in topic.flags.items():
         if name.removesuffix("[]") not in topic.lengths:
-            yield f"{shown(name)}: {_flags(flags)}"
+            yield f"{shown(name)}: {_flags(seen)}"
     rest = {name: limits for name, limits in topic.ranges.items() if name.removesuffix("[]") not in topic.lengths}
     for empty in (False, True):
         for name, (least, most) in topic.lengths.items():
