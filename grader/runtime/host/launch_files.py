@@ -905,7 +905,9 @@ def like_ros(kind: type, key: str) -> None:
     signature = launch_names.signature(key) if _knows_release() else None
     if signature is None:
         return
-    build: Any = kind.__init__  # type: ignore[misc]  # that of the class itself or of its base
+    build: Any = kind.__init__  # type: ignore[misc]
+    if "__init__" not in vars(kind):  # that of its base, without what that one takes
+        build = getattr(build, "__wrapped__", build)
 
     @functools.wraps(build)
     def checked(self: Any, *parts: Any, **more: Any) -> None:

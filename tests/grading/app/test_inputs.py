@@ -144,7 +144,7 @@ def test_launch_arguments_are_those_of_ros2_launch() -> None:
     [
         (["a=1"], "robot.launch.py", "--launch-argument a=1: expected NAME:=VALUE, found something else"),
         ([":=1"], "robot.launch.py", "--launch-argument :=1: expected NAME:=VALUE, found something else"),
-        (["a:=1", "a:=2"], "robot.launch.py", "--launch-argument a:=2: expected each argument once, found it again"),
+        (["a:=1", "a:=2"], "robot.launch.py", "--launch-argument a:=2: expected each argument once, found a again"),
         (["a:=1"], "a.py", "--launch-argument: expected a launch file among the programs, found none"),
     ],
 )
