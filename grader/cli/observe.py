@@ -17,6 +17,13 @@ from grader.runtime.model.errors import ALL_MET
 @click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
 @run_options(OBSERVE)
 @inputs_options
+@click.option(
+    "--launch-argument",
+    "launch_arguments",
+    metavar="NAME:=VALUE",
+    multiple=True,
+    help="An argument for the launch files among them, as `ros2 launch` takes it; repeatable.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
 def command(  # noqa: PLR0913  one parameter an option
     *,
@@ -25,6 +32,7 @@ def command(  # noqa: PLR0913  one parameter an option
     options: GradingOptions,
     sent: tuple[str, ...],
     simulations: tuple[str, ...],
+    launch_arguments: tuple[str, ...],
     as_json: bool,
 ) -> int:
     """Run nodes together, without a rubric, and say what they do.
@@ -34,7 +42,7 @@ def command(  # noqa: PLR0913  one parameter an option
     Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
     """
     from grader.grading.app import observe
-    from grader.grading.app.inputs import read_sent, read_simulations
+    from grader.grading.app.inputs import read_launch_arguments, read_sent, read_simulations
     from grader.grading.reporting.observed import render_summary, summary_to_json
 
     request = observe.ObserveRequest(
@@ -46,6 +54,7 @@ def command(  # noqa: PLR0913  one parameter an option
         options.interfaces,
         read_simulations(simulations),
         read_sent(sent),
+        read_launch_arguments(launch_arguments, files),
     )
     with shown_progress(wanted=True) as progress:
         summary = observe.observe(request, progress)

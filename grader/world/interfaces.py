@@ -15,7 +15,7 @@ from types import ModuleType
 
 from grader.runtime.interface_packages import InterfacePackage, is_brought, modules_named, unbuilt
 from grader.runtime.model.errors import GraderError
-from grader.runtime.programs.executables import package_of, workspace_of
+from grader.runtime.programs.executables import package_of, project_folders, workspace_of
 
 #: The largest file that is searched for the names of packages.
 MOST_BYTES = 1 << 20
@@ -27,7 +27,7 @@ def workspace_around(folder: Path) -> Path | None:
     if (package / "package.xml").is_file():
         return workspace_of(package)
     source = folder / "src"
-    return source if any(source.glob("*/package.xml")) or any(source.glob("*/*/package.xml")) else None
+    return source if project_folders(source) else None
 
 
 @cache

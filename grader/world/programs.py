@@ -17,7 +17,16 @@ from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.projects import Project
 from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.trace import Fault, LogRecord, OutputLine
-from grader.runtime.programs.executables import Executable, executables, find_executables, package_of, workspace_of
+from grader.runtime.programs.executables import (
+    IGNORED,
+    Executable,
+    executables,
+    find_executables,
+    ignored_packages,
+    package_of,
+    project_folders,
+    workspace_of,
+)
 from grader.world.errors import NoMessage
 
 Value = TypeVar("Value")
@@ -86,12 +95,17 @@ def _of_function(function: Callable[..., Any]) -> Found:
 
 def _of_package(package: str, name: str, near: Sequence[Path]) -> Found:
     known: list[str] = []
+    ignored: dict[str, Path] = {}
     for root, projects in dict.fromkeys((*map(_surroundings, near), *map(_below, near))):
         for one in find_executables(root, projects, package, name):
             if one.file is not None:
                 return Found(one.words, root, one.file, one.name if one.target else "", projects)
             raise SubmissionError(f"{package}/{name}: {one.problem}", "write the file, or correct the name")
         known += [one.words for one in executables(root, projects)]
+        ignored |= ignored_packages(root) if projects else {}
+    if package in ignored:
+        text = f"{package}/{name}: expected a package that colcon builds, found {IGNORED} in {ignored[package].name}"
+        raise SubmissionError(text, "remove that file")
     close = nearest(f"{package}/{name}", known)
     hint = (
         f"did you mean {close}?" if close else f"there are {listed(known)}" if known else "no package is near the test"
@@ -110,9 +124,9 @@ def _surroundings(folder: Path) -> tuple[Path, tuple[Project, ...]]:
 
 def _below(folder: Path) -> tuple[Path, tuple[Project, ...]]:
     """Return a folder that is in no package, such as that of a workspace, with the packages below it."""
-    levels = ("*", "*/*", "src/*/*")
     in_package = (package_of(folder) / "package.xml").is_file()
-    is_workspace = not in_package and any(any(folder.glob(f"{level}/package.xml")) for level in levels)
+    near = any(any(folder.glob(f"{level}/package.xml")) for level in ("*", "*/*"))
+    is_workspace = not in_package and (near or bool(project_folders(folder / "src")))
     return folder, _projects(folder) if is_workspace else ()
 
 
@@ -128,7 +142,10 @@ def find_launch_file(wanted: str | os.PathLike[str], near: Sequence[Path]) -> tu
     """
     found = find_program(wanted, near)
     if not is_launch_file(found.name):
-        raise SubmissionError(f"{found.name}: expected a launch file", "its name ends with .launch.py, .xml or .yaml")
+        raise SubmissionError(
+            f"{found.name}: expected a launch file",
+            "only those in Python are understood, whose names end with launch.py",
+        )
     known = [(f"{one.file} {one.name}" if one.target else one.file, one.words) for one in _runnable(found)]
     loose = () if found.projects else ((path.name, path.name) for path in sorted(found.root.glob("*.py")))
     return found, (*((file, name) for file, name in known if file), *loose)

@@ -17,7 +17,7 @@ from grader.grading.rubrics.loader import RubricMistakes, read_rubric
 from grader.grading.rubrics.yaml_tree import YamlSyntaxError, read_yaml
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError, RubricError
-from grader.runtime.model.scenario import Stimulus
+from grader.runtime.model.scenario import Stimulus, is_launch_file
 from grader.runtime.model.wording import listed, shown
 from grader.runtime.simulation import SIMULATIONS
 
@@ -53,6 +53,27 @@ def read_sent(sent: Sequence[str]) -> SentMessages:
             raise GraderError(f"--send {shown(text)}: expected TOPIC={{field: value}}, found something else")
         given.setdefault(topic, []).append(data)
     return given
+
+
+def read_launch_arguments(texts: Sequence[str], programs: Sequence[Path]) -> tuple[tuple[str, str], ...]:
+    """Parse launch arguments, `NAME:=VALUE`.
+
+    Raises:
+        GraderError: One is written in another way or given twice, or no program is a launch file.
+    """
+    given: dict[str, str] = {}
+    for text in texts:
+        name, written, value = text.partition(":=")
+        if not (name and written):
+            raise GraderError(f"--launch-argument {shown(text)}: expected NAME:=VALUE, found something else")
+        if name in given:
+            raise GraderError(
+                f"--launch-argument {shown(text)}: expected each argument once, found {shown(name)} again"
+            )
+        given[name] = value
+    if given and not any(is_launch_file(program.name) for program in programs):
+        raise GraderError("--launch-argument: expected a launch file among the programs, found none")
+    return tuple(given.items())
 
 
 def read_simulations(texts: Sequence[str]) -> tuple[NamedSimulation, ...]:

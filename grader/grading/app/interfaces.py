@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from grader.grading.model.exercise import Exercise
 from grader.runtime.interface_packages import FOREVER_S, Provided, built_from, provide, type_folders
+from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.submission import Definition, Submission
 from grader.runtime.model.trace import Delivery, Message, Trace
 
@@ -51,10 +52,19 @@ def provided_for(
     submission: Submission,
     budget_s: float = FOREVER_S,
 ) -> Provided:
-    """Build what the runs of exercises need; see `provide`. The rubrics name types as well as the programs do."""
-    text = repr(exercises).encode("utf-8", "replace")
+    """Build what the runs of exercises need; see `provide`. Rubrics and simulations name types as programs do."""
+    scenarios = [scenario for exercise in exercises for scenario in exercise.scenarios]
+    text = repr(exercises).encode("utf-8", "replace") + types_in(scenarios)
     rubric = rubric_folders(exercises)
     return provide(session, submission, course=course, rubric=rubric, text=text, budget_s=budget_s)
+
+
+def types_in(scenarios: Iterable[Scenario]) -> bytes:
+    """Return a text with the types that the simulations of scenarios use."""
+    from grader.grading.rubrics.simulations import offered_by  # noqa: PLC0415 - as above
+
+    stimuli = (stimulus for scenario in scenarios for stimulus in scenario.stimuli)
+    return repr(sorted({name for one in offered_by(stimuli) for name in one.types})).encode()
 
 
 def definitions(traces: Iterable[Trace], provided: Provided) -> dict[str, Definition]:

@@ -9,22 +9,24 @@ from pathlib import Path
 from grader.grading.app.bags import observed, recordings_of
 from grader.grading.app.grade import Progress
 from grader.grading.app.inputs import NamedSimulation, SentMessages, messages, simulated
+from grader.grading.app.interfaces import types_in
 from grader.grading.app.programs import find_targets, stage
 from grader.grading.app.seeds import PRACTICE
 from grader.grading.judging.summary import summarise
 from grader.grading.judging.values import student_endpoints
 from grader.grading.model.report import Summary
+from grader.grading.rubrics.simulations import offered_by
 from grader.grading.submissions.sources import read_files
 from grader.runtime.interface_packages import provide
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.limits import MOST_LAUNCHED, Limits
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.scenario import Scenario, Span, is_launch_file
+from grader.runtime.model.scenario import RunOptions, Scenario, Span, is_launch_file
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import ClockKind, Trace
 from grader.runtime.plan import plan_scenario
-from grader.runtime.session import Job, open_session, planned_clock
+from grader.runtime.session import AUTO, VIRTUAL, Job, RecordingSession, open_session, planned_clock
 from grader.runtime.stimuli import RecordedStream
 
 #: When a given recording starts playing; before that the nodes receive nothing of it.
@@ -44,6 +46,7 @@ class ObserveRequest:
     interfaces: tuple[Path, ...] = ()  # folders with interface packages
     simulations: tuple[NamedSimulation, ...] = ()  # participants that react to what the programs publish
     sent: SentMessages = field(default_factory=dict)  # messages to send to them
+    launch_arguments: tuple[tuple[str, str], ...] = ()  # name and value, for the launch files among the programs
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +66,13 @@ def observe(request: ObserveRequest, progress: Progress) -> Summary:
         GraderError: Nobody subscribes to a topic of a message to send, or it does not fit the type.
     """
     watched = watch(request, progress)
+    scenario = undisturbed(request, watched.processes)
     if request.sent:
         types = {end.topic: end.type for end in student_endpoints(watched.trace, "subscription")}
         sent = messages(request.sent, types, request.duration_ns / NS_PER_S, request.interfaces)
-        scenario = undisturbed(request, watched.processes)
         watched = watch(request, progress, replace(scenario, stimuli=(*scenario.stimuli, *sent)))
-    return summarise(watched.trace, watched.processes, watched.isolation, watched.sources)
+    served = [service for one in offered_by(scenario.stimuli) for service in one.serves]
+    return summarise(watched.trace, watched.processes, watched.isolation, watched.sources, served)
 
 
 def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None = None) -> Watched:
@@ -87,18 +91,36 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         submission = stage(targets, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, recordings=recordings, clock=clock)
-        provided = provide(session, submission, course=request.interfaces)
+        provided = provide(session, submission, course=request.interfaces, text=types_in([scenario]))
         installed = session.folder / "installed"
         prefixes, _ = session.install_shares(submission.root, submission.projects, installed)
         plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)
-        trace = session.record(
-            {scenario.id: Job("observing", plan, programs=submission.programs)}, request.clock, progress
-        )[scenario.id]
+        job = Job("observing", plan, programs=submission.programs)
+        trace = session.record({scenario.id: job}, request.clock, progress)[scenario.id]
+        if trace.harness_problem and trace.clock is ClockKind.WALL and request.clock == AUTO:
+            trace = _in_virtual_time(session, scenario, job, trace, progress)
         sources = _sources(trace, submission)
     if trace.harness_problem:
         raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")
-    trace = replace(trace, notes=(*known.notes, *trace.notes))
+    trace = replace(trace, notes=(*known.notes, *submission.notes, *trace.notes))
     return Watched(trace, tuple(names), session.isolation.name, sources)
+
+
+#: What is true of the summary of programs that virtual time does not suit, where the machine is too busy for the other
+#: clock: nothing is judged by it.
+_TOO_BUSY = "recorded in virtual time, which hides how slow a program is, because this machine is too busy for the wall"
+
+
+def _in_virtual_time(
+    session: RecordingSession, scenario: Scenario, job: Job, held_up: Trace, progress: Progress
+) -> Trace:
+    """Return a whole recording in virtual time where there is none on the wall clock, with the reason; or that one."""
+    again = replace(job, title="observing in virtual time")
+    whole = session.record({scenario.id: again}, VIRTUAL, progress)[scenario.id]
+    if whole.harness_problem:
+        return held_up
+    why = f": {held_up.clock_reason}" if held_up.clock_reason else ""
+    return replace(whole, notes=(f"{_TOO_BUSY} clock{why}", *whole.notes))
 
 
 def _sources(trace: Trace, submission: Submission) -> dict[str, str]:
@@ -115,4 +137,6 @@ def undisturbed(request: ObserveRequest, names: Sequence[str]) -> Scenario:
     stimuli = (*simulated(request.simulations, request.interfaces), *played)
     launched = sum(map(is_launch_file, names)) * MOST_LAUNCHED
     limits = Limits(participants=Limits().participants + len(names) + launched)
-    return Scenario("observed", tuple(names), Span(request.duration_ns), stimuli, limits=limits)
+    options = RunOptions(launch_arguments=request.launch_arguments)
+    run = tuple((name, options) for name in names if is_launch_file(name) and request.launch_arguments)
+    return Scenario("observed", tuple(names), Span(request.duration_ns), stimuli, limits=limits, run=run)

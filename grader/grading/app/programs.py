@@ -3,22 +3,36 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from grader.grading.submissions.collected import Collected
 from grader.grading.submissions.projects import read_projects
-from grader.grading.submissions.submission import collect_submission, stage_collected, stage_submission
+from grader.grading.submissions.submission import collect_submission, every_file, stage_collected, stage_submission
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import SubmissionError
+from grader.runtime.model.limits import MAX_FILES, MAX_TOTAL_BYTES
 from grader.runtime.model.projects import Project
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.wording import first_of, listed
-from grader.runtime.programs.executables import executables, find_executables, package_of, workspace_of
+from grader.runtime.programs.executables import (
+    IGNORED,
+    executables,
+    find_executables,
+    ignored_packages,
+    is_package,
+    name_of,
+    needed_packages,
+    package_of,
+    words_of,
+    workspace_of,
+)
 
 #: What can be named.
 _WHAT = "name .py files, launch files, packages, workspaces, FOLDER/EXECUTABLE or FOLDER/PACKAGE/EXECUTABLE"
+#: What launch files that are not in Python are written in, by the ending of their names.
+_LAUNCH_LANGUAGES = {".xml": "XML", ".launch": "XML", ".yaml": "YAML", ".yml": "YAML"}
 #: The most executables that a message lists.
 _SHOWN = 12
 #: The most programs that are observed together: each is a process with a sandbox, 70 MB and a DDS participant.
@@ -79,6 +93,9 @@ def _with_folders(targets: list[Target]) -> tuple[Target, ...]:
 def _of_path(path: Path) -> Targets:
     if path.is_file() and path.suffix == ".py":
         return Targets((Target(path.name, path.resolve().parent, path),))
+    if path.is_file() and path.suffix in _LAUNCH_LANGUAGES and "launch" in path.name:
+        text = f"{path}: expected a launch file in Python, found one in {_LAUNCH_LANGUAGES[path.suffix]}"
+        raise SubmissionError(text, "only launch files in Python are understood: name the files of its nodes")
     if path.is_dir():
         return _of_folder(path)
     if not path.exists():
@@ -101,7 +118,12 @@ def _of_folder(path: Path) -> Targets:
     found = tuple(Target(one.words, root) for one in known if one.file is not None)
     if not found:
         text = f"{path}: expected a package or workspace with executables, found none"
-        raise SubmissionError(text, "; ".join([*notes, _how_to_have_some(projects)]))
+        ignored = [
+            f"{name} is left out, as colcon does: there is a file {folder.relative_to(root) / IGNORED}"
+            for name, folder in ignored_packages(root).items()
+        ]
+        ignored += [f"colcon leaves this folder out: there is a file {IGNORED}"] if (root / IGNORED).is_file() else []
+        raise SubmissionError(text, "; ".join([*ignored, *notes, *([] if ignored else [_how_to_have_some(projects)])]))
     return Targets(found, (*notes, *problems))
 
 
@@ -138,11 +160,16 @@ def _of_name(path: Path, folder: Path, package: str) -> Targets | None:
 
 
 def stage(targets: Sequence[Target], into: Path) -> Submission:
-    """Stage what the programs may import: their workspace or package, or else their common folder; one may be alone."""
+    """Stage what the programs may import: their workspace or package, or else their common folder; one may be alone.
+
+    Of a workspace that is too large, only the packages are taken that the programs need. The notes say what is missing.
+    """
     names, files = [target.name for target in targets], [target.file for target in targets]
     folder = Path(os.path.commonpath([target.folder for target in targets]))
     package = package_of(folder)
-    for place, root in enumerate(dict.fromkeys((workspace_of(package), package, folder))):
+    workspace = workspace_of(package)
+    notes: tuple[str, ...] = tuple(_ignored(package, workspace)) if is_package(package) else ()
+    for place, root in enumerate(dict.fromkeys((workspace, package, folder))):
         staged = into / f"submission_{place}"
         staged.mkdir()
         meant = {
@@ -150,19 +177,63 @@ def stage(targets: Sequence[Target], into: Path) -> Submission:
         }
         try:
             submission = stage_submission(str(root), names, staged, meant)
-        except SubmissionError:
+        except SubmissionError as error:
+            if root == workspace and workspace != package:
+                needed = into / "needed"
+                needed.mkdir()
+                if (part := _stage_needed(targets, package, workspace, needed)) is not None:
+                    return replace(part, notes=(*notes, *part.notes))
+                notes = (*notes, f"without the packages beside it: {error.message}")
             if root == folder and (len(files) > 1 or files[0] is None):
                 if len({target.folder for target in targets}) > 1:
                     break
                 raise
             continue
         if all(submission.files[name].found == path for name, path in meant.items()):  # a copy leaves some folders out
-            return submission
+            return replace(submission, notes=notes)
     alone = into / "alone"
     alone.mkdir()
     if len(targets) == 1:
-        return stage_submission(str(files[0]), names, alone)
-    return _stage_apart(targets, alone)
+        return replace(stage_submission(str(files[0]), names, alone), notes=notes)
+    return replace(_stage_apart(targets, alone), notes=notes)
+
+
+def _ignored(package: Path, workspace: Path) -> Iterator[str]:
+    """Yield a sentence for each package that one names, and that colcon would not build."""
+    ignored = ignored_packages(workspace)
+    named = words_of(package) if ignored else frozenset()
+    for name, folder in ignored.items():
+        if name in named and folder not in (package, *package.parents):
+            where = (folder / IGNORED).relative_to(workspace).as_posix()
+            yield f"the package {name} was left out, as colcon does: there is a file {where}"
+
+
+def _stage_needed(targets: Sequence[Target], package: Path, workspace: Path, into: Path) -> Submission | None:
+    """Stage a package and those that it needs of a workspace; None if they are too large as well."""
+    files: list[tuple[str, bytes]] = []
+    packages = needed_packages(package, workspace)
+    try:
+        for folder in packages:
+            inside = folder.relative_to(workspace).as_posix()
+            # Packages in one another are read with the outer one.
+            if not any(other in folder.parents for other in packages):
+                files += [(f"{inside}/{name}", text) for name, text in every_file(str(folder), into).files]
+        meant = {
+            target.name: target.file.resolve().relative_to(workspace).as_posix()
+            for target in targets
+            if target.file is not None
+        }
+        if len(files) > MAX_FILES or sum(len(text) for _, text in files) > MAX_TOTAL_BYTES:
+            return None
+        submission = stage_collected(
+            Collected(tuple(files)), str(workspace), [one.name for one in targets], into, meant
+        )
+    except SubmissionError:
+        return None
+    if any(submission.files[name].found != path for name, path in meant.items()):
+        return None
+    taken = ", ".join(name_of(folder) for folder in packages)
+    return replace(submission, notes=(f"the workspace is too large to be copied: taken are the packages {taken}",))
 
 
 def _stage_apart(targets: Sequence[Target], into: Path) -> Submission:

@@ -40,6 +40,8 @@ ROS_PACKAGES = frozenset(
 EXTRAS = {"cv2": "opencv", "matplotlib": "plots"}
 #: What packages have that the grader lends where ROS brings none of its own, and the lent ones have not.
 NOT_LENT: Mapping[str, tuple[str, ...]] = {
+    # Launch files have all modules of these; a program that imports one lacks the package itself.
+    **dict.fromkeys(("launch", "launch_ros", "launch_xml", "launch_yaml"), ()),
     "cv_bridge": ("boost", "cv_bridge_boost"),
     "message_filters": ("InputAligner",),
     "sensor_msgs_py": ("numpy_compat",),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, field, replace
 from fractions import Fraction
 
@@ -177,6 +177,36 @@ def same_names(trace: Trace) -> tuple[str, ...]:
             owners.setdefault(end.node, set()).add(end.participant)
         found.update(dict.fromkeys(name for name, processes in owners.items() if len(processes) > 1))
     return tuple(same_node_name(quote(name)) for name in found)
+
+
+#: Where the name of an action becomes that of its services, and the one of them that a client calls first.
+_ACTION, _GOAL = "/_action/", "/_action/send_goal"
+#: Prefixes of the types of services that every node has, which no graph lists.
+_OF_EVERY_NODE = ("rcl_interfaces/", "type_description_interfaces/")
+
+
+def unserved(trace: Trace, served: Iterable[str] = ()) -> tuple[str, ...]:
+    """Return a note for each service and action of which a node has a client, and that nobody ever offers.
+
+    Args:
+        trace: The recording.
+        served: The services that the grader offers.
+    """
+    graphs = trace.graphs()
+    ends = dict.fromkeys(end for graph in graphs for end in graph.services)
+    offered = {end.service for end in ends if end.kind == "service"} | {*served}
+    nodes = {node for graph in graphs for node in graph.nodes}
+    notes: dict[str, None] = {}
+    for end in ends:
+        of_node = end.type.startswith(_OF_EVERY_NODE) and end.service.rpartition("/")[0] in nodes
+        if end.kind != "client" or end.service in offered or of_node:
+            continue
+        if end.service.endswith(_GOAL):
+            name = end.service.removesuffix(_GOAL)
+            notes[f"{quote(end.node)} waits for the action {quote(name)}, which nobody offers"] = None
+        elif _ACTION not in end.service:
+            notes[f"{quote(end.node)} waits for the service {quote(end.service)}, which nobody offers"] = None
+    return tuple(notes)
 
 
 def _faults(recorded: list[tuple[str, Trace]]) -> tuple[ReportedFault, ...]:

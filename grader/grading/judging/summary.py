@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TypeVar
 
 from grader.grading.judging.diagnosis import hint_for, placed_in
 from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package
-from grader.grading.judging.judge_run import same_names, started, unheard
+from grader.grading.judging.judge_run import same_names, started, unheard, unserved
 from grader.grading.judging.values import as_number
 from grader.grading.model.report import Pace, Summary, TopicSummary
 from grader.runtime.model.extras import pip_install
@@ -25,7 +25,11 @@ MOST_TEXTS, MOST_ELEMENTS = 100, 2_000
 
 
 def summarise(
-    trace: Trace, processes: Sequence[str], isolation: str, sources: Mapping[str, str] = MappingProxyType({})
+    trace: Trace,
+    processes: Sequence[str],
+    isolation: str,
+    sources: Mapping[str, str] = MappingProxyType({}),
+    served: Iterable[str] = (),
 ) -> Summary:
     """Return a summary of what the nodes of a trace did.
 
@@ -34,9 +38,11 @@ def summarise(
         processes: The names of the programs.
         isolation: The sandbox tier.
         sources: The text of files by path, for hints: those that the programs are, and those that faults name.
+        served: The services that simulations offer.
     """
     graphs = trace.graphs()
-    notes = (*started(trace), *same_names(trace), *unheard(trace), *trace.notes, *(one.sentence for one in trace.newer))
+    seen = (*started(trace), *same_names(trace), *unheard(trace), *unserved(trace, served))
+    notes = (*seen, *trace.notes, *(one.sentence for one in trace.newer))
     names = {e.topic for g in graphs for e in g.endpoints}
     return Summary(
         processes=tuple(processes),
@@ -65,6 +71,9 @@ def _hint(fault: Fault, trace: Trace, sources: Mapping[str, str]) -> str:
     started_as = next((start.file for start in trace.starts if start.process == fault.process), fault.process)
     text = sources.get(fault.file or started_as, "")
     lack = lacking_package(replace(trace, observations=(fault,)), [fault.process], {fault.process: text})
+    missing = fault.said(r"^RuntimeError: Required launch argument '(\w{1,80})' was not provided")
+    if missing is not None:
+        return f"give it a value: --launch-argument {missing[1]}:=VALUE"
     if lack is None:
         return hint_for(fault, trace, text)
     if lack.name in EXTRAS:
@@ -92,6 +101,7 @@ def _topic(trace: Trace, name: str) -> TopicSummary:
         ranges=contents.ranges,
         texts={path: (tuple(itertools.islice(seen, MOST_TEXTS)), len(seen)) for path, seen in contents.texts.items()},
         lengths=contents.lengths,
+        flags={path: tuple(seen) for path, seen in contents.flags.items()},
     )
 
 
@@ -111,6 +121,7 @@ class _Contents:
         self.ranges: dict[str, tuple[float, float]] = {}
         self.texts: dict[str, dict[str, None]] = {}
         self.lengths: dict[str, tuple[int, int]] = {}
+        self.flags: dict[str, dict[bool, None]] = {}
 
     def add(self, value: Mapping[str, object], prefix: str = "") -> None:
         """Take the fields of one message, or of a part of it."""
@@ -124,6 +135,8 @@ class _Contents:
             self.lengths[path] = _wider(self.lengths.get(path), len(inner))
             for element in inner[:MOST_ELEMENTS]:
                 self._add(f"{path}[]", element)
+        elif isinstance(inner, bool):
+            self.flags.setdefault(path, {})[inner] = None
         elif isinstance(inner, str):
             self.texts.setdefault(path, {})[inner] = None
         elif (number := as_number(inner)) is not None and math.isfinite(number):

@@ -205,6 +205,8 @@ class TopicSummary:
     texts: Mapping[str, tuple[tuple[str, ...], int]] = field(default_factory=dict)
     # Array, dotted -> least and greatest number of elements
     lengths: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    # Boolean field, dotted -> its different values in order of appearance
+    flags: Mapping[str, tuple[bool, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

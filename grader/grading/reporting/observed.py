@@ -75,19 +75,27 @@ def _topic(topic: TopicSummary) -> Iterator[str]:
 
 
 def _contents(topic: TopicSummary) -> Iterator[str]:
-    """Yield a line for each field: texts first, then arrays and numbers, and last what is empty or always 0."""
+    """Yield a line for each field: texts and booleans, then arrays and numbers, and last what is empty or always 0."""
     for name, (values, count) in topic.texts.items():
         if values != ("",):
             some = ", ".join(f'"{shown(value, limit=TEXT_LIMIT)}"' for value in values[:SHOWN_TEXTS])
             yield f"{shown(name)}: {some}{f' and {count - SHOWN_TEXTS} more' if count > SHOWN_TEXTS else ''}"
+    for name, seen in topic.flags.items():
+        if name.removesuffix("[]") not in topic.lengths:
+            yield f"{shown(name)}: {_flags(seen)}"
     rest = {name: limits for name, limits in topic.ranges.items() if name.removesuffix("[]") not in topic.lengths}
     for empty in (False, True):
         for name, (least, most) in topic.lengths.items():
             if (most == 0) is empty:
-                limits = topic.ranges.get(f"{name}[]")
+                limits, flags = topic.ranges.get(f"{name}[]"), topic.flags.get(f"{name}[]")
                 size = counted(most, "element") if least == most else f"{least} to {counted(most, 'element')}"
-                yield f"{shown(name)}: {size}{f', {_range(*limits)}' if limits else ''}"
+                values = _range(*limits) if limits else _flags(flags) if flags else ""
+                yield f"{shown(name)}: {size}{f', {values}' if values else ''}"
         yield from (f"{shown(n)}: {_range(*limits)}" for n, limits in rest.items() if (limits == (0, 0)) is empty)
+
+
+def _flags(values: Sequence[bool]) -> str:
+    return ", ".join(str(value).lower() for value in values)
 
 
 def _traffic(topic: TopicSummary) -> str:
@@ -211,6 +219,7 @@ def _topic_json(topic: TopicSummary) -> Mapping[str, object]:
         "ranges": topic.ranges,
         "texts": {name: {"values": values, "different": count} for name, (values, count) in topic.texts.items()},
         "lengths": topic.lengths,
+        "flags": topic.flags,
     }
 
 

@@ -33,6 +33,11 @@ class Offered:
     serves: Mapping[str, str]
     outputs: tuple[Output, ...]
 
+    @property
+    def types(self) -> set[str]:
+        """The types of all of it."""
+        return {*self.publishes.values(), *self.hears.values(), *self.serves.values()}
+
 
 def simulated_in(rubric: RubricShape) -> Iterator[tuple[TreePath, Simulated]]:
     """Yield the simulations of a rubric, each with the place of its name."""
@@ -85,10 +90,17 @@ def _is_output(output: object, topics: Mapping[str, str]) -> bool:
 def published_by(stimulus: Stimulus) -> Iterable[str]:
     """Return the topics that a stimulus publishes on; none for a simulation that fails, which another rule tells."""
     if isinstance(stimulus, Simulated):
-        with suppress(HarnessError):
-            return offered(stimulus).publishes
+        return [topic for one in offered_by([stimulus]) for topic in one.publishes]
     topic = getattr(stimulus, "topic", "")
     return [topic] if topic else []
+
+
+def offered_by(stimuli: Iterable[Stimulus]) -> Iterator[Offered]:
+    """Yield what the simulations among stimuli offer; nothing of one that fails, which another rule tells."""
+    for stimulus in stimuli:
+        if isinstance(stimulus, Simulated):
+            with suppress(HarnessError):
+                yield offered(stimulus)
 
 
 def simulation_mistakes(rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:

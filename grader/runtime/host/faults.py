@@ -38,7 +38,11 @@ class Describer:
     def set_root(self, root: str) -> None:
         """Use another folder of a submission."""
         self._root = os.path.join(os.path.realpath(root), "")
-        self._folders = (os.path.join(root, ""), self._root)
+        self._folders: tuple[str, ...] = (os.path.join(root, ""), self._root)
+
+    def hide(self, prefix: str) -> None:
+        """Name files below the share folders of a prefix as those of a submission: by package and path."""
+        self._folders = (*self._folders, os.path.join(prefix, "share", ""))
 
     def exception(self, error: BaseException) -> dict[str, Any]:
         """Convert an uncaught exception to a fault; of a chain, the first one that the program did not expect."""
@@ -159,7 +163,9 @@ GRADERS = "grader"
 _HOST = os.path.join(os.path.dirname(os.path.abspath(__file__)), "")
 #: Modules that find and run the student's file, or do the work of a module of the standard library: what a function
 #: raises that they call is an answer to the student's code.
-_FOR_STUDENTS = frozenset({"entry", "launch_files", "machine", "outside", "packages", "quick_imports", "setup_files"})
+_FOR_STUDENTS = frozenset(
+    {"entry", "launch_files", "launch_shares", "machine", "outside", "packages", "quick_imports", "setup_files"}
+)
 _FOR_STUDENTS |= {"shadows", "threads", "times"}
 #: What a limit or the end of the process raises, wherever it is at that moment.
 _ANYWHERE = (MemoryError, RecursionError, OSError)

@@ -1,22 +1,29 @@
 """Evaluates a Python launch file: modules in place of `launch` and `launch_ros` describe nodes and start nothing.
 
 The names and their meaning are those of `launch` and `launch_ros` of ROS 2 Jazzy, which no wheel holds and which start
-processes themselves. What is not described here is left out, with its name and line.
+processes themselves. What ROS has and is not described here is left out, with its name and line; what ROS does not have
+either raises what it raises there.
 """
 
 from __future__ import annotations
 
 import difflib
+import errno
+import functools
 import json
 import logging
 import math
 import os
 import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib.machinery import ModuleSpec
 from types import FrameType, ModuleType
 from typing import Any
+
+from . import launch_names
+from .launch_shares import Shares
 
 #: The deepest nesting of included launch files.
 DEEPEST = 20
@@ -24,11 +31,15 @@ DEEPEST = 20
 MOST_CHARACTERS = 200
 #: Names this similar to a package of the submission are taken for a misspelling of it.
 SIMILARITY = 0.8
+#: So similar are the parts in which a misspelling and the name differ; `orion` and `robot` are not.
+ALIKE = 0.7
 _TRUE, _FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
 
 
-class LeftOutError(Exception):
+class LeftOutError(BaseException):
     """Something that only ROS itself can do; the action that needs it is left out.
+
+    Not an Exception: what a launch file does after one would not be what it does in ROS.
 
     Args:
         code: What it is; the grader has the words for each code.
@@ -39,15 +50,21 @@ class LeftOutError(Exception):
     def __init__(self, code: str, name: str = "", text: str = "") -> None:
         super().__init__(code)
         self.told = {"code": code, "name": name[:MOST_CHARACTERS], "text": text[:MOST_CHARACTERS]}
+        self.place = _written_at()
 
 
 class Context:
     """What a launch file is evaluated with: its arguments, namespaces, and what it sets for all nodes."""
 
     def __init__(
-        self, packages: Mapping[str, str], arguments: Mapping[str, str], most_nodes: int, most_left_out: int
+        self,
+        packages: Mapping[str, str],
+        shares: Shares,
+        arguments: Mapping[str, str],
+        most_nodes: int,
+        most_left_out: int,
     ) -> None:
-        self.most_nodes, self.most_left_out = most_nodes, most_left_out
+        self.most_nodes, self.most_left_out, self.shares = most_nodes, most_left_out, shares
         self.launch_configurations = dict(arguments)
         self.environment = dict(os.environ)
         self.packages = packages
@@ -74,19 +91,40 @@ class Context:
         self.launch_configurations, self.namespaces, self.remappings, self.parameters, self.parameter_files = kept
 
     def leave_out(self, file: str, line: int, error: LeftOutError) -> None:
-        """Note something that is not evaluated."""
+        """Note something that is not evaluated; what is left out again at the same place is counted."""
+        told = {"file": file, "line": line, **error.told}
+        # All nodes that are too many make one note, wherever they were written.
+        same = ("code",) if error.told["code"] == "nodes" else tuple(told)
+        for one in self.left_out:
+            if all(one[key] == told[key] for key in same):
+                one["count"] += 1
+                return
         if len(self.left_out) < self.most_left_out:
-            self.left_out.append({"file": file, "line": line, **error.told})
+            self.left_out.append({**told, "count": 1})
 
-    def share_of(self, package: str) -> str:
-        """Return the folder of a package of the submission, which holds what its setup.py installs to share."""
+    def leave_out_here(self, error: LeftOutError) -> None:
+        """Note something that is not evaluated, where the launch file is now."""
+        self.leave_out(*_written_at(), error)
+
+    def know(self, package: object) -> bool:
+        """Return whether the submission has a package; raises what ROS does for a name that is a misspelling of one."""
         if not isinstance(package, str):
             raise TypeError(f"expected the name of a package, found {type(package).__name__}")
-        if package in self.packages:
-            return self.packages[package]
-        if meant_by(package, self.packages):
+        if package not in self.packages and meant_by(package, self.packages):
             raise PackageNotFoundError(f"package '{package}' not found, searching: {sorted(self.packages)}")
-        raise LeftOutError("package", package)
+        return package in self.packages
+
+    def share_of(self, package: str) -> str:
+        """Return the share folder of a package of the submission."""
+        if not self.know(package):
+            raise LeftOutError("package", package)
+        return self.shares.share_of(package)
+
+    def prefix_of(self, package: str) -> str:
+        """Return the prefix of a package of the submission."""
+        if not self.know(package):
+            raise LeftOutError("package", package)
+        return self.shares.prefix_of(package)
 
 
 def meant_by(package: str, known: Iterable[str]) -> str:
@@ -96,31 +134,33 @@ def meant_by(package: str, known: Iterable[str]) -> str:
     `my_turtlesim`, `turtlebot3_gazebo` and `turtlebot4_gazebo`.
     """
     for near in difflib.get_close_matches(package, list(known), n=3, cutoff=SIMILARITY):
-        one, other = ({*re.sub(r"[0-9]", "", name).split("_")} for name in (package, near))
-        if not (one <= other or other <= one):
+        one, other = (re.sub(r"[0-9]", "", name).split("_") for name in (package, near))
+        # What both share, such as `description`, makes them no more alike.
+        mine, theirs = ("_".join(part for part in a if part not in b) for a, b in ((one, other), (other, one)))
+        if mine and theirs and difflib.SequenceMatcher(None, mine, theirs).ratio() >= ALIKE:
             return near
     return ""
-
-
-def installed(path: str, context: Context) -> str:
-    """Return where a file of a package's folder is once it is installed, if it is not there before."""
-    if os.path.exists(path):
-        return path
-    for name, folder in context.packages.items():
-        if path.startswith(os.path.join(folder, "")):
-            for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
-                there = os.path.join(prefix, "share", name, os.path.relpath(path, folder))
-                if prefix and os.path.exists(there):
-                    return there
-    return path
 
 
 class PackageNotFoundError(KeyError):
     """A package that is neither in the submission nor installed."""
 
+    def __str__(self) -> str:
+        return str(self.args[0]) if self.args else ""
 
-class Action:
+
+PackageNotFoundError.__module__ = "ament_index_python.packages"
+
+
+class LaunchDescriptionEntity:
+    """An entry of a launch description, or a description."""
+
+
+class Action(LaunchDescriptionEntity):
     """One entry of a launch description, and where it was written."""
+
+    condition: Any = None
+    file, line = "", 0
 
     def __init__(self, *, condition: Any = None, **_: Any) -> None:
         if condition is not None and not callable(getattr(condition, "evaluate", None)):
@@ -128,9 +168,9 @@ class Action:
         self.condition = condition
         self.file, self.line = _written_at()
 
-    def visit(self, context: Context) -> Iterable[Any]:
-        """Do what the action does, and return the actions to visit next."""
-        raise NotImplementedError
+    def execute(self, context: Context) -> Iterable[Any]:
+        """Do what the action does, and return the actions to visit next; launch files derive actions from it."""
+        return ()
 
 
 #: The folders whose files are named as places: that of the submission, and that of the rubric's own files.
@@ -158,7 +198,7 @@ def _listed(parts: Any) -> list[Any]:
 
 def _pairs(given: Any, what: str) -> list[tuple[Any, Any]]:
     """Return the pairs of names and values that an argument holds; raises what a launch file did wrong."""
-    if isinstance(given, (Absent, Unknown)):
+    if isinstance(given, Lacking):
         return [(given, given)]
     if not isinstance(given, Iterable):
         raise TypeError(f"{what}: expected pairs of a name and a value, found {type(given).__name__}")
@@ -171,7 +211,7 @@ def _pairs(given: Any, what: str) -> list[tuple[Any, Any]]:
 
 def _several(given: Any) -> list[Any]:
     """Return the items of an argument; what is left out stands for its items."""
-    return [given] if isinstance(given, (Absent, Unknown)) else list(given or ())
+    return [given] if isinstance(given, Lacking) else list(given or ())
 
 
 def text_of(value: Any, context: Context) -> str:
@@ -186,8 +226,6 @@ def text_of(value: Any, context: Context) -> str:
         return str(os.fspath(value))
     if isinstance(value, (list, tuple)):
         return "".join(text_of(part, context) for part in value)
-    if isinstance(value, Unknown):
-        raise LeftOutError("action", type(value).__name__)
     raise TypeError(f"expected a text or a substitution, found {type(value).__name__}: {value!r}")
 
 
@@ -214,6 +252,9 @@ class TextSubstitution(Substitution):
 
 class SubstitutionFailure(RuntimeError):  # noqa: N818  the name in launch
     """A substitution has no text."""
+
+
+SubstitutionFailure.__module__ = "launch.substitutions.substitution_failure"
 
 
 class LaunchConfiguration(Substitution):
@@ -251,16 +292,16 @@ class EnvironmentVariable(Substitution):
 class _Made(Substitution):
     """A substitution whose text a function makes from the texts of its parts."""
 
-    def __init__(self, *parts: Any, **_: Any) -> None:
-        self.parts = parts
+    def __init__(self, *parts: Any, **more: Any) -> None:
+        self.parts, self.more = parts, more
 
     def perform(self, context: Context) -> str:
         """Return the text."""
-        text: str = self.make(context, *self.parts)
+        text: str = self.make(context, *self.parts, **self.more)
         return text
 
     @staticmethod
-    def make(context: Context, *parts: Any) -> str:
+    def make(context: Context, *parts: Any, **more: Any) -> str:
         """Return the text from the parts."""
         raise NotImplementedError
 
@@ -275,7 +316,7 @@ def _joined(context: Context, parts: Any) -> str:
     return os.path.join(*[text_of(part, context) for part in parts])
 
 
-def _python(context: Context, expression: Any, *_: Any) -> str:
+def _python(context: Context, expression: Any, *_: Any, **__: Any) -> str:
     names = {**vars(math), "math": math}
     return str(eval(text_of(expression, context), names))  # noqa: S307  what the substitution does, in the sandbox
 
@@ -291,8 +332,8 @@ def _word(value: bool) -> str:
     return "true" if value else "false"
 
 
-def _chosen(context: Context, condition: Any, yes: Any = "", no: Any = "") -> str:
-    return text_of(yes if _truth(condition, context) else no, context)
+def _chosen(context: Context, condition: Any, if_value: Any = "", else_value: Any = "") -> str:
+    return text_of(if_value if _truth(condition, context) else else_value, context)
 
 
 def _same(context: Context, left: Any, right: Any) -> str:
@@ -305,8 +346,8 @@ def _content(context: Context, path: Any) -> str:
 
 
 def _impossible(what: str) -> Callable[..., str]:
-    def make(context: Context, *parts: Any) -> str:
-        raise LeftOutError("substitution", what, ", ".join(text_of(part, context) for part in parts))
+    def make(context: Context, *parts: Any, **more: Any) -> str:
+        raise LeftOutError("substitution", what, ", ".join(text_of(part, context) for part in parts or more.values()))
 
     return make
 
@@ -344,8 +385,7 @@ class FindPackageShare(Substitution):
 
     def perform(self, context: Context) -> str:
         """Return the folder."""
-        package = text_of(self.package, context)
-        return context.share_of(package)
+        return self.find(text_of(self.package, context))
 
     def find(self, package: str) -> str:
         """Return the folder of a package at once."""
@@ -353,10 +393,19 @@ class FindPackageShare(Substitution):
         return folder
 
 
+class FindPackagePrefix(FindPackageShare):
+    """The prefix of a package."""
+
+    def find(self, package: str) -> str:
+        """Return the prefix of a package at once."""
+        folder: str = _evaluation.prefix_of(package)
+        return folder
+
+
 ROS_SUBSTITUTIONS: dict[str, Any] = {
     "FindPackageShare": FindPackageShare,
-    "FindPackage": FindPackageShare,
-    "FindPackagePrefix": FindPackageShare,
+    "FindPackage": FindPackagePrefix,
+    "FindPackagePrefix": FindPackagePrefix,
     "ExecutableInPackage": _made("ExecutableInPackage", _impossible("ExecutableInPackage")),
     "Parameter": _made("Parameter", _impossible("Parameter")),
 }
@@ -406,11 +455,11 @@ class LaunchConfigurationNotEquals(LaunchConfigurationEquals):
         return not super().evaluate(context)
 
 
-class LaunchDescription:
+class LaunchDescription(LaunchDescriptionEntity):
     """The actions of a launch file, in order."""
 
     def __init__(self, initial_entities: Iterable[Any] | None = None, **_: Any) -> None:
-        self.entities = list(initial_entities or ())
+        self.entities = [] if initial_entities is None else list(initial_entities)
 
     def add_action(self, action: Any) -> None:
         """Add an action at the end."""
@@ -431,9 +480,9 @@ class DeclareLaunchArgument(Action):
             raise TypeError(f"default_value: expected a text or a substitution, found {type(default_value).__name__}")
         if not isinstance(name, str):
             raise TypeError(f"name: expected a text, found {type(name).__name__}")
-        self.choices = list(choices or ())
+        self.choices = [] if choices is None else list(choices)
 
-    def visit(self, context: Context) -> Iterable[Any]:
+    def execute(self, context: Context) -> Iterable[Any]:
         """Set the default, unless the argument is given."""
         if self.name not in context.launch_configurations:
             if self.default is None:
@@ -452,7 +501,7 @@ class SetLaunchConfiguration(Action):
         super().__init__(**more)
         self.name, self.value = name, value
 
-    def visit(self, context: Context) -> Iterable[Any]:
+    def execute(self, context: Context) -> Iterable[Any]:
         """Set it."""
         context.launch_configurations[text_of(self.name, context)] = text_of(self.value, context)
         return ()
@@ -471,9 +520,10 @@ class GroupAction(Action):
         **more: Any,
     ) -> None:
         super().__init__(**more)
-        self.actions, self.scoped, self.values = list(actions), scoped, dict(launch_configurations or {})
+        self.actions, self.scoped = list(actions), scoped
+        self.values = {} if launch_configurations is None else dict(launch_configurations)
 
-    def visit(self, context: Context) -> Iterable[Any]:
+    def execute(self, context: Context) -> Iterable[Any]:
         """Visit the actions in their scope."""
         kept = context.scope()
         given = {text_of(name, context): text_of(value, context) for name, value in self.values.items()}
@@ -487,11 +537,11 @@ class GroupAction(Action):
 class TimerAction(Action):
     """Actions that are done later."""
 
-    def __init__(self, *, period: Any, actions: Iterable[Any], **more: Any) -> None:
+    def __init__(self, *, period: Any, actions: Iterable[Any], cancel_on_shutdown: Any = True, **more: Any) -> None:
         super().__init__(**more)
         self.period, self.actions = period, list(actions)
 
-    def visit(self, context: Context) -> Iterable[Any]:
+    def execute(self, context: Context) -> Iterable[Any]:
         """Visit the actions with the delay."""
         period = self.period if isinstance(self.period, (int, float)) else float(text_of(self.period, context))
         context.delay_s += float(period)
@@ -505,14 +555,15 @@ class OpaqueFunction(Action):
 
     def __init__(self, *, function: Callable[..., Any], args: Any = None, kwargs: Any = None, **more: Any) -> None:
         super().__init__(**more)
-        self.function, self.args, self.kwargs = function, args or (), kwargs or {}
+        self.function = function
+        self.args, self.kwargs = () if args is None else args, {} if kwargs is None else kwargs
 
-    def visit(self, context: Context) -> Iterable[Any]:
+    def execute(self, context: Context) -> Iterable[Any]:
         """Call it."""
         made = self.function(context, *self.args, **self.kwargs)
         if made is not None and not isinstance(made, Iterable):
             raise TypeError(f"expected a list of actions from {_called(self.function)}, found {type(made).__name__}")
-        return made or ()
+        return () if made is None else made
 
 
 def _called(function: Any) -> str:
@@ -532,21 +583,21 @@ class IncludeLaunchDescription(Action):
 
     def __init__(self, launch_description_source: Any, *, launch_arguments: Any = None, **more: Any) -> None:
         super().__init__(**more)
-        self.source, self.given = launch_description_source, launch_arguments or ()
+        self.source, self.given = launch_description_source, () if launch_arguments is None else launch_arguments
 
-    def visit(self, context: Context) -> Iterable[Any]:
+    def execute(self, context: Context) -> Iterable[Any]:
         """Set the arguments and visit what the file describes."""
         for name, value in _pairs(self.given, "launch_arguments"):
             context.launch_configurations[text_of(name, context)] = text_of(value, context)
         if isinstance(self.source, LaunchDescription):
             return self.source.entities
-        path = installed(text_of(getattr(self.source, "path", self.source), context), context)
+        path = context.shares.found(text_of(getattr(self.source, "path", self.source), context))
         if not path.endswith(".py"):
             raise LeftOutError("launch_file", os.path.basename(path))
         if len(context.files) >= DEEPEST:
             raise RecursionError(f"launch files include each other more than {DEEPEST} times")
         context.files.append(path)
-        walk(described_by(path).entities, context)
+        walk(described_by(path, context).entities, context)
         context.files.pop()
         return ()
 
@@ -602,27 +653,30 @@ class Node(Action):
         if unknown:
             raise TypeError(f"{type(self).__name__}() got an unexpected keyword argument '{unknown[0]}'")
         self.package, self.executable, self.name, self.namespace = package, executable, name, namespace
-        if isinstance(parameters, str) or not isinstance(parameters, (Sequence, type(None), Absent, Unknown)):
+        if isinstance(parameters, str) or not isinstance(parameters, (Sequence, type(None), Lacking)):
             raise TypeError(f"Expecting list of parameters, got {parameters}")
-        self.parameters, self.remappings = _several(parameters), _pairs(remappings or (), "remappings")
+        self.parameters = _several(parameters)
+        self.remappings = _pairs(() if remappings is None else remappings, "remappings")
         self.arguments, self.ros_arguments, self.more = _several(arguments), _several(ros_arguments), more
 
-    def visit(self, context: Context) -> Iterable[Any]:
+    def execute(self, context: Context) -> Iterable[Any]:
         """Describe the node."""
         if len(context.nodes) >= context.most_nodes:
             raise LeftOutError("nodes")
         for name in _NOT_SUPPORTED:
-            if self.more.get(name):
+            given = self.more.get(name)
+            if isinstance(given, Lacking) or given:
                 context.leave_out(self.file, self.line, LeftOutError("node_argument", name))
         name = text_of(self.name, context) if self.name is not None else ""
-        namespace = _namespace(context, text_of(self.namespace, context) if self.namespace is not None else "")
-        rules = [*([f"__node:={name}"] if name else []), *([f"__ns:={namespace}"] if namespace else [])]
+        namespace = _namespace(context, text_of(self.namespace, context) if self.namespace is not None else None)
+        rules = [*([f"__node:={name}"] if name else []), *([] if namespace is None else [f"__ns:={namespace}"])]
         own = [(text_of(old, context), text_of(new, context)) for old, new in self.remappings]
         rules += [f"{old}:={new}" for old, new in (*context.remappings, *own)]
         given = [f"{one}:={_yaml(value)}" for one, value in context.parameters]
         files = [*context.parameter_files]
         texts = [[os.path.basename(path), _read(path)] for path in files]
-        target = f"{namespace.rstrip('/')}/{name}" if name else "/**"
+        # As launch_ros does: without a namespace, the node's own code may set one.
+        target = f"{namespace.rstrip('/')}/{name}" if name and namespace is not None else "/**"
         for entry in self.parameters:
             texts += self._parameters(entry, target, context)
         ros = [part for rule in rules for part in ("-r", rule)] + [part for one in given for part in ("-p", one)]
@@ -649,7 +703,8 @@ class Node(Action):
         elif isinstance(entry, Parameter):
             values = {text_of(entry.name, context): _evaluated(entry.value, context)}
         else:
-            path = installed(text_of(entry.path if isinstance(entry, ParameterFile) else entry, context), context)
+            given = entry.path if isinstance(entry, ParameterFile) else entry
+            path = context.shares.found(text_of(given, context))
             if not os.path.isfile(path):  # as launch_ros does, with a warning
                 context.leave_out(self.file, self.line, LeftOutError("parameter_file", os.path.basename(path)))
                 return []
@@ -670,13 +725,13 @@ def _read(path: str) -> str:
         return file.read(1 << 20)
 
 
-def _namespace(context: Context, own: str) -> str:
-    """Return the namespace of a node: its own below those that were pushed; empty if there is none."""
+def _namespace(context: Context, own: str | None) -> str | None:
+    """Return the namespace of a node: its own below those that were pushed; None if there is none at all."""
+    parts = [*context.namespaces, *([] if own is None else [own])]
     whole = ""
-    for part in (*context.namespaces, own):
-        if part:
-            whole = part if part.startswith("/") else f"{whole.rstrip('/')}/{part}"
-    return whole
+    for part in filter(None, parts):
+        whole = part if part.startswith("/") else f"{whole.rstrip('/')}/{part}"
+    return (whole or "/") if parts else None
 
 
 def _flat(parameters: Mapping[Any, Any], context: Context, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -738,7 +793,7 @@ class _Setting(Action):
         super().__init__(condition=more.get("condition"))
         self.parts = (*parts, *known.values())
 
-    def visit(self, context: Context) -> Iterable[Any]:
+    def execute(self, context: Context) -> Iterable[Any]:
         """Set it."""
         self.put(context, *self.parts)
         return ()
@@ -775,7 +830,7 @@ class ExecuteProcess(Action):
         super().__init__(condition=condition)
         self.command = list(cmd)
 
-    def visit(self, context: Context) -> Iterable[Any]:
+    def execute(self, context: Context) -> Iterable[Any]:
         """Describe the node of `ros2 run`, or leave the command out."""
         words = [text_of(part, context) for part in self.command]
         words = words[0].split() + words[1:] if words else []
@@ -787,16 +842,29 @@ class ExecuteProcess(Action):
         return [node]
 
 
-class Unknown(Action):
-    """Something of launch that is not evaluated."""
+class Lacking(Action, Substitution):
+    """Something that ROS or another package has and that is not here: what needs it is left out.
 
-    def __init__(self, *parts: Any, **more: Any) -> None:
-        super().__init__(condition=more.get("condition"))
-        self.parts, self.more = parts, more
+    Args:
+        code: Why, as for `LeftOutError`.
+        name: What it is.
+    """
 
-    def visit(self, context: Context) -> Iterable[Any]:
-        """Leave it out."""
-        raise LeftOutError("action", type(self).__name__)
+    _why = ("name", "launch")
+
+    def __init__(self, code: str, name: str) -> None:
+        super().__init__()
+        self._why = (code, name)
+
+    def _needed(self, *_: Any, **__: Any) -> Any:
+        raise LeftOutError(*self._why)
+
+    execute = perform = evaluate = _needed
+    __str__ = __repr__ = __format__ = __fspath__ = __bytes__ = __bool__ = __int__ = __float__ = __index__ = _needed
+    __iter__ = __next__ = __len__ = __contains__ = __getitem__ = __enter__ = __instancecheck__ = __lt__ = __gt__ = (
+        _needed
+    )
+    __add__ = __radd__ = __truediv__ = __rtruediv__ = __mod__ = _needed
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -804,13 +872,68 @@ class Unknown(Action):
         return self
 
     def __call__(self, *_: Any, **__: Any) -> Any:
-        """Return the same."""
+        """Return the same: what it makes is not here either."""
         return self
 
 
-def unknown(name: str) -> type[Unknown]:
-    """Return a class of this name that is not evaluated."""
-    return type(name, (Unknown,), {"__doc__": "Not evaluated."})
+class Unknown(Lacking):
+    """A class of ROS that is not evaluated."""
+
+    def __init__(self, *_: Any, condition: Any = None, **__: Any) -> None:
+        Action.__init__(self, condition=condition)
+
+    def execute(self, context: Context) -> Iterable[Any]:
+        """Leave the action out."""
+        raise LeftOutError("action", type(self).__name__)
+
+
+class _Attribute:
+    """What a class of ROS has under a name and is not here, for the class and its objects."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: Any, owner: type) -> Lacking:
+        return Lacking("name", f"{owner.__name__}.{self._name}")
+
+
+def like_ros(kind: type, key: str) -> None:
+    """Make a class take what that of ROS takes and have what that has, as far as it differs."""
+    for name in launch_names.attributes(key):
+        if not hasattr(kind, name):
+            setattr(kind, name, _Attribute(name))
+    signature = launch_names.signature(key) if _knows_release() else None
+    if signature is None:
+        return
+    build: Any = kind.__init__  # type: ignore[misc]
+    if "__init__" not in vars(kind):  # that of its base, without what that one takes
+        build = getattr(build, "__wrapped__", build)
+
+    @functools.wraps(build)
+    def checked(self: Any, *parts: Any, **more: Any) -> None:
+        try:
+            bound = signature.bind(*parts, **more)
+        except TypeError as error:
+            raise TypeError(f"{kind.__name__}.__init__() {error}") from None
+        build(self, *bound.args, **bound.kwargs)
+
+    kind.__init__ = checked  # type: ignore[misc]
+
+
+def _knows_release() -> bool:
+    """Return whether the names of the ROS release are known; one that is newer may have others."""
+    return os.environ.get("ROS_DISTRO", launch_names.RELEASE) == launch_names.RELEASE
+
+
+def unknown(module: str, name: str) -> Any:
+    """Return what stands for a name of a module of ROS that is not evaluated."""
+    if not _TYPE.fullmatch(name):
+        return Lacking("name", f"{module}.{name}")
+    if name.endswith(("Error", "Failure", "Exception")):
+        return type(name, (Exception,), {"__doc__": "An exception of launch.", "__module__": module})
+    kind = type(name, (Unknown,), {"__doc__": "Not evaluated.", "_why": ("name", f"{module}.{name}")})
+    like_ros(kind, launch_names.key_of(module, name))
+    return kind
 
 
 def walk(entities: Iterable[Any], context: Context) -> None:
@@ -819,19 +942,20 @@ def walk(entities: Iterable[Any], context: Context) -> None:
         if isinstance(entity, LaunchDescription):
             walk(entity.entities, context)
             continue
-        if not isinstance(entity, Action):
+        if isinstance(entity, type) or not isinstance(entity, Action):
             raise TypeError(f"expected an action in the launch description, found {type(entity).__name__}")
         try:
             if entity.condition is None or entity.condition.evaluate(context):
-                walk(entity.visit(context), context)
+                walk(entity.execute(context), context)
         except LeftOutError as error:
             context.leave_out(entity.file, entity.line, error)
 
 
-def described_by(path: str) -> LaunchDescription:
+def described_by(path: str, context: Context) -> LaunchDescription:
     """Run a launch file and return what its `generate_launch_description` returns."""
     with open(path, "rb") as source:
-        code = compile(source.read(), path, "exec", dont_inherit=True)
+        # In a share folder lies a copy: the places are those in the submission.
+        code = compile(source.read(), context.shares.source_of(path), "exec", dont_inherit=True)
     module = ModuleType("launch_file")
     module.__file__ = path
     exec(code, module.__dict__)  # noqa: S102  evaluating the student's file is the purpose
@@ -881,76 +1005,139 @@ _DESCRIPTIONS: dict[str, Any] = {
     "ParameterFile": ParameterFile,
     "Parameter": Parameter,
 }
+
+
+def _source(name: str) -> type[PythonLaunchDescriptionSource]:
+    return type(name, (PythonLaunchDescriptionSource,), {"__doc__": f"The source {name}."})
+
+
 _SOURCES = {
     "PythonLaunchDescriptionSource": PythonLaunchDescriptionSource,
-    "AnyLaunchDescriptionSource": PythonLaunchDescriptionSource,
-    "XMLLaunchDescriptionSource": PythonLaunchDescriptionSource,
-    "FrontendLaunchDescriptionSource": PythonLaunchDescriptionSource,
+    **{name: _source(name) for name in ("AnyLaunchDescriptionSource", "FrontendLaunchDescriptionSource")},
 }
-#: The modules that a launch file imports, with what each of them has.
+_SUBSTITUTION_TYPES = {
+    "SomeSubstitutionsType": Any,
+    "SomeSubstitutionsType_types_tuple": (str, Substitution, list, tuple),
+}
+
+
+class LaunchContext(Context):
+    """A context that a launch file makes for itself."""
+
+    def __init__(self, *, argv: Any = None, noninteractive: bool = False) -> None:
+        one = _evaluation
+        super().__init__(one.packages, one.shares, {}, one.most_nodes, one.most_left_out)
+
+
+#: What is evaluated, by the modules of ROS that have it.
 MODULES: dict[str, dict[str, Any]] = {
     "launch": {
         "LaunchDescription": LaunchDescription,
-        "LaunchContext": Context,
-        "LaunchDescriptionEntity": Action,
+        "LaunchContext": LaunchContext,
+        "LaunchDescriptionEntity": LaunchDescriptionEntity,
         "Action": Action,
         "Substitution": Substitution,
+        **_SUBSTITUTION_TYPES,
     },
     "launch.actions": ACTIONS,
     "launch.conditions": _CONDITIONS,
-    "launch.event_handlers": {},
-    "launch.events": {},
     "launch.launch_description_sources": dict(_SOURCES),
     "launch.substitutions": SUBSTITUTIONS,
     "launch.logging": {"get_logger": logging.getLogger},
-    "launch.some_substitutions_type": {},
+    "launch.some_substitutions_type": _SUBSTITUTION_TYPES,
     "launch.utilities": {
         "perform_substitutions": lambda context, parts: text_of(parts, context),
         "normalize_to_list_of_substitutions": _listed,
     },
-    "launch_ros": {},
     "launch_ros.actions": ROS_ACTIONS,
     "launch_ros.descriptions": _DESCRIPTIONS,
     "launch_ros.parameter_descriptions": _DESCRIPTIONS,
     "launch_ros.substitutions": ROS_SUBSTITUTIONS,
-    "launch_ros.events": {},
-    "launch_ros.event_handlers": {},
-    "launch_xml.launch_description_sources": dict(_SOURCES),
-    "launch_xml": {},
-    "launch_yaml.launch_description_sources": {"YAMLLaunchDescriptionSource": PythonLaunchDescriptionSource},
-    "launch_yaml": {},
-    "ament_index_python": {},
-    "ament_index_python.packages": {},
+    "launch_xml.launch_description_sources": {"XMLLaunchDescriptionSource": _source("XMLLaunchDescriptionSource")},
+    "launch_yaml.launch_description_sources": {"YAMLLaunchDescriptionSource": _source("YAMLLaunchDescriptionSource")},
 }
 _TYPE = re.compile(r"[A-Z]\w*")
+_CLASSES = {
+    launch_names.key_of(module, name): found
+    for module, members in MODULES.items()
+    for name, found in members.items()
+    if isinstance(found, type)
+}
+for _key, _kind in _CLASSES.items():
+    if _kind.__module__ == __name__ and _kind is not Context:
+        like_ros(_kind, _key)
 
 
 def install(context: Context) -> None:
     """Put the modules in place of `launch`, `launch_ros` and `ament_index_python`."""
+    index = _index(context)
+    for name in {**launch_names.MODULES, **MODULES}:
+        module = sys.modules[name] = ModuleType(name)
+        module.__path__ = []
+        module.__dict__.update(MODULES.get(name, {}))
+        module.__dict__["__getattr__"] = _of_ros(module)
+        if name.startswith("ament_index_python"):
+            names = launch_names.MODULES[name].split()
+            module.__dict__.update({one: found for one, found in index.items() if one in names})
+    for name in (*launch_names.MODULES, *MODULES):
+        above, _, last = name.rpartition(".")
+        if above:
+            setattr(sys.modules[above], last, sys.modules[name])
+    sys.meta_path.append(_Unavailable())
+
+
+def _index(context: Context) -> dict[str, Any]:
+    """Return what `ament_index_python` has: it knows the packages of the submission, and asks for no other in vain."""
     from pathlib import Path
 
     def share(package: str, *_: Any, **__: Any) -> str:
         return context.share_of(package)
 
-    index = {
+    def unknown_to_us(package: object) -> None:
+        if isinstance(package, str) and not context.know(package):
+            context.leave_out_here(LeftOutError("package", package))
+
+    def has_resource(resource_type: str, resource_name: str) -> Any:
+        if resource_type != "packages":
+            return Lacking("name", "ament_index_python.has_resource")
+        unknown_to_us(resource_name)
+        return context.prefix_of(resource_name) if resource_name in context.packages else False
+
+    class Prefixes(dict[str, str]):
+        """The prefixes of packages by name; whoever looks for another one is told that it is left out."""
+
+        def __contains__(self, package: object) -> bool:
+            unknown_to_us(package)
+            return super().__contains__(package)
+
+        def get(self, package: str, default: Any = None) -> Any:
+            """Return the prefix of a package."""
+            return super().get(package, default) if package in self else default
+
+        def __missing__(self, package: str) -> str:
+            return context.prefix_of(package)
+
+    def prefixes() -> dict[str, str]:
+        return Prefixes({package: context.prefix_of(package) for package in context.packages})
+
+    def resources(resource_type: str) -> Any:
+        return prefixes() if resource_type == "packages" else Lacking("name", "ament_index_python.get_resources")
+
+    def search_paths() -> list[str]:
+        return list(dict.fromkeys(context.prefix_of(package) for package in context.packages))
+
+    return {
         "get_package_share_directory": share,
-        "get_package_prefix": share,
-        "get_package_share_path": lambda package, *_: Path(context.share_of(package)),
+        "get_package_prefix": context.prefix_of,
+        "get_package_share_path": lambda package, *_, **__: Path(context.share_of(package)),
+        "get_packages_with_prefixes": prefixes,
+        "get_resources": resources,
+        "get_search_paths": search_paths,
+        "has_resource": has_resource,
         "PackageNotFoundError": PackageNotFoundError,
+        "RESOURCE_INDEX_SUBFOLDER": "share/ament_index/resource_index",
+        "AMENT_PREFIX_PATH_ENV_VAR": "AMENT_PREFIX_PATH",
     }
-    for name, members in MODULES.items():
-        module = sys.modules[name] = ModuleType(name)
-        module.__path__ = []
-        module.__dict__.update(members)
-        module.__dict__["__getattr__"] = _missing(name)
-    for name in MODULES:
-        above, _, last = name.rpartition(".")
-        if above:
-            setattr(sys.modules[above], last, sys.modules[name])
-    sys.meta_path.append(_Unavailable())
-    for name in ("ament_index_python", "ament_index_python.packages"):
-        sys.modules[name].__dict__.update(index)
-    sys.modules["launch"].__dict__["SomeSubstitutionsType"] = Any
 
 
 #: Packages that launch files import and that are not here: what they make is left out where it is used.
@@ -969,77 +1156,75 @@ _ABSENT = (
 )
 
 
-class Absent(Action, Substitution):
-    """Something of a package that is not here, such as the text that `xacro` makes; its user is left out."""
-
-    def __init__(self, package: str) -> None:
-        super().__init__()
-        self.package = package
-
-    def visit(self, context: Context) -> Iterable[Any]:
-        """Leave it out."""
-        raise LeftOutError("module", self.package)
-
-    def perform(self, context: Context) -> str:
-        """Leave out what needs the text."""
-        raise LeftOutError("module", self.package)
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):
-            raise AttributeError(name)
-        return self
-
-    def __call__(self, *_: Any, **__: Any) -> Any:
-        """Return the same: what a function makes of it is not here either."""
-        return self
-
-    def __str__(self) -> str:
-        raise LeftOutError("module", self.package)
-
-
 class _Unavailable:
-    """Finds the modules of launch that are not listed, and the packages that are not here.
-
-    A class of launch is found by its name, whichever module it is imported from.
-    """
+    """Finds the packages that are not here, and modules of launch that only a newer ROS may have."""
 
     def find_spec(self, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
         """Return what loads a module; None for one of others."""
         package = name.partition(".")[0]
-        own = package in _PACKAGES
-        return ModuleSpec(name, self, is_package=True) if own or package in _ABSENT else None  # type: ignore[arg-type]
+        newer = package in _PACKAGES and not _knows_release()
+        return ModuleSpec(name, self, is_package=True) if newer or package in _ABSENT else None  # type: ignore[arg-type]
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         """Return a module whose names are made when they are asked for."""
         module, package = ModuleType(spec.name), spec.name.partition(".")[0]
-        find = _missing(spec.name) if package in _PACKAGES else _absent(package)
-        module.__dict__["__getattr__"] = find
+        module.__dict__["__getattr__"] = _absent(package) if package in _ABSENT else _of_ros(module)
         return module
 
     def exec_module(self, module: ModuleType) -> None:
         """Do nothing: there is no code."""
 
 
-_PACKAGES = frozenset(name.partition(".")[0] for name in MODULES) - {"ament_index_python"}
-_CLASSES = {name: found for members in MODULES.values() for name, found in members.items() if _TYPE.fullmatch(name)}
+_PACKAGES = frozenset(name.partition(".")[0] for name in MODULES)
 
 
 def _absent(package: str) -> Callable[[str], Any]:
     def find(name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
-        return Absent(package)
+        return Lacking("module", package)
 
     return find
 
 
-def _missing(module: str) -> Callable[[str], Any]:
+def _of_ros(module: ModuleType) -> Callable[[str], Any]:
+    """Return what finds a name of a module of ROS: what is evaluated, or what stands for it; others do not exist."""
+
     def find(name: str) -> Any:
-        if _TYPE.fullmatch(name):
-            return _CLASSES.get(name) or unknown(name)
-        raise AttributeError(f"module '{module}' has no attribute '{name}'")
+        where = module.__name__
+        known = launch_names.has(where, name) or not (_knows_release() or name.startswith("_"))
+        if not known:
+            raise AttributeError(f"module '{where}' has no attribute '{name}'")
+        found = _CLASSES.get(launch_names.key_of(where, name)) or unknown(where, name)
+        setattr(module, name, found)
+        return found
 
     return find
+
+
+def _left_out_by(error: OSError, folders: Sequence[str]) -> LeftOutError | None:
+    """Return what a launch file could not do in the sandbox and could do elsewhere; None if the mistake is its own."""
+    step = error.__traceback__
+    while step is not None and step.tb_next is not None:
+        step = step.tb_next
+    # Most commands are not in the sandbox, and no shell.
+    if step is not None and step.tb_frame.f_code.co_filename == subprocess.__file__:
+        command = step.tb_frame.f_locals.get("args") or ()
+        words = [os.fsdecode(word) for word in command if isinstance(word, (str, bytes, os.PathLike))]
+        return LeftOutError("command", text=" ".join(words[2:] if words[1:2] == ["-c"] else words))
+    # The submission is there to be read.
+    name = error.filename
+    refused = error.errno in (errno.EROFS, errno.EACCES, errno.EPERM) and isinstance(name, str)
+    inside = refused and any(os.path.abspath(name).startswith(folder) for folder in folders)
+    return LeftOutError("written_file", os.path.basename(name)) if inside else None
+
+
+def _without_shell(context: Context) -> Callable[[Any], int]:
+    def system(command: Any) -> int:
+        context.leave_out_here(LeftOutError("command", text=os.fsdecode(command)))
+        return 0
+
+    return system
 
 
 def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
@@ -1048,6 +1233,7 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
     packages: Mapping[str, str],
     arguments: Mapping[str, str],
     *,
+    prefix: str = "",
     most_nodes: int,
     most_left_out: int,
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
@@ -1058,22 +1244,49 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
         path: The launch file, in one of them.
         packages: Name and folder of each ROS package of the submission.
         arguments: The launch arguments.
+        prefix: The folder that share folders are laid out in; empty to lay out none.
         most_nodes: So many nodes are described; whatever follows the last one is left out.
         most_left_out: So many things are said to be left out.
 
     Returns:
-        The nodes, and what was left out with `code`, `name` and `text`, each with `file` and `line`.
+        The nodes, and what was left out with `code`, `name`, `text` and `count`, each with `file` and `line`.
     """
     global _folders  # noqa: PLW0603  every action needs them, also those that a launch file makes at import
     _folders = tuple(os.path.join(folder, "") for folder in folders)
     global _evaluation  # noqa: PLW0603  what a substitution finds without being performed
-    context = _evaluation = Context(packages, arguments, most_nodes, most_left_out)
+    shares = Shares(packages, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), prefix)
+    context = _evaluation = Context(packages, shares, arguments, most_nodes, most_left_out)
     install(context)
+    setattr(os, "system", _without_shell(context))  # noqa: B010  a plain assignment would need its exact type
     # Once a package is built, a launch file imports the modules of its package.
     sys.path += [folder for folder in packages.values() if folder not in sys.path]
     context.files.append(path)
     try:
-        walk(described_by(path).entities, context)
+        walk(described_by(path, context).entities, context)
     except LeftOutError as error:
-        context.leave_out(os.path.basename(path), 0, error)
+        _leave_out_all(context, path, error)
+    except OSError as error:
+        left_out = _left_out_by(error, _folders)
+        if left_out is None:
+            raise
+        left_out.place = _place_of(error)
+        _leave_out_all(context, path, left_out)
     return context.nodes, context.left_out
+
+
+def _leave_out_all(context: Context, path: str, error: LeftOutError) -> None:
+    """Note what ended the evaluation of a launch file."""
+    file, line = error.place
+    context.leave_out(file or os.path.basename(path), line, error)
+
+
+def _place_of(error: BaseException) -> tuple[str, int]:
+    """Return the last line of the submission that an exception went through."""
+    place, step = ("", 0), error.__traceback__
+    while step is not None:
+        name = step.tb_frame.f_code.co_filename
+        for folder in _folders:
+            if name.startswith(folder):
+                place = os.path.relpath(name, folder), step.tb_lineno
+        step = step.tb_next
+    return place

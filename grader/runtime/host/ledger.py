@@ -305,7 +305,7 @@ class Ledger:
             for topic in self.transitions.values()
             if topic.rpartition("/")[0] in nodes
         ]
-        return claims + [claim for node in seen for claim in _parameters(node)]
+        return claims + [claim for node in seen for claim in parameters_of(node)]
 
     def is_elsewhere(self, handle: Any) -> bool:
         """Return whether an endpoint's handle is in another ROS domain than the grader."""
@@ -602,12 +602,12 @@ def _valid(endpoint: Any) -> bool:
         return False
 
 
-def _parameters(node: Any) -> list[dict[str, str]]:
+def parameters_of(node: Any) -> list[dict[str, str]]:
     """Return the parameters that a node has declared, without those that every node has."""
     own = node.get_fully_qualified_name()
     return [
         {"kind": "parameter", "name": f"{own}:{name}", "type": repr(parameter.value)[:200]}
-        for name, parameter in sorted(getattr(node, "_parameters", {}).items())
+        for name, parameter in sorted([*getattr(node, "_parameters", {}).items()])
         if name not in BACKGROUND_PARAMETERS
     ]
 

@@ -180,6 +180,7 @@ def evaluate(request: dict[str, Any]) -> None:
     link.ask({"kind": "ready"})
     root, told = request["root"], request["launch"]
     own = os.path.join(os.environ.get("HOME") or tempfile.gettempdir(), "provided")
+    installed = os.path.join(os.path.dirname(own), "installed")
     os.makedirs(own, exist_ok=True)
     for name, text in told["provided"]:
         with open(os.path.join(own, name), "w", encoding="utf-8") as file:
@@ -193,7 +194,9 @@ def evaluate(request: dict[str, Any]) -> None:
         packages = {name: os.path.join(root, folder).rstrip("/") for name, folder in reversed(told["packages"])}
         sys.path += [os.path.join(root, folder) for folder in request["imported"]]
         arguments = dict(told["arguments"])
-        nodes, left_out = launch_files.describe((root, own), path, packages, arguments, **told["most"])
+        describer.hide(installed)
+        folders = (root, own)
+        nodes, left_out = launch_files.describe(folders, path, packages, arguments, prefix=installed, **told["most"])
         found = {"nodes": nodes, "left_out": left_out}
     except BaseException as error:  # whatever the launch file raises becomes a fault
         found = {"fault": describer.exception(error)}

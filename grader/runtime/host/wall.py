@@ -29,6 +29,8 @@ EARLY_S = 0.03
 WORKED_S = 0.2
 #: The most such messages that are reported.
 MOST_EARLY = 500
+#: The most parameters in one report.
+MOST_PARAMETERS = 1_000
 #: How long the other side may take to pass on a request or a response that it has read: nothing tells when it has.
 TAKEN_S = 0.03
 
@@ -70,6 +72,8 @@ class WallTime:
         self._patience: Any = None
         self._exchanged = False
         self._early_reports = 0
+        #: The parameters that were reported, by their identity: a new value is a new object.
+        self._reported: tuple[int, ...] = ()
         self.waited_s = 0.0
         self.domain = 0
 
@@ -183,6 +187,7 @@ class WallTime:
         @functools.wraps(look)
         def looking(executor: Any, timeout_sec: Any = None, *args: Any, **kwargs: Any) -> Any:
             self._await_watched()
+            self._report_parameters()
             timeout_s = getattr(timeout_sec, "timeout", timeout_sec)  # rclpy also passes an object that counts down
             if timeout_s is None or timeout_s > 0:
                 waited()
@@ -197,6 +202,22 @@ class WallTime:
         rclpy.publisher.Publisher.get_subscription_count = finding(count)
         rclpy.client.Client.service_is_ready = finding(ready)
         rclpy.executors.Executor._wait_for_ready_callbacks = looking
+
+    def _report_parameters(self) -> None:
+        """Report the parameters of all nodes, if any is new."""
+        from . import ros
+        from .ledger import is_in, parameters_of
+
+        nodes = [node for one in ros.MADE_NODES if (node := one()) is not None and is_in(self.domain, node)]
+        now = tuple(id(one) for node in nodes for one in [*getattr(node, "_parameters", {}).values()])
+        if now == self._reported:
+            return
+        self._reported = now
+        claims: list[dict[str, str]] = []
+        for node in nodes:
+            with contextlib.suppress(Exception):  # it is being destroyed
+                claims += parameters_of(node)
+        self._link.send({"kind": "parameters", "claims": claims[:MOST_PARAMETERS]})
 
     def report_early(self, topic: str, began_ns: int) -> None:
         """Report that what was sent on a topic was sent before anybody could have discovered its publisher.
@@ -221,6 +242,7 @@ class WallTime:
 
     def finish(self) -> None:
         """Wait until published messages have arrived, before the publishers are freed with the student's modules."""
+        self._report_parameters()
         self._leave()
 
     def end(self) -> bool:

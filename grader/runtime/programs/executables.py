@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import posixpath
+import re
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 
-from grader.runtime.host.packages import CMAKE, package_folders, walk
+from grader.runtime.host.packages import CMAKE, FOLDERS, SKIPPED, package_folders, walk
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.projects import Project
 
@@ -14,8 +17,15 @@ from grader.runtime.model.projects import Project
 CMAKE_LISTS = CMAKE
 #: The most files of a package that are searched for a module or a program.
 MOST_FILES = 2_000
-#: How far above a package the folder `src` of its workspace may be: packages lie in it or in a repository in it.
-MOST_LEVELS = 3
+#: How far above a package its workspace may begin: repositories have groups of packages in groups.
+MOST_LEVELS = 8
+#: With a file of this name in it, a folder is none of those that colcon builds.
+IGNORED = "COLCON_IGNORE"
+#: Files that name the packages that theirs needs, and the most bytes of one of them and of a package.xml that are read.
+_NAMING = frozenset({".py", ".xml", ".yaml", ".txt", ".cfg", ".msg", ".srv", ".action", ".idl"})
+MOST_NAMING_BYTES, MOST_MANIFEST_BYTES = 1 << 20, 64 << 10
+_PACKAGE_NAME = re.compile(rb"<name>\s*([A-Za-z0-9_-]{1,100})\s*</name>")
+_WORD = re.compile(rb"[A-Za-z][A-Za-z0-9_]{1,99}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,8 +198,90 @@ def package_of(folder: Path) -> Path:
 
 
 def workspace_of(package: Path) -> Path:
-    """Return the folder with the packages that one may need: the `src` above it, or the next if it holds others."""
-    source = next((up for up in package.parents[:MOST_LEVELS] if up.name == "src"), package.parent)
-    found = (manifest for level in ("*", "*/*") for manifest in source.glob(f"{level}/package.xml"))
-    beside = (manifest for manifest in found if manifest.parent != package)
-    return source if (package / "package.xml").is_file() and any(beside) else package
+    """Return the folder with the packages that one may need; the package itself if there are no others.
+
+    That is the `src` above it. Without one, it is the nearest of the folder that it is in, the one above that, and its
+    repository that has all packages that it names and that lie in any of them.
+    """
+    if not is_package(package):
+        return package
+    above = [up for up in package.parents[:MOST_LEVELS] if up != up.parent]
+    source = next((up for up in above if up.name == "src"), None)
+    if source is not None:
+        return source if any(folder != package for folder in project_folders(source)) else package
+    beside: dict[Path, set[str]] = {
+        up: {*_names_in(up, package, levels)} for up, levels in zip(above, _LEVELS, strict=False)
+    }
+    cloned = next((up for up in above if _is_cloned(up)), None)
+    if cloned is not None and cloned not in beside:
+        beside[cloned] = {name_of(folder) for folder in project_folders(cloned) if folder != package}
+    named = words_of(package) & {name for names in beside.values() for name in names}
+    nearest = next((up for up, names in beside.items() if named <= names), package)
+    return nearest if beside.get(nearest) else package
+
+
+#: Where packages are looked for beside one: in the folder that it is in, and in the one above that.
+_LEVELS = (("*", "*/*"), ("*", "*/*"))
+
+
+def _names_in(folder: Path, package: Path, levels: Sequence[str]) -> Iterator[str]:
+    """Yield the names of the packages in a folder, but for one."""
+    for level in levels:
+        yield from (name_of(one.parent) for one in folder.glob(f"{level}/package.xml") if one.parent != package)
+
+
+def _is_cloned(folder: Path) -> bool:
+    return (folder / ".git").exists()
+
+
+def is_package(folder: Path) -> bool:
+    """Return whether a folder is that of a ROS package."""
+    return (folder / "package.xml").is_file()
+
+
+def name_of(package: Path) -> str:
+    """Return the name of a package: that in its package.xml, or else that of its folder."""
+    try:
+        with (package / "package.xml").open("rb") as manifest:
+            found = _PACKAGE_NAME.search(manifest.read(MOST_MANIFEST_BYTES))
+    except OSError:
+        found = None
+    return found[1].decode() if found is not None else package.name
+
+
+def words_of(package: Path) -> frozenset[str]:
+    """Return the words of a package's programs, definitions and build files, among which are the packages it needs."""
+    found: set[str] = set()
+    for file in islice(files_below(package), MOST_FILES):
+        path = package / file
+        if path.suffix in _NAMING and path.is_file() and path.stat().st_size <= MOST_NAMING_BYTES:
+            found |= {word.decode() for word in _WORD.findall(path.read_bytes())}
+    return frozenset(found)
+
+
+def needed_packages(package: Path, workspace: Path) -> list[Path]:
+    """Return a package and those of its workspace that it names, with those that they name."""
+    known: dict[str, Path] = {}
+    for folder in project_folders(workspace):
+        known.setdefault(name_of(folder), folder)
+    needed, new = {package: None}, [package]
+    while new:
+        named = words_of(new.pop())
+        found = [folder for name, folder in known.items() if name in named and folder not in needed]
+        needed.update(dict.fromkeys(found))
+        new += found
+    return sorted(needed)
+
+
+def ignored_packages(workspace: Path) -> dict[str, Path]:
+    """Return the packages of a workspace that colcon does not build, by name, and the folder with COLCON_IGNORE."""
+    found: dict[str, Path] = {}
+    for number, (here, folders, files) in enumerate(os.walk(workspace)):
+        if number >= FOLDERS:
+            break
+        folders[:] = sorted(name for name in folders if name not in SKIPPED and not name.startswith("."))
+        if IGNORED in files and Path(here) != workspace:
+            folders.clear()
+            for inner in project_folders(Path(here)):
+                found.setdefault(name_of(inner), Path(here))
+    return found

@@ -208,7 +208,7 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
         if problem := made.starts[-1].problem:
             fault = Fault(0, name, FaultKind.KILLED, problem)
             return EvaluatedLaunch(fault=fault, left_out=tuple(left_out), unstarted=tuple(unstarted))
-    if not made.processes and not left_out and not unstarted:
+    if not (made.processes or left_out or unstarted or notes):
         text = "describes no node"
         return EvaluatedLaunch(fault=Fault(0, name, FaultKind.EXITED, text), notes=tuple(notes))
     return replace(made, left_out=tuple(left_out), unstarted=tuple(unstarted), notes=tuple(notes))

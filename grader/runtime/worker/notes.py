@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from grader.runtime.model.limits import MAX_FILE_BYTES
+from grader.runtime.model.limits import MAX_FILE_BYTES, MOST_LAUNCHED
 from grader.runtime.model.trace import Start, StartWay, main_not_called
 
 #: The full name of a node.
@@ -72,12 +72,14 @@ _LEFT_OUT: Mapping[str, tuple[str, re.Pattern[str] | None]] = {
     "command": ("the command {text}", None),
     "launch_file": ("the launch file {name}", re.compile(r"[A-Za-z0-9_.-]{1,80}")),
     "module": ("what needs the package {name}", re.compile(r"[a-z0-9_]{1,80}")),
+    "name": ("what needs {name}", re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*){0,6}", re.ASCII)),
     "node_argument": ("{name}= of a node", re.compile(r"[a-z_]{1,40}")),
-    "nodes": ("a node beyond the first 16", None),
+    "nodes": (f"a node beyond the first {MOST_LAUNCHED}", None),
     "package": ("what needs the package {name}", re.compile(r"[A-Za-z0-9_-]{1,80}")),
     "parameter_file": ("the parameter file {name}", re.compile(r"[A-Za-z0-9_.-]{1,80}")),
     "substitution": ("the substitution {name}({text})", re.compile(r"[A-Z][A-Za-z]{0,39}")),
     "variable": ("the environment variable {name}", re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,79}")),
+    "written_file": ("writing the file {name}", re.compile(r"[A-Za-z0-9_.-]{1,80}")),
 }
 #: Why something is left out that would be understood otherwise, by its code.
 _WHY = {
@@ -86,7 +88,10 @@ _WHY = {
     "nodes": "no more are started",
     "package": "the submission has no such package",
     "parameter_file": "it is not there",
+    "written_file": "a launch file may write only below share folders and in temporary folders",
 }
+#: No launch file describes so many nodes in the time that it has.
+MOST_COUNTED = 1_000_000
 #: As much of a student's text as fits into a line of a note.
 _QUOTED_CHARACTERS = 80
 
@@ -113,8 +118,10 @@ def left_out_words(data: Mapping[str, Any]) -> str:
 
 def left_out_sentence(data: Mapping[str, Any]) -> str:
     """Return what `left_out_words` says as a sentence, with the reason."""
-    why = _WHY.get(str(data.get("code")))
-    words = left_out_words(data)
+    code, count = str(data.get("code")), data.get("count")
+    why, words = _WHY.get(code), left_out_words(data)
+    if code == "nodes" and type(count) is int and 1 < count < MOST_COUNTED:
+        return f"{count} nodes beyond the first {MOST_LAUNCHED} were left out: {why}"
     return f"{words} was left out: {why}" if why else f"{words} is not supported and was left out"
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
 from grader.runtime.model.scenario import Event
-from grader.runtime.model.trace import ClockKind, Mark, Observation, Trace
+from grader.runtime.model.trace import ClockKind, Mark, Observation, Offer, Trace
 from grader.runtime.plan import Plan
 from grader.runtime.simulation.participant import Moment
 from grader.runtime.stimuli.calls import AddClients, Ask, PlannedCalls
@@ -22,7 +22,7 @@ from grader.runtime.worker.service_peers import ServicePeers
 from grader.runtime.worker.simulations import Simulations
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.topic_peers import TopicPeers
-from grader.runtime.worker.trace_recorder import TraceRecorder
+from grader.runtime.worker.trace_recorder import OFFERS, TraceRecorder
 from grader.runtime.worker.transit import Transit
 
 
@@ -179,6 +179,15 @@ class Runner(ABC):
     def _end_if_full(self, now_ns: int) -> None:
         if self._recorder.full:
             self._agenda.end_by(now_ns)
+
+    def _note_offers(self, student: NodeProcess, claims: Iterable[Mapping[str, Any]], now_ns: int) -> None:
+        """Record the services, clients and parameters of a process that are new."""
+        for claim in claims:
+            offer = (claim["kind"], claim["name"][:300], claim["type"][:300])
+            told = offer in student.offers or len(student.offers) >= OFFERS
+            if claim["kind"] in ("service", "client", "parameter") and not told:
+                student.offers.add(offer)
+                self._recorder.add(Offer(now_ns, student.name, *offer))
 
     def _report_fault(self, student: NodeProcess, report: Mapping[str, Any], now_ns: int) -> None:
         """Record a fault that a process has reported."""

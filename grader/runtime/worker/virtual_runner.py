@@ -9,7 +9,7 @@ from typing import Any
 
 from grader.runtime.host.originals import wait_until
 from grader.runtime.model.scenario import Event
-from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Mark, Observation, Offer
+from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Mark, Observation
 from grader.runtime.patience import Wait
 from grader.runtime.plan import Plan
 from grader.runtime.stimuli.calls import PlannedCalls
@@ -22,7 +22,7 @@ from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.runner import Runner
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.topic_peers import VirtualTopicPeers
-from grader.runtime.worker.trace_recorder import NAME_CHARACTERS, OFFERS
+from grader.runtime.worker.trace_recorder import NAME_CHARACTERS
 from grader.runtime.worker.workload import Workload
 
 #: The host never sends more reports before it waits or ends, and never reports more endpoints and parameters.
@@ -195,20 +195,11 @@ class VirtualRunner(Runner):
                 return
             self._core.has(student, [c for c in endpoints if is_claim(c)])
             student.sees_graph = report.get("sees_graph") is True
-            self._note_offers(student)
+            self._note_offers(student, student.claims, self._core.now_ns)
             self._discovery.match(self._core.now_ns)
             # A new endpoint may be the server that a call has waited for.
             for due in self._services.ready(self._is_served):
                 self._agenda.later(replace(due, t_ns=self._core.now_ns))
-
-    def _note_offers(self, student: NodeProcess) -> None:
-        """Record the services, clients and parameters that a process reports for the first time."""
-        for claim in student.claims:
-            offer = (claim["kind"], claim["name"][:300], claim["type"][:300])
-            told = offer in student.offers or len(student.offers) >= OFFERS
-            if claim["kind"] in ("service", "client", "parameter") and not told:
-                student.offers.add(offer)
-                self._recorder.add(Offer(self._core.now_ns, student.name, *offer))
 
     def _collect(self, sent: Mapping[str, int], early: Mapping[str, int]) -> None:
         """Wait until the observer has taken all published messages, and record them.
@@ -322,10 +313,13 @@ def unfit(students: Sequence[NodeProcess], seen: Sequence[Observation], *, full:
         return next((_with_place(UNSETTLED[s.unsettled], hung.get(s.name)) for s in unsettled), "")
     if full:
         return ""
-    hiding = [s.workload for s in students if s.workload is not None and s.workload.delay.hides]
+    hiding = [(s.name, s.workload) for s in students if s.workload is not None and s.workload.delay.hides]
     if not hiding:
         return ""
-    return OUTSIDE if any(workload.waited_ns > workload.used_ns for workload in hiding) else BUSY
+    waiting = [name for name, workload in hiding if workload.waited_ns > workload.used_ns]
+    reason = OUTSIDE if waiting else BUSY
+    # Of several programs, people have to know which one it is.
+    return reason if len(students) == 1 else f"{(waiting or [name for name, _ in hiding])[0]}: {reason}"
 
 
 def _with_place(reason: str, fault: Fault | None) -> str:

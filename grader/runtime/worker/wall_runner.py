@@ -14,12 +14,13 @@ from typing import Any, ClassVar, Protocol
 
 from grader.runtime.model.quantities import NS_PER_MS
 from grader.runtime.model.scenario import Event
-from grader.runtime.model.trace import ClockKind, Mark, Message, Observation
+from grader.runtime.model.trace import ClockKind, Mark, Message, Observation, Offer
 from grader.runtime.plan import Plan
 from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.stimuli.events import Disappear
 from grader.runtime.stimuli.messages import Advertise
 from grader.runtime.stimuli.server import RemoveServer
+from grader.runtime.worker.claims import is_claim
 from grader.runtime.worker.ending import ending
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.runner import Runner
@@ -90,6 +91,8 @@ class WallRunner(Runner):
         #: by the system clock, as the processes report them.
         self._early: dict[str, list[tuple[int, int]]] = {}
         self._early_told = 0
+        #: The services and clients whose process is not known.
+        self._nobodys: set[tuple[str, str, str]] = set()
         #: When messages were sent, by the system clock, by their index in the recording.
         self._sent_ns: dict[int, int] = {}
         self.held_up_ns = 0
@@ -191,6 +194,8 @@ class WallRunner(Runner):
                 student.note(report)
             elif report.get("kind") == "early":
                 self._note_early(report)
+            elif report.get("kind") == "parameters":
+                self._note_parameters(student, report, now_ns)
             elif report.get("kind") == "fault":
                 self._report_fault(student, report, now_ns)
             elif report.get("kind") == "exited":
@@ -200,6 +205,24 @@ class WallRunner(Runner):
                 self._recorder.add(ending(student.name, now_ns, report, self._plan, places, stopped=stopped))
                 student.ended = True
         self._recorder.add(*student.output(now_ns))
+
+    def _note_parameters(self, student: NodeProcess, report: Mapping[str, Any], now_ns: int) -> None:
+        claims = report.get("claims")
+        valid = [claim for claim in claims if is_claim(claim)] if isinstance(claims, list) else []
+        self._note_offers(student, (claim for claim in valid if claim["kind"] == "parameter"), now_ns)
+
+    def _note_services(self, now_ns: int) -> None:
+        """Record the services and clients in the graph; one of several processes is known by its parameters alone."""
+        nodes = {offer[1].partition(":")[0]: one for one in self._students for offer in one.offers}
+        only = self._students[0] if len(self._students) == 1 else None
+        for end in self._recorder.graph.services:
+            student = only or nodes.get(end.node)
+            claim = {"kind": end.kind, "name": end.service, "type": end.type}
+            if student is not None:
+                self._note_offers(student, [claim], now_ns)
+            elif (offer := (end.kind, end.service, end.type)) not in self._nobodys:
+                self._nobodys.add(offer)
+                self._recorder.add(Offer(now_ns, "", *offer))
 
     def _note_early(self, report: Mapping[str, Any]) -> None:
         topic, began_ns, ended_ns = (report.get(name) for name in ("topic", "began_ns", "ended_ns"))
@@ -214,6 +237,8 @@ class WallRunner(Runner):
         self._end_if_full(now_ns)
         if changed:
             self._observer.watch(self._recorder.graph.endpoints)
+            if not self._plan.bare:  # what a spot check records is compared with what nobody reported
+                self._note_services(now_ns)
             if self._observer.crowded:
                 self._recorder.stop(now_ns, self._observer.crowded)
                 self._end_if_full(now_ns)

@@ -197,8 +197,10 @@ class Worker:
         if made.harness_problem or made.fault is not None or not made.processes:
             fault = made.fault
             place = name if fault is None or not fault.file else f"{fault.file}:{fault.line}"
-            why = made.harness_problem or (fault.text if fault is not None else "; ".join(left_out))
-            failed = LaunchFailedError if fault is not None and not made.harness_problem else HarnessError
+            if fault is None and not made.harness_problem:  # the sentences name the place themselves
+                raise HarnessError("; ".join([*left_out, *made.notes]))
+            why = made.harness_problem or (fault.text if fault is not None else "")
+            failed = LaunchFailedError if not made.harness_problem else HarnessError
             raise failed(f"{place}: {why}")
         names: dict[str, str] = {}
         for process, _ in made.processes:

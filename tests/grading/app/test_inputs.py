@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from grader.cli import main
-from grader.grading.app.inputs import messages, read_sent, read_simulations, simulated
+from grader.grading.app.inputs import messages, read_launch_arguments, read_sent, read_simulations, simulated
 from grader.runtime.model.errors import GraderError
 from grader.runtime.stimuli.messages import MessageStream
 from grader.runtime.stimuli.simulation import Simulated
@@ -130,6 +130,29 @@ def test_a_message_fits_what_the_programs_subscribe_to(text: str, told: str) -> 
     with pytest.raises(GraderError) as error:
         messages(read_sent([text]), {"/limit": "std_msgs/msg/Float32"}, 10.0)
     assert told in error.value.message
+
+
+def test_launch_arguments_are_those_of_ros2_launch() -> None:
+    """A value may have any characters, and be empty."""
+    files = (Path("a.py"), Path("robot.launch.py"))
+    assert read_launch_arguments(["a:=1", "b:=", "c:=x:=y"], files) == (("a", "1"), ("b", ""), ("c", "x:=y"))
+    assert read_launch_arguments([], (Path("a.py"),)) == ()
+
+
+@pytest.mark.parametrize(
+    ("texts", "file", "told"),
+    [
+        (["a=1"], "robot.launch.py", "--launch-argument a=1: expected NAME:=VALUE, found something else"),
+        ([":=1"], "robot.launch.py", "--launch-argument :=1: expected NAME:=VALUE, found something else"),
+        (["a:=1", "a:=2"], "robot.launch.py", "--launch-argument a:=2: expected each argument once, found a again"),
+        (["a:=1"], "a.py", "--launch-argument: expected a launch file among the programs, found none"),
+    ],
+)
+def test_a_launch_argument_that_cannot_be_used_is_told(texts: list[str], file: str, told: str) -> None:
+    """Before anything runs."""
+    with pytest.raises(GraderError) as raised:
+        read_launch_arguments(texts, (Path(file),))
+    assert raised.value.message == told
 
 
 def test_messages_are_spread_over_the_time_that_is_left() -> None:

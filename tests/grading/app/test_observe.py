@@ -2,20 +2,25 @@
 
 import json
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 from places import GRADE, REPORTED, ROOT, TESTS
 from tiers import each, more
 
+from grader.grading.app import observe as observing
+from grader.grading.app.inputs import read_simulations
 from grader.grading.app.observe import ObserveRequest, observe
 from grader.grading.judging.summary import summarise
 from grader.grading.model.report import Summary
 from grader.grading.reporting.observed import render_summary, summary_to_json, without_libraries
 from grader.runtime.model.errors import SubmissionError
+from grader.runtime.model.limits import MAX_FILE_BYTES
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
+from grader.runtime.model.scenario import Scenario, Span
 from grader.runtime.model.trace import (
     ClockKind,
     Endpoint,
@@ -30,8 +35,13 @@ from grader.runtime.model.trace import (
     ServiceEnd,
     Trace,
 )
+from grader.runtime.session import Job
 
 FLOAT = "std_msgs/msg/Float32"
+
+
+def quiet(title: str) -> None:
+    """Tell nobody what is done now."""
 
 
 def an_end(kind: str, topic: str = "/t", node: str = "/a") -> Endpoint:
@@ -82,6 +92,45 @@ def test_texts_and_arrays_are_described() -> None:
     told = json.loads(summary_to_json(summarise(a_trace(graph, *said), ["a.py"], "none")))["topics"][0]
     assert told["texts"]["words"] == {"values": ["w0", "w1", "w2", "w3", "w4"], "different": 5}
     assert told["lengths"]["xs"] == [1, 5]
+
+
+def test_booleans_are_described() -> None:
+    """By their different values, in order of appearance, also those of arrays; JSON has them, too."""
+    said = [
+        Message(n * NS_PER_S, "/t", FLOAT, {"data": n > 1, "on": True, "deep": {"off": False}, "all": [False, n > 2]})
+        for n in range(4)
+    ]
+    summary = summarise(a_trace(GraphSnapshot(0, ("/a",), (an_end("publisher"),)), *said), ["a.py"], "none")
+    text = render_summary(summary)
+    assert [line.strip() for line in text.splitlines() if line.startswith("    ")][2:] == [
+        "data: false, true",
+        "on: true",
+        "deep.off: false",
+        "all: 2 elements, false, true",
+    ]
+    (told,) = json.loads(summary_to_json(summary))["topics"]
+    assert told["flags"] == {"data": [False, True], "on": [True], "deep.off": [False], "all[]": [False, True]}
+
+
+def test_what_nobody_offers_is_named() -> None:
+    """A service by its name, an action by its own; not what a node, a simulation or any node of the name offers."""
+    ends = [
+        ServiceEnd("client", "/fibonacci/_action/send_goal", "t/action/F_SendGoal", "/a"),
+        ServiceEnd("client", "/fibonacci/_action/get_result", "t/action/F_GetResult", "/a"),
+        ServiceEnd("client", "/lonely", "std_srvs/srv/Trigger", "/a"),
+        ServiceEnd("client", "/met", "std_srvs/srv/Trigger", "/a"),
+        ServiceEnd("service", "/met", "std_srvs/srv/Trigger", "/b"),
+        ServiceEnd("client", "/simulated", "std_srvs/srv/Trigger", "/a"),
+        ServiceEnd("client", "/b/get_parameters", "rcl_interfaces/srv/GetParameters", "/a"),
+        ServiceEnd("client", "/c/get_parameters", "rcl_interfaces/srv/GetParameters", "/a"),
+    ]
+    trace = a_trace(GraphSnapshot(0, ("/a", "/b"), (), tuple(ends)))
+    notes = summarise(trace, ["a.py"], "none", {}, ["/simulated"]).notes
+    assert [note for note in notes if "nobody offers" in note] == [
+        "/a waits for the action /fibonacci, which nobody offers",
+        "/a waits for the service /lonely, which nobody offers",
+        "/a waits for the service /c/get_parameters, which nobody offers",
+    ]
 
 
 def test_whole_numbers_are_shown_in_full() -> None:
@@ -242,6 +291,143 @@ def test_the_packages_beside_one_are_there(tmp_path: Path, above: str, target: s
     )
     summary = observe(ObserveRequest((tmp_path / above / target,), NS_PER_S, clock="virtual"), lambda _: None)
     assert [r.text for r in summary.records] == ["from the other package"]
+
+
+SAYS = """import rclpy
+from talk_interfaces.msg import Say
+
+def main():
+    rclpy.init()
+    node = rclpy.create_node("talker")
+    out = node.create_publisher(Say, "say", 10)
+    node.create_timer(0.5, lambda: out.publish(Say(text="hi")))
+    rclpy.spin(node)
+"""
+
+
+def an_interface_package(folder: Path) -> None:
+    (folder / "msg").mkdir(parents=True)
+    (folder / "msg" / "Say.msg").write_text("string text\n")
+    (folder / "package.xml").write_text(
+        "<package><name>talk_interfaces</name><member_of_group>rosidl_interface_packages</member_of_group></package>"
+    )
+    (folder / "CMakeLists.txt").write_text('rosidl_generate_interfaces(${PROJECT_NAME} "msg/Say.msg")\n')
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ("package", "beside"), [("src", "src"), ("PYTHON", "CPP"), ("src/repository/packages", "src/repository/packages")]
+)
+@pytest.mark.parametrize("heavy", [False, True])
+def test_a_message_package_is_found_wherever_it_lies(tmp_path: Path, package: str, beside: str, heavy: bool) -> None:
+    """Also in a workspace that is too large to be copied, of which only what is needed is taken."""
+    a_package(tmp_path / package, "talk_py", talker=SAYS)
+    an_interface_package(tmp_path / beside / "talk_interfaces")
+    if heavy:
+        a_package(tmp_path / package, "meshes")
+        for number in range(8):
+            with (tmp_path / package / "meshes" / f"{number}.stl").open("wb") as mesh:
+                mesh.truncate(MAX_FILE_BYTES - 1)
+    summary = observe(ObserveRequest((tmp_path / package / "talk_py" / "talker",), NS_PER_S, clock="virtual"), quiet)
+    assert summary.faults == ()
+    assert [topic.texts["text"][0] for topic in summary.topics] == [("hi",)]
+    taken = "the workspace is too large to be copied: taken are the packages talk_interfaces, talk_py"
+    assert (taken in summary.notes) is heavy
+
+
+@pytest.mark.ros
+def test_a_package_that_colcon_ignores_is_named(tmp_path: Path) -> None:
+    """With the file that is the reason, and no package of another name."""
+    a_package(tmp_path / "src", "talk_py", talker=SAYS)
+    an_interface_package(tmp_path / "src" / "talk_interfaces")
+    (tmp_path / "src" / "talk_interfaces" / "COLCON_IGNORE").touch()
+    summary = observe(ObserveRequest((tmp_path / "src" / "talk_py" / "talker",), NS_PER_S, clock="virtual"), quiet)
+    said = "the package talk_interfaces was left out, as colcon does: there is a file talk_interfaces/COLCON_IGNORE"
+    assert said in summary.notes
+    assert not any("rcl_interfaces" in hint for hint in summary.hints)
+
+
+WAITS = """import rclpy
+from std_srvs.srv import Trigger
+rclpy.init()
+node = rclpy.create_node("waiter", namespace="ns")
+node.declare_parameter("speed", 1.5)
+node.create_service(Trigger, "/reset", lambda request, response: response)
+client = node.create_client(Trigger, "/nobody")
+rclpy.spin(node)
+"""
+
+
+@pytest.mark.ros
+def test_both_clocks_show_services_clients_and_parameters(tmp_path: Path) -> None:
+    """The same ones."""
+    (tmp_path / "waits.py").write_text(WAITS)
+    requests = [ObserveRequest((tmp_path / "waits.py",), 2 * NS_PER_S, clock=clock) for clock in ("virtual", "wall")]
+    virtual, wall = ({(o.kind, o.name, o.detail) for o in observe(one, quiet).offers} for one in requests)
+    assert (
+        virtual
+        == wall
+        == {
+            ("service", "/reset", "std_srvs/srv/Trigger"),
+            ("client", "/nobody", "std_srvs/srv/Trigger"),
+            ("parameter", "/ns/waiter:speed", "1.5"),
+        }
+    )
+
+
+NEEDS = """from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+def generate_launch_description():
+    node = Node(package="student", executable="waits", name=LaunchConfiguration("kind"))
+    return LaunchDescription([DeclareLaunchArgument("kind"), node])
+"""
+
+
+@pytest.mark.ros
+def test_a_built_in_simulation_brings_its_types(tmp_path: Path) -> None:
+    """Although no program names the package turtlesim."""
+    (tmp_path / "waits.py").write_text(WAITS.replace("/nobody", "/clear"))
+    simulations = read_simulations(["turtle"])
+    request = ObserveRequest((tmp_path / "waits.py",), NS_PER_S, clock="virtual", simulations=simulations)
+    assert observe(request, quiet).nodes == ("/ns/waiter",)
+
+
+class Recorder:
+    """A session that records in virtual time alone."""
+
+    def __init__(self, problem: str) -> None:
+        self.problem, self.clocks = problem, list[str]()
+
+    def record(self, jobs: Mapping[str, Job], clock: str, progress: object) -> dict[str, Trace]:
+        """Return a trace for each job."""
+        self.clocks.append(clock)
+        return {key: replace(a_trace(), harness_problem=self.problem) for key in jobs}
+
+
+@pytest.mark.parametrize("problem", ["", "no worker can be started"])
+def test_where_the_machine_is_too_busy_for_the_wall_clock_virtual_time_is_shown(problem: str) -> None:
+    """With the reason, and what it may hide; nothing is judged by a summary."""
+    session, scenario = Recorder(problem), Scenario("observed", ("a.py",), Span(NS_PER_S))
+    held_up = replace(a_trace(), clock=ClockKind.WALL, clock_reason="a.py: it works", harness_problem="too busy")
+    found = observing._in_virtual_time(cast("Any", session), scenario, cast("Any", None), held_up, quiet)
+    assert session.clocks == ["virtual"]
+    assert found == held_up if problem else found.clock is ClockKind.VIRTUAL
+    assert problem or found.notes == (f"{observing._TOO_BUSY} clock: a.py: it works",)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("given", [(), (("kind", "five"),)])
+def test_a_launch_file_gets_its_arguments(tmp_path: Path, given: tuple[tuple[str, str], ...]) -> None:
+    """One that is missing is named, with the option that gives it."""
+    (tmp_path / "waits.py").write_text(WAITS)
+    (tmp_path / "needs.launch.py").write_text(NEEDS)
+    request = ObserveRequest((tmp_path / "needs.launch.py",), NS_PER_S, clock="virtual", launch_arguments=given)
+    summary = observe(request, quiet)
+    assert summary.nodes == (("/ns/five",) if given else ())
+    assert summary.hints == (() if given else ("give it a value: --launch-argument kind:=VALUE",))
 
 
 @pytest.mark.ros

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import re
 import sys
 import textwrap
 from collections.abc import Callable
+from inspect import Parameter
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 import pytest
 
+from grader.runtime.host import launch_names
 from grader.runtime.host.faults import Describer
-from grader.runtime.host.launch_files import describe
+from grader.runtime.host.launch_files import describe, meant_by
 from grader.runtime.worker.notes import left_out_sentence, left_out_words
 
 IMPORTS = """
@@ -29,6 +33,13 @@ from launch.substitutions import (Command, EnvironmentVariable, LaunchConfigurat
 from launch_ros.actions import (ComposableNodeContainer, LifecycleNode, Node, PushRosNamespace, SetParameter, SetRemap)
 from launch_ros.parameter_descriptions import ParameterFile, ParameterValue
 from launch_ros.substitutions import FindPackageShare
+import os
+import launch.events
+from ament_index_python.packages import get_packages_with_prefixes
+from ament_index_python.resources import has_resource
+from launch import Condition as NoCondition
+from launch_ros.events.lifecycle import ChangeState
+from launch_ros.utilities import make_namespace_absolute
 TALKER = dict(package="robot", executable="talker")
 """
 Described = tuple[list[dict[str, Any]], list[dict[str, Any]]]
@@ -38,7 +49,9 @@ Described = tuple[list[dict[str, Any]], list[dict[str, Any]]]
 def described(tmp_path: Path) -> Callable[..., Described]:
     """Evaluate a launch file with these actions."""
 
-    def evaluate(actions: str, arguments: dict[str, str] | None = None, before: str = "", **others: str) -> Described:
+    def evaluate(
+        actions: str, arguments: dict[str, str] | None = None, before: str = "", prefix: str = "", **others: str
+    ) -> Described:
         robot = tmp_path / "robot"
         (robot / "launch").mkdir(parents=True, exist_ok=True)
         (robot / "own.yaml").write_text("/**: {ros__parameters: {rate: 2.0}}\n")
@@ -47,9 +60,9 @@ def described(tmp_path: Path) -> Callable[..., Described]:
         file.write_text(f"{IMPORTS}\ndef generate_launch_description():\n{body}\n")
         for name, text in others.items():
             (robot / "launch" / f"{name}.launch.py").write_text(f"{IMPORTS}\n{text}")
-        with patch.dict(sys.modules):
+        with patch.dict(sys.modules), patch("os.system"), patch("sys.meta_path", [*sys.meta_path]):
             given = ((str(tmp_path),), str(file), {"robot": str(robot)}, arguments or {})
-            return describe(*given, most_nodes=16, most_left_out=50)
+            return describe(*given, prefix=prefix, most_nodes=16, most_left_out=50)
 
     return evaluate
 
@@ -151,12 +164,21 @@ def test_included_files_get_arguments(described: Callable[..., Described]) -> No
 LEFT_OUT = {
     "ExecuteProcess(cmd=['rm', '-rf', '/'])": 'the command "rm -rf /"',
     "RegisterEventHandler(OnProcessExit(target_action=None, on_exit=[]))": "the action RegisterEventHandler",
-    "ComposableNodeContainer(name='c', namespace='')": "the action ComposableNodeContainer",
+    "ComposableNodeContainer(name='c', namespace='', executable='e')": "the action ComposableNodeContainer",
     "Node(**TALKER, parameters=[{'urdf': Command(['xacro ', 'a.urdf'])}])": 'the substitution Command("xacro a.urdf")',
     "SetEnvironmentVariable('PATH', '/x')": "the environment variable PATH",
     "Node(**TALKER, prefix='gdb')": "prefix= of a node",
     "IncludeLaunchDescription('more.launch.xml')": "the launch file more.launch.xml",
     "LogInfo(msg=FindPackageShare('gazebo_ros'))": "what needs the package gazebo_ros",
+    "LogInfo(msg=Node(**TALKER).node_name)": "what needs Node.node_name",
+    "EmitEvent(event=ChangeState(lifecycle_node_matcher=launch.events.matches_action(Node(**TALKER)), "
+    "transition_id=1))": "the action EmitEvent",
+    "Node(**TALKER, name=make_namespace_absolute('a'))": "what needs launch_ros.utilities.make_namespace_absolute",
+    "Node(**TALKER, condition=NoCondition(predicate=len))": "what needs launch.Condition",
+    "LogInfo(msg='', condition=IfCondition('maybe' in get_packages_with_prefixes() and '1' or '1'))": "what needs "
+    "the package maybe",
+    "LogInfo(msg=str(has_resource('packages', 'image_view')))": "what needs the package image_view",
+    "LogInfo(msg=str(os.system('mkdir here')))": 'the command "mkdir here"',
 }
 
 
@@ -233,9 +255,8 @@ def test_what_a_package_that_is_not_here_makes_is_left_out_where_it_is_used(
         before=f"import {package} as absent\nmade = absent.process_file('a.xacro', mappings={{'a': 'b'}})\n",
     )
     assert [node["executable"] for node in nodes] == ["talker"]
-    assert [left_out_words(one) for one in left_out] == [
-        f"what needs the package {package.split('.', maxsplit=1)[0]}"
-    ] * 2
+    (one,) = left_out
+    assert (left_out_words(one), one["count"]) == (f"what needs the package {package.partition('.')[0]}", 2)
 
 
 @pytest.mark.parametrize(
@@ -246,6 +267,205 @@ def test_a_misspelt_package_is_told(described: Callable[..., Described], package
     """A name with a part or a number more may be that of another package."""
     nodes, _ = described(f"Node(package='{package}', executable='talker')")
     assert [node["near"] for node in nodes] == [near]
+
+
+@pytest.mark.parametrize(
+    ("package", "meant"),
+    [("orion5_description", ""), ("robto_description", "robot_description"), ("robot_descripton", "robot_description")],
+)
+def test_a_part_that_two_packages_share_makes_them_no_more_alike(package: str, meant: str) -> None:
+    """Only what differs counts."""
+    assert meant_by(package, ["robot_description", "robot"]) == meant
+
+
+#: Lines of a launch file that end its evaluation, and what is left out then.
+ENDINGS = {
+    "if launch_ros.utilities.is_root_namespace('/'): pass": "what needs launch_ros.utilities.is_root_namespace",
+    "for one in launch.logging.get_output_loggers('a', 'b'): pass": "what needs launch.logging.get_output_loggers",
+    "open(Node.UNSPECIFIED_NODE_NAME)": "what needs Node.UNSPECIFIED_NODE_NAME",
+    "content, prefix = get_resource('packages', 'robot')": "what needs ament_index_python.resources.get_resource",
+    "get_package_share_directory('gazebo_ros')": "what needs the package gazebo_ros",
+    "subprocess.run(['xacro-of-ros', 'a.urdf'])": 'the command "xacro-of-ros a.urdf"',
+    "try:\n    subprocess.run(['xacro-of-ros'])\nexcept ValueError: pass": 'the command "xacro-of-ros"',
+    "try: Node.UNSPECIFIED_NODE_NAME + 'a'\nexcept Exception: pass": "what needs Node.UNSPECIFIED_NODE_NAME",
+}
+
+
+@pytest.mark.parametrize(("line", "what"), ENDINGS.items(), ids=ENDINGS)
+def test_what_a_launch_file_cannot_go_on_without_is_named(
+    described: Callable[..., Described], line: str, what: str
+) -> None:
+    """With its line, and not as a mistake; no `except` for exceptions hides it."""
+    imported = "import subprocess, launch, launch_ros\nfrom ament_index_python.resources import get_resource\n"
+    with patch.dict("os.environ", PATH="/nowhere"), patch("subprocess._USE_VFORK", new=False, create=True):
+        nodes, left_out = described("Node(**TALKER)", before=f"{imported}{line}\n")
+    assert nodes == []
+    ((file, words),) = [(one["file"], left_out_words(one)) for one in left_out]
+    assert (file, words) == ("robot/launch/a.launch.py", what)
+    assert left_out[0]["line"] >= IMPORTS.count("\n") + 5
+
+
+#: What neither ROS nor the grader has: imports, actions and the exception.
+NOWHERE = [
+    ("from launch.substitutions import LaunchConfigurtion", "Node(**TALKER)", "ImportError"),
+    ("from launch.actions import EmitEvnt", "EmitEvnt(event=1)", "ImportError"),
+    ("from launch.event_handlers import OnProcesExit", "Node(**TALKER)", "ImportError"),
+    ("from launch.action import DeclareLaunchArgument", "Node(**TALKER)", "ImportError"),
+    ("from launch_ros.action import Node", "Node(**TALKER)", "ModuleNotFoundError"),
+    ("from launch.substitution import LaunchConfiguration", "Node(**TALKER)", "ImportError"),
+    ("from ament_index_python.packages import get_package_share_dir", "Node(**TALKER)", "ImportError"),
+    ("from ament_index_python.resource import has_resource", "Node(**TALKER)", "ModuleNotFoundError"),
+    ("import launch.event_handlrs", "Node(**TALKER)", "ModuleNotFoundError"),
+    ("import launch", "launch.actions.Nod(**TALKER)", "AttributeError"),
+    ("import launch_ros", "launch_ros.actions.LifecycelNode(**TALKER)", "AttributeError"),
+    ("import launch", "launch.events.match_action(1)", "AttributeError"),
+    ("import launch", "LogInfo(msg=Node(**TALKER).nodename)", "AttributeError"),
+    ("import launch", "EmitEvent(evnt=1)", "TypeError"),
+    ("import launch", "RegisterEventHandler(OnProcessExit(target_acton=None, on_exit=[]))", "TypeError"),
+    ("import launch", "DeclareLaunchArgument('a', defualt_value='1', default_value='2')", "TypeError"),
+    ("import launch", "ExecuteProcess(cmd=['true'], outptu='screen')", "TypeError"),
+    ("import launch", "GroupAction([], scopd=True)", "TypeError"),
+    ("import launch", "SetRemap(source='a', dst='b')", "TypeError"),
+    ("import launch", "LogInfo(message='a')", "TypeError"),
+]
+
+
+@pytest.mark.parametrize(("imported", "action", "error"), NOWHERE, ids=lambda one: one[:60])
+def test_what_ros_does_not_have_is_the_mistake_of_the_launch_file(
+    described: Callable[..., Described], tmp_path: Path, imported: str, action: str, error: str
+) -> None:
+    """Names of modules, classes, functions, attributes and arguments, in what is evaluated and in what is not."""
+    with pytest.raises(Exception, match=r"\S") as raised:
+        described(action, before=f"{imported}\n")
+    assert type(raised.value).__name__ == error
+    assert Describer(str(tmp_path)).exception(raised.value)["code"] == "exception"
+
+
+def test_a_name_of_a_release_whose_names_are_not_known_is_left_out(described: Callable[..., Described]) -> None:
+    """It may exist there."""
+    with patch.dict("os.environ", ROS_DISTRO="kilted"):
+        nodes, left_out = described("launch.actions.Newer(), Node(**TALKER)", before="import launch.newer\n")
+    assert [node["executable"] for node in nodes] == ["talker"]
+    assert [left_out_words(one) for one in left_out] == ["the action Newer"]
+
+
+def test_all_names_of_ros_can_be_imported(described: Callable[..., Described]) -> None:
+    """Each from its module: what is not evaluated is there, too."""
+    lines = [f"from {module} import {', '.join(names.split())}" for module, names in launch_names.MODULES.items()]
+    nodes, left_out = described("", before="\n".join(lines) + "\n")
+    assert (nodes, left_out) == ([], [])
+
+
+GATHERED = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
+
+
+@pytest.mark.parametrize("key", launch_names.CLASSES)
+def test_a_class_takes_what_that_of_ros_takes(described: Callable[..., Described], key: str) -> None:
+    """All required arguments by name; without one, or with another one, it raises what ROS does."""
+    signature = launch_names.signature(key)
+    package, _, name = key.rpartition(".")
+    modules = [one for one, names in launch_names.MODULES.items() if name in names.split() and one.startswith(package)]
+    if signature is None or name.endswith(("Error", "Failure")):
+        return
+    needed = [
+        one.name for one in signature.parameters.values() if one.default is one.empty and one.kind not in GATHERED
+    ]
+    imported = f"from {modules[0]} import {name} as Kind\n"
+    if not any(one.kind in GATHERED for one in signature.parameters.values()):
+        with pytest.raises(TypeError, match="unexpected keyword argument 'nowhere'"):
+            described(f"Kind({''.join(f'{one}=1, ' for one in needed)}nowhere=1)", before=imported)
+    if needed:
+        with pytest.raises(TypeError, match="missing"):
+            described("Kind()", before=imported)
+    every = [one.name for one in signature.parameters.values() if one.kind not in GATHERED]
+    # 1 is no name, no path and no condition, and no action.
+    with pytest.raises(Exception, match=r"\S") as raised:
+        described(f"Kind({''.join(f'{one}=1, ' for one in every)}), 5", before=imported)
+    assert not re.search("unexpected keyword|positional argument", str(raised.value))
+
+
+def test_arguments_may_be_given_by_their_names(described: Callable[..., Described]) -> None:
+    """In whatever order."""
+    nodes, left_out = described(
+        "SetLaunchConfiguration(value='one', name='n'), SetRemap(dst='q', src='p'), PushRosNamespace(namespace='a'),"
+        "Node(**TALKER, name=LaunchConfiguration(variable_name='n'), namespace=Kind(else_value='b', condition='0'))",
+        before="from launch.substitutions import IfElseSubstitution as Kind\n",
+    )
+    assert (ros(nodes), left_out) == ([["-r", "__node:=one", "-r", "__ns:=/a/b", "-r", "p:=q"]], [])
+
+
+def test_own_actions_and_contexts_are_like_those_of_ros(described: Callable[..., Described]) -> None:
+    """A launch file may derive from what launch has."""
+    own = "class Own(Node):\n    def execute(self, context):\n        return super().execute(context)\n"
+    own += "class Two(launch.Action):\n    def execute(self, context):\n        return [Own(**TALKER)]\n"
+    own += "said = LaunchConfiguration('x', default='y').perform(launch.LaunchContext())\n"
+    nodes, left_out = described("Two(), Own(**TALKER, name=said)", before=f"import launch\n{own}")
+    assert (ros(nodes), left_out) == ([[], ["-r", "__node:=y"]], [])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "namespace", "target"),
+    [
+        ("name='a'", None, "/**"),
+        ("", None, "/**"),
+        ("namespace='n'", "/n", "/**"),
+        ("name='a', namespace='n'", "/n", "/n/a"),
+        ("name='a', namespace=''", "/", "/a"),
+        ("name='a', namespace='/'", "/", "/a"),
+    ],
+)
+def test_parameters_are_for_the_node_that_launch_ros_means(
+    described: Callable[..., Described], arguments: str, namespace: str | None, target: str
+) -> None:
+    """Without a namespace in the launch file, the class of the node may set one."""
+    nodes, _ = described(f"Node(**TALKER, parameters=[{{'x': 1}}], {arguments})")
+    assert nodes[0]["parameter_files"][0][1].startswith(json.dumps(target))
+    assert [one for one in ros(nodes)[0] if "__ns" in one] == ([] if namespace is None else [f"__ns:={namespace}"])
+
+
+def test_nodes_that_are_too_many_make_one_note(described: Callable[..., Described]) -> None:
+    """With their number."""
+    nodes, left_out = described("*[Node(**TALKER) for _ in range(18)], Node(**TALKER), LogInfo(msg='')")
+    assert len(nodes) == 16
+    (one,) = left_out
+    assert left_out_sentence(one) == "3 nodes beyond the first 16 were left out: no more are started"
+
+
+def test_a_share_folder_is_as_installed_and_writable(
+    described: Callable[..., Described], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With what setup.py installs under another path and what a launch file writes; places are the submission's."""
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "built"))
+    flat = tmp_path / "built" / "share" / "robot" / "flat.urdf"
+    flat.parent.mkdir(parents=True)
+    flat.write_text("<robot/>")
+    (tmp_path / "robot" / "maps").mkdir(parents=True)
+    (tmp_path / "robot" / "maps" / "a.yaml").write_text("old")
+    share = "get_package_share_directory('robot')"
+    before = f"from pathlib import Path\nshare = {share}\ntext = Path(share, 'flat.urdf').read_text()\n"
+    before += "Path(share, 'maps/a.yaml').write_text(text)\nPath(share, 'new.txt').write_text('')\n"
+    include = (
+        "IncludeLaunchDescription(PythonLaunchDescriptionSource([FindPackageShare('robot'), '/launch/b.launch.py']))"
+    )
+    nodes, left_out = described(
+        f"Node(**TALKER, arguments=[Path(share, 'maps/a.yaml').read_text()]), {include}",
+        before=before,
+        prefix=str(tmp_path / "laid"),
+        b="def generate_launch_description():\n    return LaunchDescription([Node(**TALKER)])\n",
+    )
+    assert left_out == []
+    assert nodes[0]["arguments"] == ["<robot/>"]
+    assert (nodes[1]["file"], nodes[1]["line"]) == ("robot/launch/b.launch.py", IMPORTS.count("\n") + 3)
+    assert (tmp_path / "robot" / "maps" / "a.yaml").read_text() == "old"
+
+
+def test_a_submission_that_cannot_be_written_to_is_no_mistake(described: Callable[..., Described]) -> None:
+    """Elsewhere the launch file could write there."""
+    refused = "raise OSError(30, 'Read-only file system', __file__)\n"
+    _, left_out = described("Node(**TALKER)", before=refused)
+    assert [left_out_words(one) for one in left_out] == ["writing the file a.launch.py"]
+    with pytest.raises(OSError, match="Read-only"):
+        described("Node(**TALKER)", before=refused.replace("__file__", "'/etc/passwd'"))
 
 
 #: What a launch file may do wrong, each in the list of its actions; `ros2 launch` refuses all of it.
@@ -366,7 +586,7 @@ def test_a_mistake_of_a_launch_file_is_its_own(
 
 
 @pytest.mark.parametrize("argument", ["parameters", "name", "remappings", "arguments"])
-@pytest.mark.parametrize("made", ["OnProcessExit(5)", "xacro.load()"])
+@pytest.mark.parametrize("made", ["OnProcessExit(on_exit=5)", "xacro.load()"])
 def test_a_node_with_an_argument_that_is_left_out_is_left_out(
     described: Callable[..., Described], argument: str, made: str
 ) -> None:

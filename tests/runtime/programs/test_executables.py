@@ -11,7 +11,7 @@ from places import TESTS
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.submission import stage_submission
 from grader.runtime.model.submission import StudentFile
-from grader.runtime.programs.executables import find_executable
+from grader.runtime.programs.executables import find_executable, ignored_packages, needed_packages, workspace_of
 
 WORKSPACE = TESTS / "packages" / "workspace"
 NODES = "src/robot/robot/nodes.py"
@@ -85,3 +85,64 @@ def test_a_file_that_is_installed_without_permission_is_found_with_a_note(tmp_pa
         "scripts/talker.py is not installed as a program, so that `ros2 run` may not find it; "
         "install it with install(PROGRAMS ...)",
     )
+
+
+def a_package(folder: Path, name: str, text: str = "") -> Path:
+    (folder / name).mkdir(parents=True)
+    (folder / name / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    (folder / name / "node.py").write_text(text)
+    return folder / name
+
+
+#: Where a package lies, where the one lies that it imports, and its workspace, relative to a folder.
+LAYOUTS = [
+    ("ws/src", "ws/src", "ws/src"),
+    ("ws/src/repository/packages", "ws/src/repository/packages", "ws/src"),
+    ("ws/src/a/b/c", "ws/src/other/d", "ws/src"),
+    ("course/PYTHON", "course/CPP", "course"),
+    ("course", "course", "course"),
+    ("cloned/x/y/z", "cloned/w", "cloned"),
+]
+
+
+@pytest.mark.parametrize("crowded", [False, True])
+@pytest.mark.parametrize(("own", "other", "workspace"), LAYOUTS)
+def test_a_workspace_has_the_packages_that_one_names(
+    tmp_path: Path, own: str, other: str, workspace: str, crowded: bool
+) -> None:
+    """However deep they lie, and whatever else lies beside it."""
+    package = a_package(tmp_path / own, "talk_py", "from talk_interfaces.msg import Say\n")
+    needed = a_package(tmp_path / other, "talk_interfaces")
+    (tmp_path / "cloned" / ".git").mkdir(parents=True)
+    if crowded:
+        a_package(tmp_path / own, "beside")
+    assert workspace_of(package) == tmp_path / workspace
+    assert needed_packages(package, tmp_path / workspace) == sorted([package, needed])
+
+
+def test_a_package_that_names_no_other_has_those_beside_it(tmp_path: Path) -> None:
+    """A launch file may start their programs; what lies further away has nothing to do with it."""
+    package = a_package(tmp_path / "course" / "PYTHON", "talk_py")
+    a_package(tmp_path / "course" / "CPP", "talk_interfaces")
+    assert workspace_of(package) == package
+    a_package(tmp_path / "course" / "PYTHON", "beside")
+    assert workspace_of(package) == tmp_path / "course" / "PYTHON"
+
+
+def test_what_needed_packages_need_is_needed(tmp_path: Path) -> None:
+    """Whichever of their files names it."""
+    one = a_package(tmp_path, "one", "import two")
+    two = a_package(tmp_path, "two", "")
+    (two / "package.xml").write_text("<package><name>two</name><depend>three</depend></package>")
+    three = a_package(tmp_path, "three")
+    a_package(tmp_path, "four", "import one")
+    assert needed_packages(one, tmp_path) == sorted([one, three, two])
+
+
+def test_packages_that_colcon_ignores_are_named(tmp_path: Path) -> None:
+    """Those with COLCON_IGNORE in their own folder, or in one above."""
+    a_package(tmp_path, "one")
+    (a_package(tmp_path, "two") / "COLCON_IGNORE").touch()
+    three = a_package(tmp_path / "group", "three")
+    (tmp_path / "group" / "COLCON_IGNORE").touch()
+    assert ignored_packages(tmp_path) == {"two": tmp_path / "two", "three": three.parent}

@@ -201,6 +201,44 @@ def test_a_mistake_of_the_evaluator_costs_no_points(graded: Callable[..., Exerci
         assert "please report this line" in verdict.reason
 
 
+LACKING = {
+    "from ament_index_python import has_resource\n    has_resource('packages', 'image_view')": "package image_view",
+    "import launch.events\n    str(launch.events.matches_action(1))": "launch.events.matches_action",
+    "os.popen('xacro a.urdf').read()": 'the command "xacro a.urdf"',
+    "open(__file__, 'a').close()": "writing the file robot.launch.py",
+}
+
+
+@pytest.mark.parametrize(("line", "said"), each(LACKING.items(), 3), ids=LACKING.values())
+def test_what_ros_has_and_the_grader_lacks_costs_no_points(
+    graded: Callable[..., ExerciseReport], line: str, said: str
+) -> None:
+    """It is undecided, with its name, however little is left of the launch file."""
+    share = '    share = get_package_share_directory("robot")\n'
+    report = graded((LAUNCH, share, f"    {line}\n{share}"), (LAUNCH, 'name="speaker",', ""))
+    assert report.faults == ()
+    assert outcomes(report)["names"] == "undecided"
+    assert any(said in note for note in report.notes), report.notes
+
+
+def test_what_ros_lacks_too_is_the_mistake_of_the_launch_file(graded: Callable[..., ExerciseReport]) -> None:
+    """Although no node needs it."""
+    share = '    share = get_package_share_directory("robot")\n'
+    report = graded((LAUNCH, share, f"    from launch.actions import EmitEvnt\n{share}"))
+    assert set(outcomes(report).values()) <= {"not_met", "blocked"}
+    (fault,) = report.faults
+    assert fault.text.startswith("ImportError: cannot import name 'EmitEvnt' from 'launch.actions'")
+
+
+def test_a_launch_file_of_viewers_alone_has_no_fault(graded: Callable[..., ExerciseReport]) -> None:
+    """It shows what others do, and lacks nodes of its own."""
+    viewer = 'return LaunchDescription([Node(package="rviz2", executable="rviz2")])\n    share = ""\n'
+    report = graded((LAUNCH, '    share = get_package_share_directory("robot")\n', f"    {viewer}"))
+    assert report.faults == ()
+    assert set(outcomes(report).values()) <= {"not_met", "blocked"}
+    assert any("rviz2/rviz2 was not started" in note for note in report.notes)
+
+
 @pytest.mark.long
 def test_a_misspelt_package_is_a_fault(graded: Callable[..., ExerciseReport]) -> None:
     """`ros2 launch` refuses it, although a program of that name is there."""

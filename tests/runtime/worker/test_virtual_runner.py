@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
@@ -732,3 +733,17 @@ def test_a_flood_goes_on_to_its_limit_on_every_machine(count: int, reason: str, 
     assert run.trace.clock_reason == reason
     assert (len(run.trace.messages("/x")) == 2000) is whole
     assert run.trace.stop_ns < 1000 * MS
+
+
+@pytest.mark.parametrize(("waited_ns", "reason"), [(0, module.BUSY), (2, module.OUTSIDE)])
+def test_of_several_programs_the_one_is_named_that_virtual_time_does_not_suit(waited_ns: int, reason: str) -> None:
+    """One alone needs no name."""
+
+    def student(name: str, *, hides: bool) -> Any:
+        workload = SimpleNamespace(delay=SimpleNamespace(hides=hides), waited_ns=waited_ns, used_ns=1)
+        return SimpleNamespace(name=name, workload=workload, unsettled="")
+
+    several = [student("a.py", hides=False), student("b.py", hides=True), student("c.py", hides=False)]
+    assert module.unfit(several, [], full=False) == f"b.py: {reason}"
+    assert module.unfit(several[1:2], [], full=False) == reason
+    assert module.unfit(several[:1], [], full=False) == ""

@@ -238,7 +238,7 @@ def _missing_module(crash: Crash) -> Clue | None:
     called = named(wanted, 80)
     known = [*MODULES, *PACKAGES, *PLAIN_MODULES, "numpy"]
     near = closest(wanted, known, 0.8)
-    if near and near.count(".") == wanted.count("."):
+    if near and near.count(".") == wanted.count(".") and _has_alike_stem(wanted, near):
         return Clue(f"the module is called {near}, not {called}")
     if wanted.startswith("rclpy."):
         hint = f"there is no {called}; the class Node is in rclpy.node"
@@ -250,6 +250,13 @@ def _missing_module(crash: Crash) -> Clue | None:
     if "." in wanted:
         return None
     return Clue(f"{called} is neither in the submission nor installed here: hand it in, or do without it")
+
+
+def _has_alike_stem(wanted: str, near: str) -> bool:
+    """Return whether two names are alike without the ending that packages of messages share."""
+    ending = next((one for one in _MESSAGE_ENDINGS if wanted.endswith(one) and near.endswith(one)), "")
+    stems = [name.removesuffix(ending) for name in (wanted, near)]
+    return not ending or closest(stems[0], stems[1:], 0.75) != ""
 
 
 def _gives_messages(source: Source, module: str) -> bool:
