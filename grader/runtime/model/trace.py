@@ -387,6 +387,11 @@ class Trace:
     reached: tuple[str, ...] = ()
     # On the wall clock, how long the thread of the nodes that waited most waited for processors that others used
     most_starved_ns: int = 0
+    # How long all threads of the nodes and of the grader's worker together waited for them: nothing is recorded later
+    # than that because the machine was busy
+    all_starved_ns: int = 0
+    # Why no check on the wall clock came to a result; empty if one did, or none was due. The result is then not final.
+    unchecked: str = ""
     # What a launch file asks for and the grader cannot do, as sentences: what is not met may be due to it
     left_out: tuple[str, ...] = ()
     # Programs beside the student's own that were not started, as sentences, each with the one topic, service or action
