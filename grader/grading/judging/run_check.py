@@ -10,7 +10,7 @@ from grader.grading.judging.authored import breach, is_authored, mistake_in, mis
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
 from grader.grading.judging.idle_machine import quicker
-from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package, lacking_python
+from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package, lacking_python, may_differ_by_numpy
 from grader.grading.judging.launched import excuses
 from grader.grading.judging.values import student_endpoints
 from grader.grading.model.exercise import Criterion, Exercise, Finding, ask, of_beginning, reads_sources
@@ -93,7 +93,7 @@ def run_check(
                 "which can be why",
                 suspected=trace.suspected,
             )
-    answer = _for_older_python(answer, scenario, trace)
+    answer = _for_other_numpy(_for_older_python(answer, scenario, trace), scenario, trace, sources or {})
     if not reads_sources(criterion.check):
         return _for_what_is_lacking(answer, criterion, scenario, trace, sources or {})
     return answer if answer.finding is None else replace(answer, finding=_placed(answer.finding, submission))
@@ -127,6 +127,16 @@ def _for_older_python(answer: Answer, scenario: Scenario, trace: Trace) -> Answe
     fault = next((f for f in trace.faults(lack.process) if (f.file, f.line) == (lack.file, lack.line)), None)
     hint = f"grade again on Python {_version(lack.python)}, or write it for Python {_version(lack.here)}"
     return Answer(problem=lack.sentence, hint=hint, fault=fault)
+
+
+def _for_other_numpy(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
+    """Return the answer; no answer if points are lost by a program whose numbers may be other ones on the release."""
+    if answer.finding is None or answer.finding.credit == 1 or trace.other_numpy is None:
+        return answer
+    if not may_differ_by_numpy(trace, scenario.processes, sources):
+        return answer
+    hint = f"grade again with numpy {trace.other_numpy.wanted}, which needs Python 3.12 or older"
+    return Answer(problem=f"{trace.other_numpy.sentence}, which may be the reason why this is not met", hint=hint)
 
 
 def _for_what_is_lacking(

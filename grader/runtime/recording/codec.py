@@ -77,6 +77,7 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
         **({"left_out": list(trace.left_out)} if trace.left_out else {}),
         **({"unstarted": [list(one) for one in trace.unstarted]} if trace.unstarted else {}),
         **({"written": [plain(file) for file in trace.written]} if trace.written else {}),
+        **({"other_numpy": plain(trace.other_numpy)} if trace.other_numpy is not None else {}),
         **({"newer": [plain(one) for one in trace.newer]} if trace.newer else {}),
         **({"author_mistake": asdict(trace.author_mistake)} if trace.author_mistake is not None else {}),
         **({"tested": _tested_to_json(trace.tested)} if trace.tested is not None else {}),
