@@ -360,7 +360,7 @@ class OtherNumpy:
     def sentence(self) -> str:
         """What differs."""
         return (
-            f"the program uses numpy, of which ROS 2 {self.release} has {self.wanted} and this machine {self.here}: the "
+            f"the program uses numpy, of which ROS 2 {self.release} has {self.wanted} and this machine {self.here}: "
             "types and values of results differ (NEP 50)"
         )
 
