@@ -112,7 +112,13 @@ class _Finder(MetaPathFinder):
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """Return the place of a package, if it is one; raises ImportError if it cannot be built."""
-        if path is not None or self._is_looking or not (_MAY_BE_OF_ROS.search(fullname) or self._is_in_package()):
+        if path is not None or not (_MAY_BE_OF_ROS.search(fullname) or self._is_in_package()):
+            return None
+        return self.find(fullname, target)
+
+    def find(self, fullname: str, target: ModuleType | None) -> ModuleSpec | None:
+        """Return the place of what may be a package of ROS; raises ImportError if it cannot be built."""
+        if self._is_looking:
             return None
         self._is_looking = True  # a build looks whether other modules have these names
         try:
@@ -147,7 +153,7 @@ class _BeforeFolders(MetaPathFinder):
         folders = [Path(folder) for folder in found.submodule_search_locations or ()]
         if not any((folder / "package.xml").is_file() for folder in folders):
             return None
-        return self._finder.find_spec(fullname, path, target)
+        return self._finder.find(fullname, target)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

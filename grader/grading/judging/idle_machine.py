@@ -19,9 +19,11 @@ from grader.runtime.model.trace import (
 )
 
 #: On the wall clock, a program that pauses after its work loses the time that it waits for a processor. If it waited
-#: for more than this share of the time, the recording may be another one on an idle machine: at so many higher speeds,
-#: up to that of a program that did not wait, and so much earlier. Longer waits count as the longest.
-_ORDINARY_WAIT, _LONGEST_WAIT, _STEPS = 0.03, 0.5, 8
+#: for more than this share of the time, the recording may be another one on an idle machine: at higher speeds, up to
+#: that of a program that did not wait, and earlier. Longer waits count as the longest.
+_ORDINARY_WAIT, _LONGEST_WAIT = 0.03, 0.9
+#: The number of speeds, a tenth apart at most, which is less than rubrics allow a rate to be wrong; and of delays.
+_SPEEDS, _DELAYS = 24, 8
 
 
 def quicker(trace: Trace) -> Iterator[Trace]:
@@ -34,13 +36,13 @@ def quicker(trace: Trace) -> Iterator[Trace]:
         return
     longest_ns = round(_LONGEST_WAIT * trace.stop_ns)
     slower_ns, late_ns = (min(waited, longest_ns) for waited in (trace.most_starved_ns, trace.all_starved_ns))
-    for step in range(1, _STEPS + 1):
-        left = 1 - slower_ns / trace.stop_ns * step / _STEPS
+    for step in range(1, _SPEEDS + 1):
+        left = (1 - slower_ns / trace.stop_ns) ** (step / _SPEEDS)
         observations = tuple(replace(one, t_ns=round(one.t_ns * left)) for one in trace.observations)
         yield replace(trace, stop_ns=round(trace.stop_ns * left), observations=observations)
-    for step in range(1, _STEPS + 1) if late_ns else ():
-        yield _begun_earlier(trace, late_ns * step // _STEPS)
-        yield _answered_earlier(trace, late_ns * step // _STEPS)
+    for step in range(1, _DELAYS + 1) if late_ns else ():
+        yield _begun_earlier(trace, late_ns * step // _DELAYS)
+        yield _answered_earlier(trace, late_ns * step // _DELAYS)
 
 
 def _begun_earlier(trace: Trace, by_ns: int) -> Trace:

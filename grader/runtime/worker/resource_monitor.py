@@ -47,9 +47,9 @@ UNREAD_BYTES = 224 * MIB
 #: If real time runs out after the nodes spent more than STARVED_SHARE of it waiting for a processor, the machine was
 #: too busy; but not if the nodes themselves used more than OWN_SHARE of all processor time.
 STARVED_SHARE, OWN_SHARE = 0.25, 0.5
-#: Threads and children beside the busiest thread that use more of all processors than this may be why a machine is too
-#: busy. The threads of the middleware use a tenth of that, and of a node with 300 publishers a half.
-OTHERS_SHARE = 0.15
+#: Threads and children that together use more than the busiest thread, and more of all processors than this, may be why
+#: the nodes have to wait. The threads of the middleware use a tenth of that.
+OTHERS_SHARE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +109,8 @@ class ResourceMonitor:
         self._ending = False
         self._polls = self._search_at = 0  # counted in polling intervals
         self._used_bytes = 0
-        self._used_ns = self._waited_ns = self._most_starved_ns = self._others_ns = 0
+        self._used_ns = self._waited_ns = self._most_starved_ns = 0
+        self._others_ns = self._busiest_ns = 0
         self._own_waited_ns = self._own_waiting_ns()
         self._thread = threading.Thread(target=self._watch, name="guard", daemon=True)
 
@@ -125,13 +126,13 @@ class ResourceMonitor:
         """Add to a trace how long threads waited, and a harness problem if waiting used up the time."""
         if trace.clock is ClockKind.WALL:
             self._look_for_waiting()
-            most_ns = 0 if self.fills_machine else max(0, self._most_starved_ns - self._others_ns)
+            most_ns = 0 if self.fills_machine else self._most_starved_ns
             own_ns = self._own_waiting_ns() - self._own_waited_ns
             trace = replace(
                 trace,
                 most_starved_ns=most_ns,
                 all_starved_ns=self.starved_ns + max(0, own_ns) if most_ns else 0,
-                suspected=self._others_ns > OTHERS_SHARE * self._processors * self.real_ns,
+                suspected=self._others_ns > max(self._busiest_ns, OTHERS_SHARE * self._processors * self.real_ns),
             )
         return replace(trace, harness_problem=trace.harness_problem or self.problem)
 
@@ -148,11 +149,8 @@ class ResourceMonitor:
 
     @property
     def starved_ns(self) -> int:
-        """Real time that the nodes have lost to other programs on this machine, in nanoseconds.
-
-        While a thread waits, another runs: what their own threads and children have used is not lost to others.
-        """
-        return 0 if self.fills_machine else max(0, min(self._waited_ns, self.real_ns) - self._others_ns)
+        """Real time that the nodes have lost to other programs on this machine, in nanoseconds."""
+        return 0 if self.fills_machine else min(self._waited_ns, self.real_ns)
 
     @property
     def fills_machine(self) -> bool:
@@ -262,6 +260,7 @@ class ResourceMonitor:
         used = [
             (self._kernel.usage(family).processor_ns, self._kernel.busiest_thread_ns(family)) for family in families
         ]
+        self._busiest_ns = max(self._busiest_ns, max((most_ns for _, most_ns in used), default=0))
         self._others_ns = max(self._others_ns, sum(max(0, whole_ns - most_ns) for whole_ns, most_ns in used))
         waited_ns = self._kernel.threads_starved_ns(pids).values()
         self._waited_ns = max(self._waited_ns, sum(waited_ns))

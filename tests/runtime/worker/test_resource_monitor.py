@@ -121,33 +121,29 @@ def test_a_machine_that_gave_no_time_decides_nothing(waited_ns: int, used_ns: in
 
 
 @pytest.mark.parametrize(
-    ("others_s", "starved_s"), [(0, 50), (40, 10), (60, 0)], ids=["alone", "beside its children", "for its children"]
+    ("main_s", "others_s", "suspected", "fills"),
+    [
+        (50, 1, False, False),
+        (1, 45, False, False),
+        (200, 150, False, False),
+        (150, 200, True, False),
+        (1, 600, True, True),
+    ],
+    ids=["computes", "threads of the middleware", "hardly any", "children", "many children"],
 )
-def test_a_node_that_waits_for_its_own_children_waits_for_nobody_else(others_s: int, starved_s: int) -> None:
-    """While it waits for a processor, another runs: what its own threads and children have used is its own doing."""
+def test_a_node_whose_children_compute_is_a_suspect(main_s: int, others_s: int, suspected: bool, fills: bool) -> None:
+    """Perhaps it waits for them; where they fill the machine, it has waited for nobody else."""
     kernel, student = QuietKernel(), Watched()
-    kernel.told[student.process.pid] = Usage(processor_ns=(1 + others_s) * NS_PER_S)
-    kernel.busiest_ns = NS_PER_S
-    guard = guarding(kernel, student)
+    processors = len(os.sched_getaffinity(0))
+    kernel.told[student.process.pid] = Usage(processor_ns=(main_s + others_s) * processors * NS_PER_S)
+    kernel.busiest_ns = main_s * processors * NS_PER_S
+    guard = guarding(kernel, student, limits=Limits(processor_ns=10**9 * NS_PER_S))
     guard._started_ns -= 1000 * NS_PER_S
     kernel.starved_ns = {"1": 50 * NS_PER_S}
     guard.poll()
     found = guard.reviewed(replace(TRACE, clock=ClockKind.WALL))
-    assert found.most_starved_ns == starved_s * NS_PER_S
-    assert not found.suspected
-
-
-def test_a_node_whose_children_compute_is_a_suspect() -> None:
-    """Even where they get too little to fill the machine: perhaps it is undecided because of them."""
-    kernel, student = QuietKernel(), Watched()
-    processors = len(os.sched_getaffinity(0))
-    kernel.told[student.process.pid] = Usage(processor_ns=(1 + 200 * processors) * NS_PER_S)
-    kernel.busiest_ns = NS_PER_S
-    guard = guarding(kernel, student)
-    guard._started_ns -= 1000 * NS_PER_S
-    guard.poll()
-    assert guard.reviewed(replace(TRACE, clock=ClockKind.WALL)).suspected
-    assert not guard.fills_machine
+    assert (found.suspected, guard.fills_machine) == (suspected, fills)
+    assert found.most_starved_ns == (0 if fills else 50 * NS_PER_S)
 
 
 def test_a_budget_that_is_used_up_ends_the_nodes() -> None:
