@@ -134,7 +134,9 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     written = WrittenFiles(() if request["in_place"] else (request["root"], os.getcwd(), home), kept)
     # Last: what the host imports after this would show up. Where a module of the submission hides another one, rclpy is
     # not imported yet.
-    if not hidden:
+    if hidden:
+        IMPORTS.end()
+    else:
         IMPORTS.hide()
     ending = play(request, describer, link, install_ros)
     try:
@@ -177,6 +179,7 @@ def evaluate(request: dict[str, Any]) -> None:
         request: As for `run`, with `launch`: its `arguments`, the `provided` files of the rubric, name and folder of
             the submission's `packages`, outermost first, and how much is described at `most`; see `describe`.
     """
+    IMPORTS.end()  # a launch file has modules of the grader in place of those that it imports
     machine.install(request["root"])
     link, describer = Link(), Describer()
     link.open(request["fd"])

@@ -35,6 +35,11 @@ class Imports(MetaPathFinder):
         builtins.__import__ = self._noted  # type: ignore[assignment]
         sys.meta_path.insert(0, self)
 
+    def end(self) -> None:
+        """Note no more, and hide nothing."""
+        builtins.__import__ = self._import
+        sys.meta_path[:] = [finder for finder in sys.meta_path if finder is not self]
+
     def hide(self) -> None:
         """Hide all that was imported meanwhile; no more is noted."""
         builtins.__import__ = self._import
