@@ -15,8 +15,9 @@ from importlib.machinery import ModuleSpec, PathFinder
 from types import FrameType, ModuleType
 from typing import Any
 
-#: Never hidden: the program itself, and modules of the grader, whose names no program has.
-_OWN = ("__main__", "sitecustomize", "_grader_host", "_launcher", "_sandbox")
+#: Never hidden: the program itself, modules of the grader, whose names no program has, and what replaces clocks: its
+#: functions are looked up in sys.modules at each call.
+_OWN = ("__main__", "sitecustomize", "_grader_host", "_launcher", "_sandbox", "time_machine", "_time_machine")
 
 
 class Imports(MetaPathFinder):
@@ -66,7 +67,7 @@ class Imports(MetaPathFinder):
         module = self._modules[fullname]
         if self._is_another(fullname, module):
             return None
-        self._hidden.remove(fullname)  # Python itself puts it into sys.modules
+        self._hidden.discard(fullname)  # Python itself puts it into sys.modules
         for name in self._with_imported(fullname):
             self._show(name)
         return ModuleSpec(fullname, _Known(module), origin=getattr(module, "__file__", None))
@@ -91,7 +92,7 @@ class Imports(MetaPathFinder):
 
     def _show(self, name: str) -> None:
         if name in self._hidden:
-            self._hidden.remove(name)
+            self._hidden.discard(name)
             sys.modules[name] = self._modules[name]
         above, last = self._above(name)
         if above is not None and name in self._attributes:
