@@ -33,7 +33,7 @@ class Imports(MetaPathFinder):
 
     def begin(self) -> None:
         """Note imports from now on."""
-        builtins.__import__ = self._noted  # type: ignore[assignment]
+        builtins.__import__ = self._noted
         sys.meta_path.insert(0, self)
 
     def end(self) -> None:
