@@ -10,7 +10,7 @@ import re
 import sys
 from collections.abc import Generator, Iterator, Sequence
 from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Any
@@ -65,12 +65,14 @@ def pytest_configure(config: pytest.Config) -> None:
         "points(N, hint=TEXT, needs=ID): what the test is worth where a rubric names its file; it does nothing here",
     )
 
-    sys.meta_path.append(_Finder(config.rootpath))
+    finder = _Finder(config.rootpath)
+    sys.meta_path.append(finder)
+    sys.meta_path.insert(0, _BeforeFolders(finder))
 
 
 def pytest_unconfigure() -> None:
     """Find no more packages that are not installed."""
-    sys.meta_path[:] = [finder for finder in sys.meta_path if not isinstance(finder, _Finder)]
+    sys.meta_path[:] = [finder for finder in sys.meta_path if not isinstance(finder, (_Finder, _BeforeFolders))]
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -110,7 +112,13 @@ class _Finder(MetaPathFinder):
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """Return the place of a package, if it is one; raises ImportError if it cannot be built."""
-        if path is not None or self._is_looking or not (_MAY_BE_OF_ROS.search(fullname) or self._is_in_package()):
+        if path is not None or not (_MAY_BE_OF_ROS.search(fullname) or self._is_in_package()):
+            return None
+        return self.find(fullname, target)
+
+    def find(self, fullname: str, target: ModuleType | None) -> ModuleSpec | None:
+        """Return the place of what may be a package of ROS; raises ImportError if it cannot be built."""
+        if self._is_looking:
             return None
         self._is_looking = True  # a build looks whether other modules have these names
         try:
@@ -122,6 +130,30 @@ class _Finder(MetaPathFinder):
 
     def _is_in_package(self) -> bool:
         return any((up / "package.xml").is_file() for up in (self.folder, *self.folder.parents))
+
+
+class _BeforeFolders(MetaPathFinder):
+    """Finds a package of ROS whose own folder Python would take for a package of Python without `__init__.py`.
+
+    It is the folder in which its definitions lie, beside a test for instance: nothing can be imported from it.
+    """
+
+    def __init__(self, finder: _Finder) -> None:
+        self._finder = finder
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return the place of such a package; None for any other name."""
+        if path is not None:
+            return None
+        found = PathFinder.find_spec(fullname)
+        if found is None or (found.loader is not None and found.origin is not None):
+            return None
+        folders = [Path(folder) for folder in found.submodule_search_locations or ()]
+        if not any((folder / "package.xml").is_file() for folder in folders):
+            return None
+        return self._finder.find(fullname, target)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 import grader
@@ -27,6 +28,7 @@ from grader.runtime.sandbox.properties import SETTINGS_FOLDER, confined, install
 from grader.runtime.sandbox.tiers import is_for_others, isolation_from_name
 from grader.runtime.supervisor.byte_code import byte_code
 from grader.runtime.supervisor.memory_groups import group_fact
+from grader.runtime.supervisor.numpy_version import other_numpy
 from grader.runtime.weaknesses import BUBBLEWRAP, FAST_DDS, LINUX, kernel_version, known, repaired_here, version_of
 
 #: Disk space that staged submissions, recordings and reports may need at the same time.
@@ -106,6 +108,7 @@ def software(ros: RosInstallation | None) -> Iterator[Fact]:
     yield Fact("grader", grader.__version__)
     yield _python(ros)
     if ros is not None:
+        yield _numpy(ros)
         origin = "Python wheels" if ros.source == "wheels" else "the sourced installation"
         yield Fact("ROS 2", f"{ros.distro}, from {origin} in {ros.prefix}")
         yield Fact("rclpy", ros.rclpy_version)
@@ -122,6 +125,18 @@ def _python(ros: RosInstallation | None) -> Fact:
     newer = ".".join(map(str, wanted))
     lack = f"ROS 2 {ros.distro} runs on Python {newer}: criteria whose programs need it are undecided here"
     return Fact("Python", f"{value}; {lack}", remedy=f"install the grader with python{newer}")
+
+
+def _numpy(ros: RosInstallation) -> Fact:
+    """Report the version of numpy, and whether numbers are other ones on the ROS release."""
+    other = other_numpy(ros.distro)
+    value = version("numpy")
+    if other is None:
+        return Fact("numpy", value)
+    lack = (
+        f"ROS 2 {ros.distro} has numpy {other.wanted}: criteria that programs with numpy do not meet are undecided here"
+    )
+    return Fact("numpy", f"{value}; {lack}", remedy=f"install numpy {other.wanted}, which needs Python 3.12 or older")
 
 
 def weaknesses(ros: RosInstallation | None, repaired: frozenset[str]) -> Iterator[Fact]:

@@ -127,7 +127,8 @@ class RecordingSession:
             on_wall: Whether to record on the wall clock at all. If not, what `auto` would record there is the beginning
                 in virtual time, with the reason.
         """
-        from grader.runtime.supervisor.newer_python import with_newer  # noqa: PLC0415 - as the next one
+        from grader.runtime.supervisor.newer_python import with_newer  # noqa: PLC0415 - as the next ones
+        from grader.runtime.supervisor.numpy_version import other_numpy  # noqa: PLC0415
 
         # After a worker has been started.
         from grader.runtime.supervisor.unrunnable import trace_without_run  # noqa: PLC0415
@@ -142,6 +143,7 @@ class RecordingSession:
         recorded = zip(to_run, self.recorder.each(first, progress), strict=True)
 
         def tell(key: Key, trace: Trace) -> None:
+            trace = replace(trace, other_numpy=other_numpy(self.ros.distro))
             traces[key] = with_newer(trace, jobs[key].plan.root, self.ros.distro) if trace.faults() else trace
             if finished is not None:
                 finished(key, traces[key])

@@ -50,6 +50,10 @@ class Kernel(Protocol):
         """See `threads_starved_ns`."""
         ...
 
+    def busiest_thread_ns(self, pids: Iterable[int]) -> int:
+        """See `busiest_thread_ns`."""
+        ...
+
     def thread_starved_ns(self, pid: int, thread: int | str) -> int:
         """See `thread_starved_ns`."""
         ...
@@ -182,8 +186,18 @@ def threads_starved_ns(pids: Iterable[int]) -> dict[str, int]:
 
 def thread_starved_ns(pid: int, thread: int | str) -> int:
     """Return how long a thread was ready to run but waited for a processor; 0 if the kernel does not count it."""
+    return _schedule(pid, thread)[1]
+
+
+def busiest_thread_ns(pids: Iterable[int]) -> int:
+    """Return the processor time of the thread of processes that has used most; 0 if the kernel does not count it."""
+    return max((_schedule(pid, thread)[0] for pid in pids for thread in _names(f"/proc/{pid}/task")), default=0)
+
+
+def _schedule(pid: int, thread: int | str) -> tuple[int, int]:
+    """Return how long a thread has run and has waited for a processor, from /proc/PID/task/TID/schedstat."""
     fields = _read(f"/proc/{pid}/task/{thread}/schedstat").split()
-    return int(fields[1]) if len(fields) > 1 else 0
+    return (int(fields[0]), int(fields[1])) if len(fields) > 1 else (0, 0)
 
 
 def _status(pid: int) -> tuple[int, int]:

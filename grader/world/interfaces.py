@@ -27,7 +27,9 @@ def workspace_around(folder: Path) -> Path | None:
     if (package / "package.xml").is_file():
         return workspace_of(package)
     source = folder / "src"
-    return source if project_folders(source) else None
+    if project_folders(source):
+        return source
+    return folder if any(folder.glob("*/package.xml")) else None
 
 
 @cache

@@ -111,7 +111,10 @@ TRACES = st.builds(
     clock_reason=_TEXTS,
     notes=_several(_TEXTS),
     harness_problem=_TEXTS,
+    suspected=st.booleans(),
     most_starved_ns=_TIMES,
+    all_starved_ns=_TIMES,
+    unchecked=_TEXTS,
     starts=_several(st.builds(Start, _TEXTS, _TEXTS, st.sampled_from(StartWay), _TEXTS, _several(_TEXTS))),
 )
 

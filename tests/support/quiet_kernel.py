@@ -13,11 +13,13 @@ class QuietKernel:
     Attributes:
         told: What processes use, by their pids; the others use nothing.
         starved_ns: How long each thread of any process has waited for a processor.
+        busiest_ns: The processor time of the busiest thread of any process; None if there is only one.
     """
 
     def __init__(self) -> None:
         self.told: dict[int, Usage] = {}
         self.starved_ns: dict[str, int] = {}
+        self.busiest_ns: int | None = None
 
     def scratch_names(self, pids: Iterable[int]) -> int:
         """Return that no files were made."""
@@ -44,6 +46,10 @@ class QuietKernel:
         """Return how long threads have waited."""
         del pids
         return dict(self.starved_ns)
+
+    def busiest_thread_ns(self, pids: Iterable[int]) -> int:
+        """Return the processor time of the busiest thread."""
+        return self.usage(pids).processor_ns if self.busiest_ns is None else self.busiest_ns
 
     def thread_starved_ns(self, pid: int, thread: int | str) -> int:
         """Return that a thread of this process has never waited."""

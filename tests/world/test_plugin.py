@@ -313,3 +313,37 @@ def test_a_wrong_clock_is_told(suite: pytest.Pytester, options: str, words: str)
     result = run(suite, f"import pytest\n@pytest.mark.ros({options})\ndef test_it(ros): pass\n")
     assert result.ret != 0
     result.stdout.fnmatch_lines([words])
+
+
+BESIDE = """
+from talk_words.msg import Say
+
+def test_it(ros):
+    ros.run("sayer.py")
+    ros.advance(2.5)
+    assert ros.messages("/say") == [Say(text="hi")] * 2
+"""
+SAYER = """
+import rclpy
+from talk_words.msg import Say
+
+rclpy.init()
+node = rclpy.create_node("sayer")
+out = node.create_publisher(Say, "say", 10)
+node.create_timer(1.0, lambda: out.publish(Say(text="hi")))
+rclpy.spin(node)
+"""
+
+
+def test_a_message_package_beside_the_test_is_not_taken_for_a_folder(suite: pytest.Pytester) -> None:
+    """Python would find its folder first, as a package without `__init__.py`, in which there is nothing to import."""
+    package = suite.mkdir("talk_words")
+    (package / "msg").mkdir()
+    (package / "msg" / "Say.msg").write_text("string text\n", encoding="utf-8")
+    (package / "package.xml").write_text(
+        "<package format='3'><name>talk_words</name><member_of_group>rosidl_interface_packages</member_of_group>"
+        "</package>",
+        encoding="utf-8",
+    )
+    (suite.path / "sayer.py").write_text(SAYER, encoding="utf-8")
+    run(suite, BESIDE).assert_outcomes(passed=1)

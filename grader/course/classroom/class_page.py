@@ -212,7 +212,7 @@ def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator
     yield Listing(
         "undecided",
         "Undecided",
-        "Each criterion here says why it is undecided. The same command with --rerun undecided grades these again.",
+        "Each entry says why it is not final. The same command with --rerun undecided grades these again.",
         tuple(entry for k, row in undecided for entry in _undecided(k, row, run)),
     )
     yield Listing(
@@ -285,6 +285,8 @@ def _texts(texts: Sequence[str], run: RunOfClass) -> tuple[PageEntry, ...]:
 
 def _undecided(index: int, row: Row, run: RunOfClass) -> Iterator[PageEntry]:
     for exercise in exercises_of(row.report):
+        if why := exercise.get("unchecked"):
+            yield PageEntry(f"{exercise['title']}: {without_folders(why, run.folders)}", index)
         for criterion in exercise["criteria"]:
             if criterion["outcome"] == "undecided":
                 reason = without_folders(str(criterion["reason"]), run.folders)

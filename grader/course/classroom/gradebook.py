@@ -220,13 +220,15 @@ def _decided(report: ReportData | None, decision: Decision) -> tuple[Fraction | 
         for criterion in exercise["criteria"]:
             id_ = f"{exercise['id']}/{criterion['id']}"
             decided = decision.criteria.get(id_)
+            # Nor are they final while a check is open, which may take them away.
+            open_ = criterion["outcome"] == "undecided" or bool(exercise.get("unchecked"))
             if decided is not None:
                 found[id_] = decided
             if decided is not None and decided.score is not None:
                 points += decided.score
             else:
                 points += exactly(criterion["score"])
-                final = final and criterion["outcome"] != "undecided"
+                final = final and not open_
     return points if final else None, found
 
 
@@ -389,9 +391,12 @@ def remarks(row: Row) -> list[str]:
     if row.adjusted.ignored:
         found.append("does not count")
     if row.status.value == "undecided":
-        theirs = any(map(may_be_theirs, (c for e in exercises_of(row.report) for c in e["criteria"])))
+        found += [f"not final: {shown(why, limit=500)}" for why in unchecked(row.report)]
+        criteria = [c for e in exercises_of(row.report) for c in e["criteria"]]
+        theirs = any(map(may_be_theirs, criteria))
         why = "perhaps because of what the submission does" if theirs else "through no fault of the student"
-        found.append(f"not final: a criterion was not decided, {why}")
+        if any(criterion["outcome"] == Outcome.UNDECIDED.value for criterion in criteria):
+            found.append(f"not final: a criterion was not decided, {why}")
     return found
 
 
@@ -484,6 +489,11 @@ def _points(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, st
 def exercises_of(report: ReportData | None) -> Sequence[ExerciseData]:
     """Return the exercises of a report, none without one."""
     return () if report is None else report["exercises"]
+
+
+def unchecked(report: ReportData | None) -> list[str]:
+    """Return why checks on the wall clock came to no result, each reason once."""
+    return list(dict.fromkeys(filter(None, (exercise.get("unchecked", "") for exercise in exercises_of(report)))))
 
 
 def may_be_theirs(criterion: CriterionData) -> bool:

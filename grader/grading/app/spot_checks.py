@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from grader.grading.judging.agreement import ClockDifference, differences, sentence, start_of
+from grader.grading.judging.idle_machine import quicker
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import ClockKind, Trace
@@ -135,8 +136,8 @@ def check(  # noqa: PLR0913  what to check, with what, and where progress goes
     All are recorded at the same time first. That can make the clocks disagree, never agree, so whatever disagrees is
     recorded again, one at a time, and only this counts.
 
-    If the machine is too busy for a check, the trace in virtual time counts and gets a note. Only for a program that
-    accesses internals of its process, the result is then undecided. Each trace of a checked exercise is passed to
+    If the machine is too busy for a check, the trace in virtual time counts, but the result is not final. For a
+    program that accesses internals of its process, it is undecided. Each trace of a checked exercise is passed to
     `finished`.
     """
     found = dict(traces)
@@ -187,12 +188,21 @@ class _Checked:
         return Job(f"{self.job.title}, checked on the wall clock", plan)
 
     def compared(self, wall: Trace) -> tuple[ClockDifference | None, bool]:
-        """Return the most obvious difference, and whether a busy machine prevented a comparison."""
+        """Return the most obvious difference, and whether a busy machine prevented a comparison.
+
+        What no busy machine can cause comes first, and counts however busy it was.
+        """
         first_message_on = self.job.plan.first_message_on
         starts_ns = start_of(self.recorded, first_message_on), start_of(wall, first_message_on)
         judged = self.judge.compare(self.recorded, wall, starts_ns)
-        found = (*judged.lost, *differences(self.recorded, wall, first_message_on))
-        return next(iter(found), None), bool(found and wall.harness_problem) or (judged.unsure and not found)
+        other = differences(self.recorded, wall, first_message_on)
+        if certain := next((difference for difference in other if not difference.by_load), None):
+            return certain, False
+        found = (*judged.lost, *other)
+        busy = bool(found and wall.harness_problem) or (judged.unsure and not found)
+        if found and not judged.lost:  # the checks of criteria have been asked about an idle machine already
+            busy = busy or any(not differences(self.recorded, one, first_message_on) for one in quicker(wall))
+        return next(iter(found), None), busy
 
     def disagreement(self, record: Record) -> tuple[ClockDifference | None, bool]:
         """Return a difference that occurred in repeated attempts, and whether the machine was too busy to find out."""
@@ -224,7 +234,7 @@ def _agreed(due: Mapping[Key, _Checked], record: Record) -> set[Key]:
 def _unchecked(trace: Trace, *, suspect: bool) -> Trace:
     if suspect:
         return replace(trace, harness_problem=f"{BUSY}, and this submission inspects its own process")
-    return replace(trace, notes=(*trace.notes, f"{BUSY}: what was recorded in virtual time counts"))
+    return replace(trace, unchecked=BUSY)
 
 
 def _decided(

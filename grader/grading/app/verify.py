@@ -40,6 +40,8 @@ KEPT = "kept"
 PROGRAM = (sys.executable, "-m", "grader.grading.app.recorded_again")
 #: A loop that keeps a processor busy as long as the process lives that started it, whose pid is its argument.
 LOOP = "import os, sys\nwhile os.getppid() == int(sys.argv[1]):\n    for _ in range(1_000_000): pass\n"
+#: Why a recording is not compared in which a wait for the middleware has timed out twice.
+LATE = "the machine was too busy: something that was sent or created did not become known in time"
 #: How much of the output of a failed program is shown, in characters.
 _MOST_CHARACTERS = 300
 
@@ -173,7 +175,7 @@ def _record_first(folder: Path, subjects: Sequence[_Subject], isolation: str, pr
         if "trace" in line:
             trace = trace_from_json(line["trace"])
             packed = zlib.compress(json.dumps(line["trace"]).encode(), 1)
-            problem = "" if trace.clock_reason else trace.harness_problem
+            problem = "" if trace.clock_reason else trace.harness_problem or _missing(trace)
             one.first[_key(line)] = _First(packed, len(events(trace)), problem, trace.clock_reason)
         elif "sources" in line:
             one.sources = read_texts(line["sources"])
@@ -215,8 +217,9 @@ def _tried(
         elif "trace" in line:
             one = again[line["number"]]
             trace = trace_from_json(line["trace"])
-            if trace.harness_problem and not trace.clock_reason:
-                counted.problem = counted.problem or trace.harness_problem
+            failed = "" if trace.clock_reason else trace.harness_problem or _missing(trace)
+            if failed:
+                counted.problem = counted.problem or failed
                 continue
             found = first_difference(one.first[_key(line)].trace, trace, one.sources)
             counted.add(Place(one.name, *_key(line)), found)
@@ -224,6 +227,11 @@ def _tried(
     if missed and not counted.problem:
         counted.problem = f"{missed} scenarios were not recorded"
     return counted.tried()
+
+
+def _missing(trace: Trace) -> str:
+    """Return that a recording lacks something because the machine was too busy, even in the second attempt."""
+    return LATE if trace.incomplete else ""
 
 
 @dataclass(slots=True)

@@ -112,6 +112,28 @@ def lacking_python(trace: Trace, processes: Sequence[str], place: Location | Non
     return next((one for one in trace.newer if launched or one.process in processes), None)
 
 
+#: Packages whose results are arrays of numpy, or numbers from one.
+_OF_NUMPY = ("numpy", "cv2", "cv_bridge", "scipy", "sensor_msgs_py")
+#: What a result of another type, or one that does not fit, leads to.
+_NUMBERS_RAISE = ("AssertionError", "OverflowError", "TypeError", "ValueError")
+
+
+def may_differ_by_numpy(trace: Trace, processes: Sequence[str], sources: Mapping[str, str]) -> bool:
+    """Return whether programs of a scenario compute with numpy, and did not end for another reason.
+
+    Args:
+        trace: The recording.
+        processes: The programs; those of a launch file may be any of the sources.
+        sources: Wanted file name -> its text.
+    """
+    launched = any(map(is_launch_file, processes))
+    texts = [text for name, text in sources.items() if launched or name in processes]
+    if not any(_imports(text, package) for text in texts for package in _OF_NUMPY):
+        return False
+    faults = [fault for fault in faults_before_stop(trace) if launched or fault.process in processes]
+    return not faults or any(fault.exception in _NUMBERS_RAISE for fault in faults)
+
+
 def _imports(text: str, package: str) -> bool:
     source = read("", text)
     plain = (alias.name for node in source.all(ast.Import) for alias in node.names)

@@ -111,6 +111,7 @@ def judge_exercise(
         notes=(*variant_notes(exercise.variant), *_notes(recorded, submission, sources), *notes),
         graph=_graph(exercise, traces),
         starts=tuple(dict.fromkeys(start for _, t in recorded for start in t.starts)),
+        unchecked=next((t.unchecked for _, t in recorded if t.unchecked), ""),
     )
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 
 from grader.grading.judging.authored import breach, is_authored, mistake_in, mistake_of
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
-from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package, lacking_python
+from grader.grading.judging.idle_machine import quicker
+from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package, lacking_python, may_differ_by_numpy
 from grader.grading.judging.launched import excuses
 from grader.grading.judging.values import student_endpoints
 from grader.grading.model.exercise import Criterion, Exercise, Finding, ask, of_beginning, reads_sources
@@ -21,11 +22,6 @@ from grader.runtime.model.extras import pip_install
 from grader.runtime.model.scenario import Scenario, is_launch_file
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Request, Response, Trace
-
-#: On the wall clock, a program that pauses after its work loses the time that it waits for a processor. If it waited
-#: for more than this share of the time, what is not met is judged again at so many higher speeds, up to that of a
-#: program that did not wait. Longer waits count as the longest.
-_ORDINARY_WAIT, _LONGEST_WAIT, _SPEEDS = 0.03, 0.5, 8
 
 #: How many gaps between messages show that the first one is unusual.
 _FEWEST_GAPS = 5
@@ -85,23 +81,20 @@ def run_check(
         scenario = replace(scenario, processes=tuple(dict.fromkeys(fault.process for fault in trace.faults())))
     answer = _judged(criterion, scenario, trace, sources)
     if answer.finding is not None and answer.finding.credit < 1:
-        faster = (
-            _judged(criterion, scenario, one, sources).finding
-            for one in trace.once("without waiting", lambda: tuple(_without_waiting(trace)))
-        )
+        faster = (_judged(criterion, scenario, one, sources).finding for one in quicker(trace))
         if any(finding is not None and finding.credit > answer.finding.credit for finding in faster):
             waited = f"{span(trace.most_starved_ns)} of {span(trace.stop_ns)}"
-            return Answer(
-                problem=f"the machine was too busy: the nodes waited {waited} for a processor, which may be the reason"
-            )
+            problem = f"the machine was too busy: the nodes waited {waited} for a processor, which may be the reason"
+            return Answer(problem=problem, suspected=trace.suspected)
         at_once = trace.once("first at once", lambda: _with_first_at_once(trace))
         finding = None if at_once is None else _judged(criterion, scenario, at_once, sources).finding
         if finding is not None and finding.credit > answer.finding.credit:
             return Answer(
                 problem="the machine was too busy: the first message had to wait until its publisher was discovered, "
-                "which can be why"
+                "which can be why",
+                suspected=trace.suspected,
             )
-    answer = _for_older_python(answer, scenario, trace)
+    answer = _for_other_numpy(_for_older_python(answer, scenario, trace), scenario, trace, sources or {})
     if not reads_sources(criterion.check):
         return _for_what_is_lacking(answer, criterion, scenario, trace, sources or {})
     return answer if answer.finding is None else replace(answer, finding=_placed(answer.finding, submission))
@@ -137,6 +130,16 @@ def _for_older_python(answer: Answer, scenario: Scenario, trace: Trace) -> Answe
     return Answer(problem=lack.sentence, hint=hint, fault=fault)
 
 
+def _for_other_numpy(answer: Answer, scenario: Scenario, trace: Trace, sources: Mapping[str, str]) -> Answer:
+    """Return the answer; no answer if points are lost by a program whose numbers may be other ones on the release."""
+    if answer.finding is None or answer.finding.credit == 1 or trace.other_numpy is None:
+        return answer
+    if not may_differ_by_numpy(trace, scenario.processes, sources):
+        return answer
+    hint = f"grade again with numpy {trace.other_numpy.wanted}, which needs Python 3.12 or older"
+    return Answer(problem=f"{trace.other_numpy.sentence}, which may be the reason why this is not met", hint=hint)
+
+
 def _for_what_is_lacking(
     answer: Answer, criterion: Criterion, scenario: Scenario, trace: Trace, sources: Mapping[str, str]
 ) -> Answer:
@@ -165,16 +168,6 @@ def _for_what_is_lacking(
 
 def _version(version: tuple[int, int]) -> str:
     return ".".join(map(str, version))
-
-
-def _without_waiting(trace: Trace) -> Iterator[Trace]:
-    """Yield what an idle machine may have recorded: the trace at a higher speed, in steps up to no waiting at all."""
-    if trace.most_starved_ns <= _ORDINARY_WAIT * trace.stop_ns:
-        return
-    for step in range(1, _SPEEDS + 1):
-        left = 1 - min(trace.most_starved_ns / trace.stop_ns, _LONGEST_WAIT) * step / _SPEEDS
-        observations = tuple(replace(one, t_ns=round(one.t_ns * left)) for one in trace.observations)
-        yield replace(trace, stop_ns=round(trace.stop_ns * left), observations=observations)
 
 
 def _with_first_at_once(trace: Trace) -> Trace | None:

@@ -100,6 +100,7 @@ class ExerciseReport:
     situations: Mapping[str, str] = field(default_factory=dict)
     variant: Variant | None = None  # the values of this student's variant; None if there are none
     starts: tuple[Start, ...] = ()  # how each file was started; empty in reports on evidence of earlier versions
+    unchecked: str = ""  # why a check on the wall clock came to no result; empty if it did, or none was due
 
     @property
     def score(self) -> Fraction:
@@ -169,8 +170,9 @@ class Report:
 
     @property
     def final(self) -> bool:
-        """Whether every criterion was decided."""
-        return all(v.outcome is not Outcome.UNDECIDED for e in self.exercises for v in e.verdicts)
+        """Whether every criterion was decided, and every check that was due came to a result."""
+        decided = all(v.outcome is not Outcome.UNDECIDED for e in self.exercises for v in e.verdicts)
+        return decided and not any(exercise.unchecked for exercise in self.exercises)
 
     @property
     def all_met(self) -> bool:

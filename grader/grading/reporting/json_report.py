@@ -62,6 +62,7 @@ class ExerciseData(TypedDict):
     faults: list[FaultData]
     notes: list[str]
     starts: NotRequired[list[JsonObject]]
+    unchecked: NotRequired[str]
     variant: NotRequired[JsonObject]
 
 
@@ -140,6 +141,7 @@ def _exercise(exercise: ExerciseReport, report: Report) -> Mapping[str, object]:
         "faults": [_fault(fault) for fault in exercise.faults],
         "notes": _notes(exercise, report),
         **({"starts": [start_values(start) for start in exercise.starts]} if exercise.starts else {}),
+        **({"unchecked": exercise.unchecked} if exercise.unchecked else {}),
         **({"variant": {"student": variant.student, "values": dict(variant.values)}} if variant else {}),
     }
 

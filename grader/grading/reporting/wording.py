@@ -75,7 +75,8 @@ def warnings(report: Report) -> list[str]:
         for mistake in dict.fromkeys(filter(None, causes.values()))
     ]
     others = [verdict for verdict in undecided if not causes[verdict.id]]
-    return [*lines, *([_not_final(others)] if others else [])]
+    lines += [_not_final(others)] if others else []
+    return lines + [_unchecked(why) for why in dict.fromkeys(e.unchecked for e in report.exercises) if why]
 
 
 def author_mistakes(report: Report) -> list[str]:
@@ -309,6 +310,10 @@ def _not_final(undecided: Sequence[Verdict]) -> str:
         f"This score is not final: {criteria} undecided through no fault of the student, "
         f"{open_points} points are still open. Grade again."
     )
+
+
+def _unchecked(why: str) -> str:
+    return f"This score is not final: {shown(why)}. Grade again."
 
 
 def _rubric_wrong(mistake: str, undecided: Sequence[Verdict]) -> str:

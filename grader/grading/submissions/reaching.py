@@ -7,6 +7,7 @@ every expression.
 from __future__ import annotations
 
 import ast
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
@@ -43,8 +44,11 @@ _NAMES = _words(
     "rclpy.impl rclpy.impl.implementation_singleton rclpy._rclpy_pybind11 traceback.extract_stack traceback.walk_stack "
     "traceback.format_stack traceback.print_stack traceback.walk_tb traceback.extract_tb traceback.StackSummary "
     "traceback.FrameSummary traceback.TracebackException numpy.datetime64 uuid.uuid1 unittest.mock logging.config "
-    "operator.attrgetter operator.methodcaller string.Formatter sys.path_importer_cache sys.displayhook sys.hash_info"
+    "operator.attrgetter operator.methodcaller string.Formatter sys.path_importer_cache sys.displayhook sys.hash_info "
+    "concurrent.futures.ProcessPoolExecutor numpy.memmap numpy.ctypeslib"
 )
+#: Modules that others of the standard library have as attributes, such as `logging.sys`, under these names.
+_PASSED_ON = _MODULES | _words("sys os _sys _os")
 #: Attributes that reach internals, whatever object they are read from.
 _ATTRIBUTES = _words(
     "__closure__ __globals__ __code__ __wrapped__ __builtins__ __subclasses__ __mro__ __bases__ __getattribute__ "
@@ -54,7 +58,7 @@ _ATTRIBUTES = _words(
     "import_module getrusage CLOCK_PROCESS_CPUTIME_ID CLOCK_THREAD_CPUTIME_ID CLOCK_BOOTTIME CLOCK_MONOTONIC_RAW "
     "CLOCK_REALTIME CLOCK_MONOTONIC handle implementation_singleton rclpy_implementation tm_year tm_mon tm_mday "
     "tm_yday year month day toordinal fromordinal "
-    "__traceback__ tb_next relativeCreated"
+    "__traceback__ tb_next relativeCreated __array_interface__"
 )
 #: Built-in functions that run code or look up names at run time.
 _BUILTINS = _words("exec eval compile __import__ globals locals vars dir memoryview breakpoint id hash")
@@ -114,6 +118,8 @@ def _imports(source: Source) -> Iterator[str]:
             names = [name.name for name in node.names]
         elif isinstance(node, ast.ImportFrom) and not node.level:
             names = [f"{node.module}.{name.name}" for name in node.names]
+            if str(node.module).partition(".")[0] in sys.stdlib_module_names:
+                yield from (f"{node.module}.{name.name}" for name in node.names if name.name in _PASSED_ON)
         else:
             continue
         for name in names:
@@ -127,7 +133,8 @@ def _named(source: Source) -> Iterator[str]:
     for node in source.nodes:
         if isinstance(node, ast.Attribute):
             name = source.resolved(node)
-            if node.attr in _ATTRIBUTES or name in _NAMES:
+            # However a module is reached: `logging.sys.modules` is `sys.modules`.
+            if node.attr in _ATTRIBUTES or name in _NAMES or ".".join(name.split(".")[-2:]) in _NAMES:
                 yield node.attr if node.attr in _ATTRIBUTES else name
             elif node.attr == "__doc__" or (_is_private(node.attr) and chain(node.value) in source.aliases):
                 yield name

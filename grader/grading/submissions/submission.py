@@ -125,9 +125,16 @@ def stage_collected(
         digest=digest,
         files=files,
         notes=(*several, *_unrunnable(files.values(), projects), *collected.notes, *contents.notes),
-        projects=projects,
+        projects=_meant_first(projects, files.values()),
         programs=contents.programs,
     )
+
+
+def _meant_first(projects: Sequence[Project], files: Iterable[StudentFile]) -> tuple[Project, ...]:
+    """Return the packages; of several with one name, that of a file that runs comes first, because the first counts."""
+    found = [file.found for file in files if file.found]
+    own = [p for p in projects if any(not p.folder or name.startswith(f"{p.folder}/") for name in found)]
+    return (*own, *(project for project in projects if project not in own))
 
 
 def _mode(path: str, where: str) -> int:

@@ -21,9 +21,9 @@ from .packages import (
     SCRIPT,
     PackageLayout,
     calls,
+    import_folders,
     layout_of,
     never_true,
-    package_folders,
     parse,
     start_of,
 )
@@ -42,7 +42,8 @@ def path_of(request: Mapping[str, Any]) -> list[str]:
     if not layout.module and layout.package is None:
         return [first]
     imported = (os.path.join(root, folder) for folder in request.get("imported", ()))
-    return list(dict.fromkeys(f for f in (first, *package_folders(root), *imported) if f))
+    packages = import_folders(root, layout.module, layout.base)
+    return list(dict.fromkeys(f for f in (first, *packages, *imported) if f))
 
 
 def _layout_of(request: Mapping[str, Any]) -> PackageLayout:

@@ -23,6 +23,8 @@ def load_package() -> Any:
     package = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = package
     spec.loader.exec_module(package)
+    # First of all: what a program has not imported is hidden from it.
+    importlib.import_module("_grader_host.unseen").IMPORTS.begin()
     return importlib.import_module("_grader_host.program")
 
 

@@ -123,6 +123,25 @@ def package_folders(root: str) -> list[str]:
     return found
 
 
+def import_folders(root: str, module: str, base: str) -> list[str]:
+    """Return the folders of packages that a module of one can import from, with a module of its own package first.
+
+    Of two packages with one name colcon builds one, and the one is meant whose file is named. Python would prefer
+    another one that has an `__init__.py`, wherever that is in its path.
+
+    Args:
+        root: The submission's folder.
+        module: The dotted name of the module that is run; empty for a script.
+        base: The folder that this name is relative to; empty if that is above the submission.
+    """
+    top = module.partition(".")[0]
+    folders = package_folders(root)
+    if not top or not base:
+        return folders
+    others = (f"{top}.py", os.path.join(top, "__init__.py"))
+    return [f for f in folders if f == base or not any(os.path.isfile(os.path.join(f, other)) for other in others)]
+
+
 def walk(root: str) -> Iterator[tuple[str, list[str], list[str]]]:
     """Yield the folders of a submission as `os.walk` does, in order, without those that a tool has made."""
     for folder, folders, files in os.walk(root):

@@ -24,6 +24,7 @@ from .quick_imports import import_without_needless
 from .replaced import guard_methods, hide_frames, rename_functions, without_own_frames
 from .shadows import ROS_PARTS, Around
 from .threads import report_threads
+from .unseen import IMPORTS
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
@@ -131,6 +132,12 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     kept = tuple(os.path.join(home, name) for name in ("log", ".cache", ".config"))
     # Where a program runs in place, whoever started it finds its files there, among as many others as there may be.
     written = WrittenFiles(() if request["in_place"] else (request["root"], os.getcwd(), home), kept)
+    # Last: what the host imports after this would show up. Where a module of the submission hides another one, rclpy is
+    # not imported yet.
+    if hidden:
+        IMPORTS.end()
+    else:
+        IMPORTS.hide()
     ending = play(request, describer, link, install_ros)
     try:
         ending |= clean_up(request["root"], time, watchdog)
@@ -172,6 +179,7 @@ def evaluate(request: dict[str, Any]) -> None:
         request: As for `run`, with `launch`: its `arguments`, the `provided` files of the rubric, name and folder of
             the submission's `packages`, outermost first, and how much is described at `most`; see `describe`.
     """
+    IMPORTS.end()  # a launch file has modules of the grader in place of those that it imports
     machine.install(request["root"])
     link, describer = Link(), Describer()
     link.open(request["fd"])

@@ -13,6 +13,8 @@ class Release:
     fast_dds: int  # major version of Fast DDS, which decides the names in its profiles
     # The Python of its distribution of Linux, which it is released for (REP 2000); None if that is not known
     python: tuple[int, int] | None = None
+    # The numpy of that distribution; None if that is not known. Types of results differ between 1 and 2 (NEP 50)
+    numpy: tuple[int, int] | None = None
     tried: bool = False  # whether this project is tested on it; other releases cause a warning
 
     @property
@@ -24,10 +26,10 @@ class Release:
 RELEASES = {
     release.name: release
     for release in (
-        Release("humble", 2, (3, 10)),
-        Release("iron", 2, (3, 10)),
-        Release("jazzy", 2, (3, 12), tried=True),
-        Release("kilted", 3, (3, 12), tried=True),
+        Release("humble", 2, (3, 10), (1, 21)),
+        Release("iron", 2, (3, 10), (1, 21)),
+        Release("jazzy", 2, (3, 12), (1, 26), tried=True),
+        Release("kilted", 3, (3, 12), (1, 26), tried=True),
     )
 }
 #: The release that is available as wheels, and the default.

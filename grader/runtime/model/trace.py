@@ -349,6 +349,23 @@ class NewerPython:
 
 
 @dataclass(frozen=True, slots=True)
+class OtherNumpy:
+    """Programs run with another major version of numpy here than on the ROS release."""
+
+    here: str  # e.g. `2.4`
+    wanted: str  # that of the release, e.g. `1.26`
+    release: str  # the ROS release, e.g. `jazzy`
+
+    @property
+    def sentence(self) -> str:
+        """What differs."""
+        return (
+            f"the program uses numpy, of which ROS 2 {self.release} has {self.wanted} and this machine {self.here}: "
+            "types and values of results differ (NEP 50)"
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class WrittenFile:
     """A small file that a program wrote beside itself, as its process reports it; no check reads it."""
 
@@ -387,12 +404,18 @@ class Trace:
     reached: tuple[str, ...] = ()
     # On the wall clock, how long the thread of the nodes that waited most waited for processors that others used
     most_starved_ns: int = 0
+    # How long all threads of the nodes and of the grader's worker together waited for them: nothing is recorded later
+    # than that because the machine was busy
+    all_starved_ns: int = 0
+    # Why no check on the wall clock came to a result; empty if one did, or none was due. The result is then not final.
+    unchecked: str = ""
     # What a launch file asks for and the grader cannot do, as sentences: what is not met may be due to it
     left_out: tuple[str, ...] = ()
     # Programs beside the student's own that were not started, as sentences, each with the one topic, service or action
     # that it would use, empty where that is not known: what is not met may be due to what they send or answer
     unstarted: tuple[tuple[str, str], ...] = ()
     written: tuple[WrittenFile, ...] = ()  # of programs that ended in time
+    other_numpy: OtherNumpy | None = None  # what numpy programs run with, if it is not that of the ROS release
     newer: tuple[NewerPython, ...] = ()  # what programs ended of, and would not where the release's own Python runs
     # Whether a wait for the middleware timed out, so that something may be missing: a reason to record again
     incomplete: bool = False

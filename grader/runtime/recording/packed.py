@@ -26,6 +26,7 @@ from grader.runtime.model.trace import (
     NewerPython,
     Observation,
     Offer,
+    OtherNumpy,
     OutputLine,
     Request,
     Response,
@@ -142,7 +143,7 @@ def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: An
 _START = _row_of(Start, "arguments", "launched_by", last=("given", tuple[str, str], ("", "")))
 
 
-_WRITTEN, _NEWER = _row_of(WrittenFile), _row_of(NewerPython)
+_WRITTEN, _NEWER, _OTHER_NUMPY = _row_of(WrittenFile), _row_of(NewerPython), _row_of(OtherNumpy)
 #: The end of a service; its QoS follows in a list, if it is not the usual one.
 _SERVICE_END = _row_of(ServiceEnd, "reliability", "durability", last=("qos", tuple[str, str], ("reliable", "volatile")))
 
@@ -164,11 +165,15 @@ def _trace_row(rows: Iterable[Any]) -> Any:
         ("reached", tuple[str, ...], ()),
         ("incomplete", bool, False),
         ("may_drift", bool, False),
+        ("suspected", bool, False),
         ("most_starved_ns", int, 0),
+        ("all_starved_ns", int, 0),
+        ("unchecked", str, ""),
         ("left_out", tuple[str, ...], ()),
         ("unstarted", tuple[tuple[str, str], ...], ()),
         ("written", tuple[_WRITTEN, ...], ()),  # type: ignore[valid-type]
         ("newer", tuple[_NEWER, ...], ()),  # type: ignore[valid-type]
+        ("other_numpy", _OTHER_NUMPY | None, None),
         ("author_mistake", AuthorMistake | None, None),
         ("tested", _TESTED | None, None),
     ]
@@ -189,11 +194,15 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
         reached=row.reached,
         incomplete=row.incomplete,
         may_drift=row.may_drift,
+        suspected=row.suspected,
         most_starved_ns=row.most_starved_ns,
+        all_starved_ns=row.all_starved_ns,
+        unchecked=row.unchecked,
         left_out=row.left_out,
         unstarted=row.unstarted,
         written=tuple(_same(WrittenFile, file) for file in row.written),
         newer=tuple(_same(NewerPython, one) for one in row.newer),
+        other_numpy=None if row.other_numpy is None else _same(OtherNumpy, row.other_numpy),
         author_mistake=row.author_mistake,
         tested=None if row.tested is None else _tested(row.tested),
     )

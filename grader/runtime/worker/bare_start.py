@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from grader.runtime.host.packages import ENTRY_POINT, layout_of, never_true, package_folders, start_of
+from grader.runtime.host.packages import ENTRY_POINT, import_folders, layout_of, never_true, start_of
 from grader.runtime.model.limits import MAX_PARSED_BYTES, Limits
 from grader.runtime.model.trace import LogRecord, OutputLine
 from grader.runtime.plan import PlannedStart
@@ -60,7 +60,8 @@ def bare_arguments(  # noqa: PLR0913  what is known of a file
     layout = layout_of(str(here), file, installed=installed)
     start = start_of(str(here), file, layout, tree, given.executable, scripts)
     own = [str(here / folder) for folder in imported]
-    folders = [f for f in dict.fromkeys((start.base, layout.base, *package_folders(str(here)), *own)) if f]
+    packages = import_folders(str(here), layout.module, layout.base)
+    folders = [f for f in dict.fromkeys((start.base, layout.base, *packages, *own)) if f]
     seen = [root + folder.removeprefix(str(here)) for folder in folders]
     if layout.module and not layout.base:  # its package is the submission's own folder
         seen.append(str(PurePosixPath(root).parent))

@@ -47,6 +47,9 @@ UNREAD_BYTES = 224 * MIB
 #: If real time runs out after the nodes spent more than STARVED_SHARE of it waiting for a processor, the machine was
 #: too busy; but not if the nodes themselves used more than OWN_SHARE of all processor time.
 STARVED_SHARE, OWN_SHARE = 0.25, 0.5
+#: Threads and children that together use more than the busiest thread, and more of all processors than this, may be why
+#: the nodes have to wait. The threads of the middleware use a tenth of that.
+OTHERS_SHARE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +110,8 @@ class ResourceMonitor:
         self._polls = self._search_at = 0  # counted in polling intervals
         self._used_bytes = 0
         self._used_ns = self._waited_ns = self._most_starved_ns = 0
+        self._others_ns = self._busiest_ns = 0
+        self._own_waited_ns = self._own_waiting_ns()
         self._thread = threading.Thread(target=self._watch, name="guard", daemon=True)
 
     def __enter__(self) -> ResourceMonitor:
@@ -118,10 +123,17 @@ class ResourceMonitor:
         self._thread.join()
 
     def reviewed(self, trace: Trace) -> Trace:
-        """Add to a trace how long a thread waited, and a harness problem if waiting used up the time."""
+        """Add to a trace how long threads waited, and a harness problem if waiting used up the time."""
         if trace.clock is ClockKind.WALL:
             self._look_for_waiting()
-            trace = replace(trace, most_starved_ns=self._most_starved_ns if self.starved_ns else 0)
+            most_ns = 0 if self.fills_machine else self._most_starved_ns
+            own_ns = self._own_waiting_ns() - self._own_waited_ns
+            trace = replace(
+                trace,
+                most_starved_ns=most_ns,
+                all_starved_ns=self.starved_ns + max(0, own_ns) if most_ns else 0,
+                suspected=self._others_ns > max(self._busiest_ns, OTHERS_SHARE * self._processors * self.real_ns),
+            )
         return replace(trace, harness_problem=trace.harness_problem or self.problem)
 
     @property
@@ -138,10 +150,19 @@ class ResourceMonitor:
     @property
     def starved_ns(self) -> int:
         """Real time that the nodes have lost to other programs on this machine, in nanoseconds."""
-        processors = len(os.sched_getaffinity(0))
-        # Nodes that use so much of the machine wait for each other, which is their own fault.
-        their_own = self._used_ns > OWN_SHARE * processors * self.real_ns
-        return 0 if their_own else min(self._waited_ns, self.real_ns)
+        return 0 if self.fills_machine else min(self._waited_ns, self.real_ns)
+
+    @property
+    def fills_machine(self) -> bool:
+        """Whether the nodes use so much of the machine that they wait for each other, which is their own doing."""
+        return self._used_ns > OWN_SHARE * self._processors * self.real_ns
+
+    @property
+    def _processors(self) -> int:
+        return len(os.sched_getaffinity(0))
+
+    def _own_waiting_ns(self) -> int:
+        return sum(self._kernel.threads_starved_ns([os.getpid()]).values())
 
     def _watch(self) -> None:
         intervals = 1
@@ -234,6 +255,13 @@ class ResourceMonitor:
     def _look_for_waiting(self) -> None:
         pids = [pid for family in self._families.values() for pid in family]
         self._used_ns = max(self._used_ns, self._kernel.usage(pids).processor_ns)
+        # Of each program by itself: what several have used in their first threads is no program's second one.
+        families = self._families.values()
+        used = [
+            (self._kernel.usage(family).processor_ns, self._kernel.busiest_thread_ns(family)) for family in families
+        ]
+        self._busiest_ns = max(self._busiest_ns, max((most_ns for _, most_ns in used), default=0))
+        self._others_ns = max(self._others_ns, sum(max(0, whole_ns - most_ns) for whole_ns, most_ns in used))
         waited_ns = self._kernel.threads_starved_ns(pids).values()
         self._waited_ns = max(self._waited_ns, sum(waited_ns))
         self._most_starved_ns = max(self._most_starved_ns, max(waited_ns, default=0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -33,6 +33,9 @@ class Runner(ABC):
         plan: What to run.
         students: The started processes, each waiting for its first answer.
         observer: The grader's node.
+
+    Attributes:
+        fills_machine: Returns whether the nodes use most of the machine themselves; set by whoever watches them.
     """
 
     clock: ClassVar[ClockKind]
@@ -45,6 +48,7 @@ class Runner(ABC):
         self._students = students
         self._observer = observer
         self._stop_ns = 0
+        self.fills_machine: Callable[[], bool] = lambda: False
         self._simulations = Simulations(plan)
         self._transits = {connection.topic: Transit(connection) for connection in plan.connections}
         # Simulations last: of two events at one instant, that of the plan comes first.

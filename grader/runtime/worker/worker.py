@@ -278,7 +278,9 @@ class Worker:
             self.has_started = True
             if plan.clock == ClockKind.WALL.value:
                 stack.enter_context(OutputWatch(students, observer.wake))
-            trace = monitor.reviewed(runner(plan, students, observer).run())
+            run = runner(plan, students, observer)
+            run.fills_machine = lambda: monitor.fills_machine
+            trace = monitor.reviewed(run.run())
             if not plan.bare:
                 end_in_order(students)
             written = tuple(file for student in students for file in student.written)

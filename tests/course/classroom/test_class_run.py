@@ -18,7 +18,7 @@ from class_samples import GRADING, FakeScheduler, course, grade, hand_in, scores
 
 from grader.course.classroom import class_run
 from grader.course.classroom.final_marks import load_mark
-from grader.course.classroom.gradebook import Status
+from grader.course.classroom.gradebook import Status, remarks
 from grader.course.classroom.last_run import read_last_run
 from grader.course.classroom.outputs import Graded, Platforms, render_summary
 from grader.course.classroom.store import SEED_KEY, State, Store, open_store
@@ -124,6 +124,15 @@ def test_rerun_chooses(tmp_path: Path) -> None:
     ran, graded = regraded(tmp_path, rerun="failed")
     assert (ran, graded.graded) == ([], 1)  # eve is refused again, for which nothing runs
     assert regraded(tmp_path, rerun="all")[0] == ["ada", "bob"]
+
+
+def test_a_check_without_a_result_leaves_no_final_score(tmp_path: Path) -> None:
+    """The points so far, and why they are not final, in the gradebook and on the page of the class."""
+    hand_in(tmp_path / "in", bob="unchecked 10")
+    row = regraded(tmp_path)[1].book.rows[0]
+    assert (row.status, row.adjusted.score) == (Status.UNDECIDED, None)
+    assert remarks(row) == ["not final: the machine was too busy for a check"]
+    assert "t: the machine was too busy for a check" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
 
 
 def test_what_is_undecided_has_no_final_score(tmp_path: Path) -> None:

@@ -200,11 +200,43 @@ def test_a_disagreement_that_does_not_come_again_is_none() -> None:
 
 
 def test_a_busy_machine_is_nobodys_mark() -> None:
-    """Of a drawn submission virtual time counts, with a note; of one that a check is about nothing is decided."""
+    """Of a drawn submission virtual time counts, and is not final; of one that a check is about nothing is decided."""
     drawn = checked(Recorder(BUSY, BUSY, BUSY), reaches=(), share=1.0)
     assert drawn.harness_problem == ""
-    assert drawn.notes[-1].startswith("the machine was too busy for a check on the wall clock")
+    assert drawn.unchecked == "the machine was too busy for a check on the wall clock"
     assert checked(Recorder(BUSY, BUSY, BUSY)).harness_problem.startswith("the machine was too busy")
+
+
+def on_wall(
+    *, topic: str = "/x", value: float = RIGHT, rate_hz: float = 20.0, kind: str = "std_msgs/msg/Float32"
+) -> Trace:
+    """Return a recording of a machine that was too busy."""
+    made = TraceBuilder("a.py", clock=ClockKind.WALL).publisher(topic, kind)
+    found = made.messages(topic, kind, {"data": value}, rate_hz=rate_hz).trace()
+    return replace(found, scenario="alone", harness_problem=BUSY.harness_problem, most_starved_ns=9 * S)
+
+
+@pytest.mark.parametrize(
+    "wall",
+    [on_wall(topic="/t1"), on_wall(value=2.0), on_wall(kind="std_msgs/msg/Float64")],
+    ids=["a topic", "a value", "a type"],
+)
+def test_what_no_busy_machine_can_cause_decides_however_busy_it_was(wall: Trace) -> None:
+    """What exists on the wall clock alone was made by the program: nothing excuses it."""
+    same = TraceBuilder("a.py").publisher("/x", FLOAT).messages("/x", FLOAT, {"data": RIGHT}, rate_hz=20.0)
+    decided = checked(
+        Recorder(wall, wall, wall), virtual=replace(same.trace(), scenario="alone"), reaches=(), share=1.0
+    )
+    assert decided.clock is ClockKind.WALL
+
+
+def test_slowness_that_a_busy_machine_explains_is_no_difference() -> None:
+    """A node that waited for a processor for half of the time is half as fast, whatever the loop has noticed."""
+    slow = replace(trace(ClockKind.WALL, rate_hz=11.0), most_starved_ns=5 * S)
+    found = checked(Recorder(slow, slow, slow), reaches=(), share=1.0)
+    assert (found.clock, bool(found.unchecked)) == (ClockKind.VIRTUAL, True)
+    hardly = replace(slow, most_starved_ns=S)
+    assert checked(Recorder(hardly, hardly, hardly), reaches=(), share=1.0).clock is ClockKind.WALL
 
 
 def test_a_busy_machine_is_given_another_try() -> None:

@@ -452,6 +452,7 @@ print(json.dumps({{"number": 0, "sources": {{}}}}))
         ('trace["stop_ns"] = 6', 1, ConditionState.DIFFERENT),
         ('trace["clock_reason"] = "it is late"', 1, ConditionState.DIFFERENT),
         ('trace["harness_problem"] = "the machine was too busy"', 3, ConditionState.FAILED),
+        ('trace["incomplete"] = True; trace["notes"] = ["a message did not arrive"]', 3, ConditionState.FAILED),
         ('line = {"number": 0, "problem": "no space left", "hint": ""}', 3, ConditionState.FAILED),
         ("sys.exit(1)", 3, ConditionState.FAILED),
         ('line = {"number": 0, "sources": {}}', 3, ConditionState.FAILED),

@@ -194,6 +194,53 @@ def test_a_rate_that_a_busy_machine_can_have_lowered_is_undecided(rate: float, s
         )
 
 
+@dataclass(frozen=True)
+class StartsEarly:
+    """An author's own check: the first message comes within half a second."""
+
+    def judge(self, trace: Trace) -> Finding:
+        return Finding(Fraction(trace.messages("/cmd_vel")[0].t_ns <= SECOND // 2), "found")
+
+
+@dataclass(frozen=True)
+class AnswersSoon:
+    """An author's own check: each input is answered within a quarter of a second."""
+
+    def judge(self, trace: Trace) -> Finding:
+        pairs = zip(trace.deliveries("/in"), trace.messages("/out"), strict=True)
+        return Finding(Fraction(all(0 <= out.t_ns - given.t_ns <= SECOND // 4 for given, out in pairs)), "found")
+
+
+@pytest.mark.parametrize(
+    ("late_s", "waited_s", "outcome"),
+    [(0.7, 0.0, "not_met"), (0.7, 0.1, "not_met"), (0.7, 0.5, "undecided"), (0.9, 0.3, "not_met"), (0.3, 0.5, "met")],
+    ids=["idle machine", "hardly waited", "late by the machine", "late anyway", "right anyway"],
+)
+def test_what_a_busy_machine_can_have_delayed_is_undecided_for_every_check(
+    late_s: float, waited_s: float, outcome: str
+) -> None:
+    """A delay passes through several threads, each of which waits: their waits together bound it."""
+    waits = {"most_starved_ns": SECOND // 10 if waited_s else 0, "all_starved_ns": round(waited_s * SECOND)}
+    first = TraceBuilder(FILE, stop_s=2.0).messages("/cmd_vel", TWIST, {}, rate_hz=10, start_s=late_s)
+    answers = TraceBuilder(FILE, stop_s=2.0)
+    for at_s in (0.0, 1.0):
+        answers.delivery(at_s, "/in", "std_msgs/msg/Float32", {"data": at_s})
+    answers.message(0.1, "/out", "std_msgs/msg/Float32", {"data": 0.0})
+    answers.message(1.0 + late_s - 0.25, "/out", "std_msgs/msg/Float32", {"data": 1.0})
+    for check, made in ((StartsEarly(), first), (AnswersSoon(), answers)):
+        trace = replace(made.trace(), clock=ClockKind.WALL, **waits)
+        given = judge_exercise(exercise(criterion("own", check)), {"alone": trace}, handed_in(FILE))
+        assert outcomes(given) == {"own": outcome}
+
+
+def test_a_check_without_a_result_leaves_the_points_and_is_not_final() -> None:
+    """What was recorded in virtual time counts so far."""
+    trace = velocity(20.0, 10.0).trace(unchecked="the machine was too busy for a check")
+    asked = criterion("rate", CHECKS["topic_rate"]("/cmd_vel", 20.0, 1.0))
+    given = judge_exercise(exercise(asked), {"alone": trace}, handed_in(FILE))
+    assert (outcomes(given), given.unchecked) == ({"rate": "met"}, "the machine was too busy for a check")
+
+
 @pytest.mark.parametrize(
     ("clock", "rate", "late_s", "outcome"),
     [

@@ -254,6 +254,17 @@ def test_notes_for_staff_are_shown_on_request_and_never_to_students() -> None:
     assert not [word for word in ("of the machine", "sha256", "reproduce", "isolation") if word in students]
 
 
+def test_a_check_without_a_result_is_said() -> None:
+    """The points stay, and nobody takes them for final ones."""
+    one = exercise("e", "1", "E", criterion("c", "C", 5, Outcome.MET))
+    found = report(replace(one, unchecked="the machine was too busy for a check"))
+    assert not found.final
+    text = " ".join(render(found).split())
+    assert "This score is not final: the machine was too busy for a check. Grade again." in text
+    assert "Final:" not in text
+    assert "5 of 5 points" in text
+
+
 def test_an_undecided_report_says_so_plainly() -> None:
     """Nobody takes a score that is not final for one that is."""
     text = " ".join(render(undecided()).split())

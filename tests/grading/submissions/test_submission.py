@@ -156,6 +156,18 @@ def test_other_files_are_named_for_a_missing_one(
     assert (file.found, file.candidates, file.likely) == (None, candidates, likely)
 
 
+def test_of_two_packages_of_one_name_that_of_the_named_file_counts(work: Path, into: Path) -> None:
+    """Its shared files are installed, and found by launch files: the first of a name counts."""
+    for folder in ("a_first", "b_second", "c_other"):
+        name = "other" if folder == "c_other" else "my_pkg"
+        put(work, f"{folder}/package.xml", f"<package format='3'><name>{name}</name></package>")
+        put(work, f"{folder}/my_pkg/talker.py")
+    meant = {"talker.py": "b_second/my_pkg/talker.py"}
+    found = stage_submission(str(work), ["talker.py"], into, meant)
+    assert [project.folder for project in found.projects] == ["b_second", "a_first", "c_other"]
+    assert found.files["talker.py"].found == meant["talker.py"]
+
+
 def test_one_file_counts_as_a_folder_that_holds_only_it(work: Path, tmp_path: Path, into: Path) -> None:
     """A single file is found, and has the digest of a folder with the same content."""
     file = put(work, "odom_subscriber.py", "import rclpy\n")

@@ -342,6 +342,16 @@ def test_packages_of_a_submission_see_each_other(start: Callable[..., Any]) -> N
     assert start(files, "src/drive/drive/node.py") == ("main, drive.node, main", ["found"])
 
 
+@pytest.mark.parametrize("own_init", [{}, {"b_second/my_pkg/__init__.py": ""}], ids=["without init", "with init"])
+def test_the_package_of_the_file_that_is_named_runs(start: Callable[..., Any], own_init: Mapping[str, str]) -> None:
+    """Not another one of its name, which Python would prefer for its `__init__.py`."""
+    files = {"a_first/my_pkg/__init__.py": "", "a_first/my_pkg/talker.py": "here = 'first'\n", "a_first/setup.py": ""}
+    files |= {"b_second/my_pkg/talker.py": "here = 'second'\n", "b_second/setup.py": "", "tools/setup.py": ""}
+    files |= {"tools/tools/__init__.py": "", "tools/tools/more.py": "x = 1\n", **own_init}
+    files["b_second/my_pkg/main.py"] = "from my_pkg.talker import here\nfrom tools.more import x\nsay(f'{here} {x}')\n"
+    assert "second 1" in str(start(files, "b_second/my_pkg/main.py"))
+
+
 def test_a_package_whose_own_folder_was_handed_in_has_no_name(start: Callable[..., Any]) -> None:
     """Its files know each other by relative imports."""
     files = {

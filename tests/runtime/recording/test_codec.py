@@ -91,7 +91,10 @@ TRACES = st.builds(
     clock_reason=TEXTS,
     notes=st.lists(TEXTS, max_size=3).map(tuple),
     harness_problem=TEXTS,
+    suspected=st.booleans(),
     most_starved_ns=TIMES,
+    all_starved_ns=TIMES,
+    unchecked=TEXTS,
 )
 
 

@@ -6,6 +6,7 @@ import os
 import threading
 import time
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -117,6 +118,32 @@ def test_a_machine_that_gave_no_time_decides_nothing(waited_ns: int, used_ns: in
     guard = watch(kernel, student, Limits(wall_ns=NS_PER_S // 20))
     assert student.stopped == "stopped after 0.05 s of real time"
     assert bool(guard.reviewed(TRACE).harness_problem) is undecided
+
+
+@pytest.mark.parametrize(
+    ("main_s", "others_s", "suspected", "fills"),
+    [
+        (50, 1, False, False),
+        (1, 45, False, False),
+        (200, 150, False, False),
+        (150, 200, True, False),
+        (1, 600, True, True),
+    ],
+    ids=["computes", "threads of the middleware", "hardly any", "children", "many children"],
+)
+def test_a_node_whose_children_compute_is_a_suspect(main_s: int, others_s: int, suspected: bool, fills: bool) -> None:
+    """Perhaps it waits for them; where they fill the machine, it has waited for nobody else."""
+    kernel, student = QuietKernel(), Watched()
+    processors = len(os.sched_getaffinity(0))
+    kernel.told[student.process.pid] = Usage(processor_ns=(main_s + others_s) * processors * NS_PER_S)
+    kernel.busiest_ns = main_s * processors * NS_PER_S
+    guard = guarding(kernel, student, limits=Limits(processor_ns=10**9 * NS_PER_S))
+    guard._started_ns -= 1000 * NS_PER_S
+    kernel.starved_ns = {"1": 50 * NS_PER_S}
+    guard.poll()
+    found = guard.reviewed(replace(TRACE, clock=ClockKind.WALL))
+    assert (found.suspected, guard.fills_machine) == (suspected, fills)
+    assert found.most_starved_ns == (0 if fills else 50 * NS_PER_S)
 
 
 def test_a_budget_that_is_used_up_ends_the_nodes() -> None:

@@ -29,11 +29,14 @@ class Clock:
 
     Args:
         held_up: How many milliseconds the pause takes that begins at a millisecond.
+        work: How many milliseconds of it this process works.
     """
 
-    def __init__(self, held_up: dict[int, int] | None = None) -> None:
+    def __init__(self, held_up: dict[int, int] | None = None, work: dict[int, int] | None = None) -> None:
         self.now_ns = 10**12
         self.held_up = held_up or {}
+        self.work = work or {}
+        self.used_ns = 0
 
     def monotonic_ns(self) -> int:
         return self.now_ns
@@ -41,20 +44,34 @@ class Clock:
     def time_ns(self) -> int:
         return EPOCH_NS + self.now_ns
 
+    def process_time_ns(self) -> int:
+        return self.used_ns
+
     def sleep(self, seconds: float) -> None:
         elapsed_ms = (self.now_ns - 10**12) // MS
+        self.used_ns += self.work.pop(elapsed_ms, 0) * MS
         self.now_ns += self.held_up.pop(elapsed_ms, 1) * MS
 
 
 class Run:
     """One run of some programs: its trace, and everybody who took part."""
 
-    def __init__(self, *programs: Behaviour, held_up: dict[int, int] | None = None, **fields: Any) -> None:
+    def __init__(
+        self,
+        *programs: Behaviour,
+        held_up: dict[int, int] | None = None,
+        work: dict[int, int] | None = None,
+        fills_machine: bool = False,
+        **fields: Any,
+    ) -> None:
         self.world = World()
         self.students = [ScriptedStudent(n, p, self.world) for n, p in zip(("a.py", "b.py"), programs, strict=False)]
         self.observer = ScriptedObserver(self.world)
         students, observer = cast("list[NodeProcess]", self.students), cast("Observer", self.observer)
-        self.trace = WallRunner(plan(clock="wall", **fields), students, observer, real_time=Clock(held_up)).run()
+        clock = Clock(held_up, work)
+        runner = WallRunner(plan(clock="wall", **fields), students, observer, real_time=clock)
+        runner.fills_machine = lambda: fills_machine
+        self.trace = runner.run()
 
 
 def publisher(topic: str, *, every_ms: int, first_ms: int = 0, interface: str = FLOAT) -> Behaviour:
@@ -112,6 +129,22 @@ def test_a_machine_that_did_not_keep_up_is_no_judge() -> None:
     """The reference is the loop itself: held up for long, it says nothing about the nodes."""
     assert Run(quiet, held_up={300: 151}).trace.harness_problem.startswith("the machine was too busy")
     assert Run(quiet, held_up={300: 150}).trace.harness_problem == ""
+    # Nor is one that was held up until after the end: nobody has looked meanwhile.
+    assert Run(quiet, held_up={300: 2000}).trace.harness_problem.startswith("the machine was too busy")
+
+
+def test_what_the_nodes_make_the_grader_do_is_no_busy_machine() -> None:
+    """A graph of hundreds of endpoints, say: what the loop works itself nobody else has taken from it."""
+    assert Run(quiet, held_up={300: 400}, work={300: 300}).trace.harness_problem == ""
+    # Beside other programs the same work is interrupted many times, each time as briefly as ever.
+    assert Run(quiet, held_up={300: 600}, work={300: 300}).trace.harness_problem == ""
+    assert Run(quiet, held_up={300: 400}, work={300: 1}).trace.harness_problem != ""
+    assert Run(quiet, held_up={300: 400}, work={100: 300}).trace.harness_problem != ""
+
+
+def test_nodes_that_fill_the_machine_themselves_are_judged() -> None:
+    """With children that compute, for instance."""
+    assert Run(quiet, held_up={300: 400}, fills_machine=True).trace.harness_problem == ""
 
 
 class RarelyLooking(WallRunner):

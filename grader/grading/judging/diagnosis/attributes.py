@@ -15,6 +15,7 @@ from grader.grading.judging.diagnosis.names import (
     NODE_SLIPS,
     PUBLISHER,
     RCLPY,
+    RCLPY_MODULES,
     SINGLE_NUMBERS,
     article,
     closest,
@@ -116,12 +117,27 @@ def _plain_value(crash: Crash) -> Clue | None:
 def _module_attribute(crash: Crash) -> Clue | None:
     module, name = crash.found.groups()
     if module == "rclpy":
-        return _rclpy_name(name)
+        return _rclpy_module(crash, name) or _rclpy_name(name)
     near = closest(name, FUNCTIONS[module], 0.7)
     if near:
         return Clue(f"{module}.{name} should be {module}.{near}")
     homes = [other for other, names in FUNCTIONS.items() if name in names and other != "rclpy"]
     return Clue(f"{name} is in the module {homes[0]}: write {homes[0]}.{name}") if len(homes) == 1 else None
+
+
+def _rclpy_module(crash: Crash, name: str) -> Clue | None:
+    """A module of rclpy that the file uses without importing it: what imports it elsewhere decides whether it works."""
+    if name not in RCLPY_MODULES:
+        return None
+    used = [crash.source.parents.get(node) for node in _named(crash, name)]
+    names = {node.attr for node in used if isinstance(node, ast.Attribute)}
+    if len(names) != 1:
+        return Clue(f"import rclpy does not import rclpy.{name}: write import rclpy.{name}")
+    (one,) = names
+    whole = f"rclpy.{name}.{one}"
+    return Clue(
+        f"import rclpy does not import rclpy.{name}: write from rclpy.{name} import {one}, and {one} for {whole}"
+    )
 
 
 def _rclpy_name(name: str) -> Clue | None:
@@ -216,9 +232,9 @@ def _published_through(crash: Crash, owner: str) -> Clue | None:  # noqa: PLR091
     return None
 
 
-def _named(crash: Crash) -> list[ast.Attribute]:
+def _named(crash: Crash, name: str = "") -> list[ast.Attribute]:
     """Return the attributes of the missing name on the line."""
-    return [n for n in crash.source.on_line(crash.line, ast.Attribute) if n.attr == crash.found[2]]
+    return [n for n in crash.source.on_line(crash.line, ast.Attribute) if n.attr == (name or crash.found[2])]
 
 
 def _is_called(source: Source, node: ast.AST) -> bool:

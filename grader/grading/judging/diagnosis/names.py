@@ -49,6 +49,12 @@ RCLPY = words(
     "init spin spin_once spin_until_future_complete shutdown try_shutdown ok create_node get_default_context "
     "get_global_executor"
 )
+#: Modules of rclpy that `import rclpy` does not import.
+RCLPY_MODULES = words(
+    "action callback_groups clock client duration event_handler executors lifecycle logging node parameter_client "
+    "parameter_service publisher qos qos_event qos_overriding_options serialization service subscription time "
+    "time_source timer topic_endpoint_info type_support validate_full_topic_name wait_for_message waitable"
+)
 #: Names that other languages and releases use for methods of Node, with the method that is meant.
 NODE_SLIPS = {
     "create_subscriber": "create_subscription",
