@@ -312,10 +312,8 @@ def last_name(node: ast.AST | None) -> str:
 
 
 def chain(node: ast.AST | None) -> str:
-    """Return a dotted name with `()` for calls: `self.get_logger().info`; empty if it starts with anything else.
-
-    Each node keeps its own: a long chain is asked for once for every link.
-    """
+    """Return a dotted name with `()` for calls: `self.get_logger().info`; empty if it starts with anything else."""
+    # each node keeps its own, because a long chain is asked for once for every link
     inner: list[ast.Attribute | ast.Call] = []
     name: str | None = None
     while name is None:
