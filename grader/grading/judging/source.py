@@ -218,8 +218,8 @@ def _kept(text: SourceText) -> ast.Module | None:
     if text.kept is None:
         told = text.tree
         text.kept = (None if told is None else tree_of(told),)
-    (tree,) = text.kept if isinstance(text.kept, tuple) else (None,)
-    return tree
+    tree = text.kept[0] if isinstance(text.kept, tuple) else None
+    return tree if isinstance(tree, ast.Module) else None
 
 
 def source_of(file: str, lines: Sequence[str], tree: ast.Module) -> Source:
