@@ -197,7 +197,7 @@ def _staged(folder: Path | None, exercise: Exercise, session: RecordingSession, 
     return stage_submission(str(folder), exercise.files, root)
 
 
-def _sources(reference: Submission, exercise: Exercise) -> dict[str, str]:
+def _sources(reference: Submission, exercise: Exercise) -> Mapping[str, str]:
     """Read the files of the reference solution; raises RubricError if one cannot be used."""
     sources = read_sources(reference)
     for name in exercise.files:

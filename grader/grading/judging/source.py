@@ -218,8 +218,8 @@ def _kept(text: SourceText) -> ast.Module | None:
     if text.kept is None:
         told = text.tree
         text.kept = (None if told is None else tree_of(told),)
-    (tree,) = text.kept if isinstance(text.kept, tuple) else (None,)
-    return tree
+    tree = text.kept[0] if isinstance(text.kept, tuple) else None
+    return tree if isinstance(tree, ast.Module) else None
 
 
 def source_of(file: str, lines: Sequence[str], tree: ast.Module) -> Source:
@@ -312,10 +312,8 @@ def last_name(node: ast.AST | None) -> str:
 
 
 def chain(node: ast.AST | None) -> str:
-    """Return a dotted name with `()` for calls: `self.get_logger().info`; empty if it starts with anything else.
-
-    Each node keeps its own: a long chain is asked for once for every link.
-    """
+    """Return a dotted name with `()` for calls: `self.get_logger().info`; empty if it starts with anything else."""
+    # each node keeps its own, because a long chain is asked for once for every link
     inner: list[ast.Attribute | ast.Call] = []
     name: str | None = None
     while name is None:

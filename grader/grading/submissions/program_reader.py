@@ -143,12 +143,10 @@ def described(  # noqa: PLR0911  one for each kind of file
 
 def _decoded(content: bytes, encoding: str) -> str | None:
     """Return the text of a file; None if it is not text in its encoding."""
-    marked = content.startswith(_BOM)
-    if marked and encoding != "utf_8":
+    if content.startswith(_BOM) and encoding != "utf_8":
         return None
-    name = "utf_8_sig" if marked else encoding
     try:
-        return io.TextIOWrapper(io.BytesIO(content), name, newline=None).read()
+        return io.TextIOWrapper(io.BytesIO(content.removeprefix(_BOM)), encoding, newline=None).read()
     except (UnicodeError, LookupError):
         return None
 

@@ -336,10 +336,10 @@ def _reached(source: Source, first: _Given, given: _Given) -> set[str]:
         name = left.pop()
         if name and name not in found:
             found.add(name)
-            for value in using.get(name, ()):
-                if value not in reached:
-                    reached.add(value)
-                    left += names_given[value]
+            for holder in using.get(name, ()):
+                if holder not in reached:
+                    reached.add(holder)
+                    left += names_given[holder]
     return found
 
 
