@@ -200,6 +200,8 @@ def stage(targets: Sequence[Target], into: Path) -> Submission:
 
 def _ignored(package: Path, workspace: Path) -> Iterator[str]:
     """Yield a sentence for each package that one names, and that colcon would not build."""
+    if workspace == package:  # all others may be ignored
+        workspace = next((up for up in package.parents if up.name == "src"), package.parent)
     ignored = ignored_packages(workspace)
     named = words_of(package) if ignored else frozenset()
     for name, folder in ignored.items():

@@ -66,7 +66,8 @@ _ALIASES = {"PushRosNamespace": "PushROSNamespace", "RosTimer": "ROSTimer", "Fin
 #: What releases after Jazzy have, or may have brought back to it since.
 LATER: Mapping[str, str] = {
     "launch.actions": ("ForEach ForLoop Log LogDebug LogError LogWarning ScopedIncludeLaunchDescription"),
-    "launch.substitutions": "ForEachVar ForLoopIndex PathSubstitution StringJoinSubstitution",
+    "launch.substitutions": "BooleanSubstitution ForEachVar ForLoopIndex PathSubstitution StringJoinSubstitution",
+    "launch_ros.descriptions": "ComposableLifecycleNode",
 }
 #: Names by module.
 MODULES: Mapping[str, str] = {
