@@ -73,11 +73,11 @@ def _turned(quaternion: Any, transform: TransformStamped) -> Quaternion:
     return Quaternion(w=w, x=x, y=y, z=z)
 
 
-def _point(values: np.ndarray) -> Point:
+def _point(values: NDArray[Any]) -> Point:
     return Point(x=float(values[0]), y=float(values[1]), z=float(values[2]))
 
 
-def _vector(values: np.ndarray) -> Vector3:
+def _vector(values: NDArray[Any]) -> Vector3:
     return Vector3(x=float(values[0]), y=float(values[1]), z=float(values[2]))
 
 
