@@ -463,8 +463,9 @@ class _Words:
             begin, end = _common(texts)
             mine = _tokens(output.text)
             named = any(len(t) >= _LETTERS and t.isalpha() for t in (*begin, *end))
-            rest = len(mine) - len(begin) - len(end)
-            if len(set(texts)) > 1 and named and rest > 0 and mine[: len(begin)] == begin and mine[len(mine) - len(end) :] == end:
+            behind = len(mine) - len(end)
+            alike = behind > len(begin) and mine[: len(begin)] == begin and mine[behind:] == end
+            if len(set(texts)) > 1 and named and alike:
                 return output
         return None
 
