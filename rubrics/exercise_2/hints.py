@@ -123,9 +123,8 @@ def _whole_metres(case: Case) -> Clue | None:
         return None
     cut = [c for c in source.calls("round", "int", "floor", "trunc") if len(c.args) == 1]
     if cut:
-        hint = (
-            f"{source.code(cut[0])} drops the decimals: keep two, {source.code(cut[0].args[0], 50)}:.2f in an f-string"
-        )
+        given = source.code(cut[0].args[0], 50)
+        hint = f"{source.code(cut[0])} drops the decimals: write {{{given}:.2f}} in an f-string"
         return Clue(hint, source.place(cut[0]))
     return Clue("this format drops the decimals: write :.2f in place of :.0f", source.place(call))
 

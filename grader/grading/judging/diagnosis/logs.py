@@ -358,6 +358,34 @@ def _wrong_log(source: Source, log: ast.Call, inside: list[ast.AST]) -> Clue | N
     return Clue(f"{source.code(log, 60)} does not show what was received: log msg.data", source.place(log))
 
 
+#: Functions that convert an angle to radians.
+_TO_RADIANS = ("radians", "deg2rad")
+#: A factor beyond this makes degrees of radians.
+_DEGREES = 50.0
+
+
+@hint_rule("logs_values", outcome=Outcome.NOT_MET, problem=ProblemKind.WRONG_VALUE, priority=11140)
+def _converted_wrongly(case: Case) -> Clue | None:
+    """The line that converts the received number, or the only one that logs it."""
+    source, advice = case.source, case.verdict.hint or case.criterion.hint
+    item = made_for(source, "subscription", case.check.topic)
+    inside = runs(source, item) if item is not None else []
+    wants_degrees = max(map(abs, case.check.unit_factors), default=0.0) > _DEGREES
+    for node in inside:
+        if isinstance(node, ast.Call) and last_name(node.func) in _TO_RADIANS and wants_degrees:
+            code, given = source.code(node, 40), source.code(node.args[0], 30) if node.args else "..."
+            return Clue(f"{code} converts degrees to radians: write math.degrees({given})", source.place(node))
+    scaled = [n for n in inside if isinstance(n, ast.BinOp) and isinstance(n.op, (ast.Mult, ast.Div))]
+    numeric = [
+        n for n in scaled if any(isinstance(p, ast.Constant) and p.value in (180, 57.3, 360) for p in ast.walk(n))
+    ]
+    if numeric and wants_degrees and advice:
+        outer = min(numeric, key=lambda n: n.col_offset)
+        return Clue(f"{source.code(outer, 40)} does not give degrees: {advice}", source.place(outer))
+    logs = [n for n in inside if isinstance(n, ast.Call) and is_log(source, n)]
+    return Clue(advice, source.place(logs[0])) if len(logs) == 1 and advice else None
+
+
 def _logged_at_one_number(source: Source, test: ast.If, every: int) -> Clue | None:
     """Return a clue if a condition compares the counter itself, as in `count == 10`."""
     asked = test.test
