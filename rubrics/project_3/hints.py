@@ -13,6 +13,7 @@ from grader.api import (
     Outcome,
     ProblemKind,
     Source,
+    Switch,
     argument,
     calls_of,
     chain,
@@ -101,25 +102,33 @@ def _charge_as_text(case: Case) -> Clue | None:
 def _other_limit(case: Case) -> Clue | None:
     """The comparison has another limit, includes the limit itself, or is the wrong way round."""
     source, limit = case.source, case.check.threshold
-    here, known = switches(source, limit), switches(source)
+    here, charges = switches(source, limit), [s for s in switches(source) if s.limit.value > 1]
     if len(here) == 1:
-        code, op = source.code(here[0].node, 40), here[0].op
-        good, low = _after(case, "good"), _after(case, "low")
-        if good and low and all(a.warned for a in good) and not all(a.warned for a in low):
-            hint = f"the branches of '{code}' are the wrong way round: above {number(limit)} the mission starts"
-            return Clue(hint, source.place(here[0].node), key="charge")
-        if isinstance(op, ast.GtE):
-            return Clue(f"{code} is true at exactly {number(limit)}: write > instead of >=", source.place(here[0].node))
-        if isinstance(op, ast.Lt):
-            return Clue(
-                f"{code} is false at exactly {number(limit)}: write <= instead of <", source.place(here[0].node)
-            )
-        return None
-    charges = [s for s in known if s.limit.value > 1]
+        return _turned(case, here[0]) or (_at_the_limit(source, here[0]) if case.check.side != "above" else None)
     if here or len(charges) != 1:
         return None
     hint = f"{source.code(charges[0].node, 40)} compares with {number(charges[0].limit.value)}: the limit is "
     return Clue(f"{hint}{number(limit)}", source.place(charges[0].limit.origin), key="charge")
+
+
+def _turned(case: Case, switch: Switch) -> Clue | None:
+    """Return a clue if the client warns above the limit, and not below it."""
+    good, low = _after(case, "good"), _after(case, "low")
+    if not good or not low or not all(a.warned for a in good) or all(a.warned for a in low):
+        return None
+    code = case.source.code(switch.node, 40)
+    hint = f"the branches of '{code}' are the wrong way round: above {number(case.check.threshold)} the mission starts"
+    return Clue(hint, case.source.place(switch.node), key="charge")
+
+
+def _at_the_limit(source: Source, switch: Switch) -> Clue | None:
+    """Return a clue if a comparison takes the limit itself for a number above it."""
+    code, limit = source.code(switch.node, 40), number(switch.limit.value)
+    if isinstance(switch.op, ast.GtE):
+        return Clue(f"{code} is true at exactly {limit}: write > instead of >=", source.place(switch.node))
+    if isinstance(switch.op, ast.Lt):
+        return Clue(f"{code} is false at exactly {limit}: write <= instead of <", source.place(switch.node))
+    return None
 
 
 @hint_rule("reacts_to_responses", outcome=Outcome.NOT_MET, priority=3143)

@@ -313,7 +313,8 @@ def _rare(case: Case) -> Case | None:
     late = case.is_about(ProblemKind.TOO_LATE) and bool(case.serves)
     few = missing is not None and missing.missing > 0
     slow = pace is not None and (pace.average_s > pace.wanted_s or case.is_about(ProblemKind.STOPPED))
-    return case if late or few or slow or case.is_about(ProblemKind.NOT_LOGGED) else None
+    heard = case.is_about(ProblemKind.NOT_LOGGED) and (bool(case.logs) or case.criterion.check_name.startswith("logs_"))
+    return case if late or few or slow or heard else None
 
 
 @hint_rule(given=_rare, priority=11105)
