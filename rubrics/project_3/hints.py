@@ -237,7 +237,7 @@ def _went_on_after(case: Case) -> str:
     if not isinstance(moment_s, (int, float)):
         return ""
     found = [e for e in episodes if e.start_ns <= moment_s * 1e9 + 1 and moment_s * 1e9 <= e.stop_ns]
-    return found[-1].kind.value if found else ""
+    return str(found[-1].kind.value) if found else ""
 
 
 # --- the server -------------------------------------------------------------------------------------------------------
