@@ -110,6 +110,10 @@ def _added_up(case: Case) -> Clue | None:
     for statement in inside:
         if isinstance(statement, ast.AugAssign) and chain(statement.value).endswith((".x", ".y")):
             target = source.code(statement.target)
+            if any(
+                chain(n.left) == chain(statement.target) and isinstance(n.op, ast.Div) for n in source.all(ast.BinOp)
+            ):
+                continue  # a mean, and it is meant to be one
             hint = f"{source.code(statement)} adds all positions up: write {target} = {source.code(statement.value)}"
             return Clue(hint, source.place(statement))
     return None

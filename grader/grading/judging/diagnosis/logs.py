@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import re
 
 from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, log_call
@@ -361,6 +362,8 @@ def _wrong_log(source: Source, log: ast.Call, inside: list[ast.AST]) -> Clue | N
 
 #: Functions that convert an angle to radians.
 _TO_RADIANS = ("radians", "deg2rad")
+#: How many operators of a conversion are followed.
+_DEEPEST_FACTOR = 12
 #: A factor beyond this makes degrees of radians.
 _DEGREES = 50.0
 
@@ -377,14 +380,27 @@ def _converted_wrongly(case: Case) -> Clue | None:
             code, given = source.code(node, 40), source.code(node.args[0], 30) if node.args else "..."
             return Clue(f"{code} converts degrees to radians: write math.degrees({given})", source.place(node))
     scaled = [n for n in inside if isinstance(n, ast.BinOp) and isinstance(n.op, (ast.Mult, ast.Div))]
-    numeric = [
-        n for n in scaled if any(isinstance(p, ast.Constant) and p.value in (180, 57.3, 360) for p in ast.walk(n))
-    ]
-    if numeric and wants_degrees and advice:
-        outer = min(numeric, key=lambda n: n.col_offset)
-        return Clue(f"{source.code(outer, 40)} does not give degrees: {advice}", source.place(outer))
+    whole = [n for n in scaled if source.parents.get(n) not in scaled]
+    wrong = [n for n in whole if _factor(source, n) not in (None, 1.0) and not _is_degrees(_factor(source, n))]
+    if len(wrong) == 1 and wants_degrees and advice:
+        return Clue(advice, source.place(wrong[0]))
     logs = [n for n in inside if isinstance(n, ast.Call) and is_log(source, n)]
     return Clue(advice, source.place(logs[0])) if len(logs) == 1 and advice else None
+
+
+def _factor(source: Source, node: ast.AST, depth: int = 0) -> float | None:
+    """Return what a product or quotient multiplies its only unknown part by; None if the text does not show it."""
+    if not isinstance(node, ast.BinOp) or depth > _DEEPEST_FACTOR:
+        worth = number_in_code(source, node)
+        return 1.0 if worth is None else worth
+    left, right = _factor(source, node.left, depth + 1), _factor(source, node.right, depth + 1)
+    if left is None or right is None or not isinstance(node.op, (ast.Mult, ast.Div)):
+        return None
+    return left * right if isinstance(node.op, ast.Mult) else left / right if right else None
+
+
+def _is_degrees(factor: float | None) -> bool:
+    return factor is not None and math.isclose(factor, math.degrees(1.0), rel_tol=1e-3)
 
 
 def _logged_at_one_number(source: Source, test: ast.If, every: int) -> Clue | None:

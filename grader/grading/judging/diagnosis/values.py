@@ -546,7 +546,7 @@ def _value_line(case: Case) -> Clue | None:
     places = given_leaf(case.source, case.check.field.rpartition(".")[2])
     if len(places) != 1 or not case.verdict.hint:
         return None
-    return Clue(f"{case.source.code(places[0])}: {case.verdict.hint}", case.source.place(places[0]))
+    return Clue(case.verdict.hint, case.source.place(places[0]))
 
 
 @hint_rule("random_in_range", problem=ProblemKind.NO_NUMBER, priority=10160)
