@@ -331,7 +331,7 @@ def _doubled(name: str, known: list[str]) -> str:
     def single(text: str) -> str:
         return re.sub(r"(.)\1+", r"\1", text)
 
-    near = [other for other in dict.fromkeys(known) if single(other) == single(name)]
+    near = [other for other in dict.fromkeys(known) if other != name and single(other) == single(name)]
     return near[0] if len(near) == 1 else ""
 
 
