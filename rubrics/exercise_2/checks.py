@@ -146,8 +146,10 @@ class LogsPosition:
 
     def _coarse(self, found: Analysis, track: Track) -> Finding | None:
         """Return half credit for positions in metres without decimals, if the path is short for that; else None."""
-        pairs = [_pair(e, g.pair) for g in found.groups if g.pair for e in g.entries if e.right]
-        steps = [min(n.step for n in pair) for pair in pairs]
+        shown = [
+            (e, pair) for g in found.groups for e in g.entries if e.right for pair in _hits(e, g.pairs, track, position)
+        ]
+        steps = [min(n.step for n in _pair(e, pair)) for e, pair in shown]
         # what can be read in another way, such as -2,51 with a decimal comma, may have decimals
         plain = all(sum(map(bool, readings(e.text))) == 1 for e in found.right)
         if not steps or not plain or min(steps) < max(1.0, _COARSE * max(track.spans)):

@@ -367,18 +367,18 @@ def pauses(source: Source) -> list[Pause]:
     """Return the sleeps that hold callbacks up: those in a callback, and those beside `spin_once` in a loop."""
     found: dict[ast.Call, Pause] = {}
     for node in callback_nodes(source):
-        if _sleeps(source, node):
+        if _sleeps(node, source):
             found.setdefault(node, Pause(node, number_in_code(source, argument(node, 0, "secs"))))
     for loop in source.loops():
         inside = list(reached(source, [loop]))
         spun = next((n for n in inside if isinstance(n, ast.Call) and last_name(n.func) == "spin_once"), None)
         for node in inside if spun is not None else ():
-            if _sleeps(source, node):
+            if _sleeps(node, source):
                 found.setdefault(node, Pause(node, number_in_code(source, argument(node, 0, "secs")), spun))
     return sorted(found.values(), key=lambda pause: first_line(pause.call))
 
 
-def _sleeps(source: Source, node: ast.AST) -> TypeGuard[ast.Call]:
+def _sleeps(node: ast.AST, source: Source) -> TypeGuard[ast.Call]:
     if not isinstance(node, ast.Call) or not (node.args or node.keywords):
         return False
     return chain(node.func) in ("time.sleep", "sleep") or source.resolved(node.func) == "time.sleep"
