@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     from grader.grading.judging.diagnosis.values import draws as draws
     from grader.grading.judging.diagnosis.wiring import Constant as Constant
     from grader.grading.judging.diagnosis.wiring import Made as Made
+    from grader.grading.judging.diagnosis.wiring import Pause as Pause
+    from grader.grading.judging.diagnosis.wiring import Switch as Switch
     from grader.grading.judging.diagnosis.wiring import conditions as conditions
     from grader.grading.judging.diagnosis.wiring import constant as constant
     from grader.grading.judging.diagnosis.wiring import elsewhere_because as elsewhere_because
@@ -59,6 +61,7 @@ if TYPE_CHECKING:
     from grader.grading.judging.diagnosis.wiring import names_in as names_in
     from grader.grading.judging.diagnosis.wiring import node_made as node_made
     from grader.grading.judging.diagnosis.wiring import number_in_code as number_in_code
+    from grader.grading.judging.diagnosis.wiring import pauses as pauses
     from grader.grading.judging.diagnosis.wiring import publish_calls as publish_calls
     from grader.grading.judging.diagnosis.wiring import python_loggers as python_loggers
     from grader.grading.judging.diagnosis.wiring import reached as reached
@@ -67,7 +70,9 @@ if TYPE_CHECKING:
     from grader.grading.judging.diagnosis.wiring import runs as runs
     from grader.grading.judging.diagnosis.wiring import short as short
     from grader.grading.judging.diagnosis.wiring import spins as spins
+    from grader.grading.judging.diagnosis.wiring import switches as switches
     from grader.grading.judging.diagnosis.wiring import target_of as target_of
+    from grader.grading.judging.diagnosis.wiring import text_comparisons as text_comparisons
     from grader.grading.judging.diagnosis.wiring import text_in_code as text_in_code
     from grader.grading.judging.diagnosis.wiring import timer_code as timer_code
     from grader.grading.judging.diagnosis.wiring import used as used
@@ -312,7 +317,7 @@ CONTENTS: dict[str, dict[str, str]] = {
             "Constant Made constant given_leaf made made_for target_of roots reached runs names_in is_log "
             "publish_calls used conditions is_flag spins node_made variable_of timer_code short received "
             "message_classes value_of number_in_code text_in_code elsewhere_because goes_to head_of "
-            "python_loggers waits_for_ever"
+            "python_loggers waits_for_ever Switch switches text_comparisons Pause pauses"
         ),
     },
     "Report formats": {

@@ -56,6 +56,7 @@ from grader.api import (
     number,
     number_at,
     only_printed,
+    partly,
     per_trace,
     printed_lines,
     printed_numbers,
@@ -76,6 +77,9 @@ from grader.api import (
 X = "pose.pose.position.x"
 Y = "pose.pose.position.y"
 _LOGGER_HINT = "write the position through the node's logger: self.get_logger().info(...)"
+_DECIMALS_HINT = "keep a decimal or two: f'x={x:.2f}, y={y:.2f}'"
+#: Positions in whole metres are coarse where this share of the path's extent is less than a metre.
+_COARSE = 0.05
 _TIMER_HINT = "log from a timer of that period, or give the logger throttle_duration_sec"
 #: Longest gap between two logs, and longest wait at both ends of the stream, in periods.
 _LONGEST_GAP = 2.2
@@ -105,7 +109,8 @@ class LogsPosition:
     """A process logs the (x, y) of the odometry that is played, with any wording, to the precision that it prints.
 
     A logged pair must show a pose that was current when it was written: the newest one, or one replaced less than half
-    a second before. Positions that are printed instead of logged give half the points.
+    a second before. Positions that are printed instead of logged give half the points, and so do positions without
+    decimals, unless the path is longer than 20 m.
 
     Attributes:
         process: File name of the student process.
@@ -118,7 +123,8 @@ class LogsPosition:
 
     @property
     def expected(self) -> str:
-        return f"{self.process} logs the x and y that {self.topic} had at that moment; half the points if only printed"
+        text = f"{self.process} logs the x and y that {self.topic} had at that moment"
+        return f"{text}; half the points if only printed, or without decimals"
 
     def judge(self, trace: Trace) -> Finding:
         track = _track(trace, self.process, self.topic)
@@ -126,7 +132,7 @@ class LogsPosition:
             return track
         logged = logged_positions(trace, self.process, track)
         if self._shows(trace, logged):
-            return met(self._right(logged), _evidence(logged))
+            return self._coarse(logged, track) or met(self._right(logged), _evidence(logged))
         printed = printed_positions(trace, self.process, track)
         if self._shows(trace, printed):
             return only_printed(f"{self._right(printed)}, printed and not logged", _evidence(printed), _LOGGER_HINT)
@@ -137,6 +143,24 @@ class LogsPosition:
         """Return whether the position is logged; `log_period` judges how often, unless a fault cut it short."""
         lived = first_fault(trace, self.process) is None
         return found.met or (lived and bool(found.right) and not found.wrong)
+
+    def _coarse(self, found: Analysis, track: Track) -> Finding | None:
+        """Return half credit for positions in metres without decimals, if the path is short for that; else None."""
+        shown = [
+            (e, pair) for g in found.groups for e in g.entries if e.right for pair in _hits(e, g.pairs, track, position)
+        ]
+        steps = [min(n.step for n in _pair(e, pair)) for e, pair in shown]
+        # what can be read in another way, such as -2,51 with a decimal comma, may have decimals
+        plain = all(sum(map(bool, readings(e.text))) == 1 for e in found.right)
+        if not steps or not plain or min(steps) < max(1.0, _COARSE * max(track.spans)):
+            return None
+        first = found.right[0]
+        pose = track.pose(track.current(first.t_ns).stop - 1)
+        reason = f"{self.process}: the positions agree with {self.topic}, but have no decimals: "
+        reason += f"at {moment(first.t_ns)} the log says '{quote(first.text, 80)}' at {_exact(pose)}"
+        facts = WrongLogFacts("whole", len(found.right), (X, Y))
+        problem = Problem(ProblemKind.WRONG_VALUE, detail="whole")
+        return partly(reason, _evidence(found), hint=_DECIMALS_HINT, problem=problem, facts=facts)
 
     def _right(self, found: Analysis) -> str:
         first = found.right[0]
@@ -994,8 +1018,11 @@ def _first_difference(analysis: Analysis, track: Track) -> Cause:
 
 def _difference(entry: Entry, track: Track) -> str:
     pose = track.pose(track.current(entry.t_ns).stop - 1)
-    there = f"({pose.at(X):.3f}, {pose.at(Y):.3f}) m"
-    return f"at {moment(entry.t_ns)} the log says '{quote(entry.text, 80)}', the position was {there}"
+    return f"at {moment(entry.t_ns)} the log says '{quote(entry.text, 80)}', the position was {_exact(pose)}"
+
+
+def _exact(pose: Pose) -> str:
+    return f"({pose.at(X):.3f}, {pose.at(Y):.3f}) m"
 
 
 def _pair(entry: Entry, pair: Pair) -> tuple[Printed, Printed]:

@@ -23,6 +23,7 @@ from grader.api import (
     names_in,
     number_in_code,
     parameters,
+    pauses,
     reached,
     roots,
     runs,
@@ -76,6 +77,60 @@ def _other_part(case: Case) -> Clue | None:
     what = next(part for part in _PARTS[cause] if f".{part}." in f"{chain(reads[0])}.")
     hint = f"{source.code(reads[0], 50)} is the {_MEANING.get(what, what)}: the position is {_POSITION}.x and .y"
     return Clue(hint, source.place(reads[0]))
+
+
+@_position_rule("no_y", "no_x", "only_x", "only_y", "wrong", "no_pair", "orientation", priority=12005)
+def _copied_axis(case: Case) -> Clue | None:
+    """Copy and paste: what should hold y gets another field of the message, such as x of the position."""
+    source = case.source
+    for statement in source.all(ast.Assign):
+        target, value = statement.targets[0], chain(statement.value)
+        axis, field = _axis(chain(target)), value.rpartition(".")[2]
+        owner = value.rpartition(".")[0]
+        if len(statement.targets) > 1 or not axis or field not in ("x", "y", "z", "w") or not owner:
+            continue
+        part = next((p for p in ("orientation", "linear", "angular") if owner.endswith(f".{p}")), "")
+        others = [a for a in source.all(ast.Assign) if a is not statement and _axis(chain(a.targets[0])) in ("x", "y")]
+        right = [
+            a for a in others if chain(a.value).endswith((".position.x", ".position.y", f"{owner}.x", f"{owner}.y"))
+        ]
+        if not right or (field == axis and not part):
+            continue
+        meant = f"{_POSITION}.{axis}" if part else f"{owner}.{axis}"
+        hint = f"{source.code(target)} gets {part + '.' if part else ''}{field}: write {source.code(target)} = {meant}"
+        return Clue(hint, source.place(statement))
+    return None
+
+
+@_position_rule("only_x", "only_y", "wrong", "no_pair", "stale", priority=12008)
+def _added_up(case: Case) -> Clue | None:
+    """`self.x += ...` adds each position to the sum of the earlier ones."""
+    source = case.source
+    inside = [n for m in made(source, "subscription") for n in runs(source, m)]
+    for statement in inside:
+        if isinstance(statement, ast.AugAssign) and chain(statement.value).endswith((".x", ".y")):
+            target = source.code(statement.target)
+            if any(
+                chain(n.left) == chain(statement.target) and isinstance(n.op, ast.Div) for n in source.all(ast.BinOp)
+            ):
+                continue  # a mean, and it is meant to be one
+            hint = f"{source.code(statement)} adds all positions up: write {target} = {source.code(statement.value)}"
+            return Clue(hint, source.place(statement))
+    return None
+
+
+@hint_rule("logs_position", outcome=Outcome.PARTLY, priority=12065)
+def _whole_metres(case: Case) -> Clue | None:
+    """The decimals are rounded away, by a function or by the format."""
+    source, call = case.source, log_call(case)
+    if _cause(case) != "whole" or call is None:
+        return None
+    cut = [c for c in source.calls("round", "int", "floor", "trunc") if len(c.args) == 1]
+    if cut:
+        given = source.code(cut[0].args[0], 50)
+        hint = f"{source.code(cut[0])} drops the decimals: write {{{given}:.2f}} in an f-string"
+        return Clue(hint, source.place(cut[0]))
+    return Clue("this format drops the decimals: write :.2f in place of :.0f", source.place(call))
 
 
 @_position_rule("swapped", priority=12020)
@@ -232,11 +287,10 @@ def _old_messages(case: Case) -> Clue | None:
         return oldest
     if facts is not None and facts.cause == "wrong" and not facts.right:
         return None
-    for item in made(source, "subscription"):
-        for node in runs(source, item):
-            if isinstance(node, ast.Call) and source.resolved(node.func) in ("time.sleep", "sleep"):
-                hint = f"{source.code(node)} in the callback makes messages wait in the queue: remove it"
-                return Clue(hint, source.place(node), key="old_messages")
+    pause = next((p for p in pauses(source) if p.spun is None), None)
+    if pause is not None:
+        hint = f"{source.code(pause.call)} in the callback makes messages wait in the queue: remove it"
+        return Clue(hint, source.place(pause.call), key="old_messages")
     return _one_at_a_time(source)
 
 

@@ -13,10 +13,10 @@ from grader.api import (
     AnswerRow,
     Case,
     Clue,
-    Constant,
     Outcome,
     ProblemKind,
     Source,
+    Switch,
     chain,
     conditions,
     constant,
@@ -31,6 +31,7 @@ from grader.api import (
     names_in,
     number,
     number_in_code,
+    pauses,
     publish_calls,
     published,
     published_numbers,
@@ -38,7 +39,8 @@ from grader.api import (
     runs,
     silent_topic,
     subtree,
-    text_in_code,
+    switches,
+    text_comparisons,
     text_of,
     timer_code,
     within,
@@ -49,9 +51,6 @@ ALONE, TOGETHER = ANSWERS = ("threshold_response", "answers_together")
 #: Answers delayed by at most this count as prompt.
 _PROMPT_S = 0.3
 _MEANS = ("mean", "fmean", "average", "median", "nanmean")
-#: Comparison -> the same one with its sides exchanged.
-_TURNED: dict[type[ast.cmpop], type[ast.cmpop]] = {ast.Gt: ast.Lt, ast.GtE: ast.LtE, ast.Lt: ast.Gt, ast.LtE: ast.GtE}
-_ORDERS = tuple(_TURNED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,16 +92,6 @@ def _compared(case: Case) -> Iterator[tuple[Source, ast.Compare]]:
     yield from ((h.source, n) for h in _subscribers(case) for n in h.comparisons() if len(n.ops) == 1)
 
 
-@dataclass(frozen=True, slots=True)
-class _Switch:
-    """A comparison with a number, turned so that the number is on the right."""
-
-    node: ast.Compare
-    op: ast.cmpop
-    limit: Constant
-    tested: ast.expr
-
-
 def _controller(case: Case) -> _Controller | None:
     """Return the controller, if it answers."""
     check = case.check
@@ -110,21 +99,6 @@ def _controller(case: Case) -> _Controller | None:
         return None
     owners = [s for s in case.sources.values() if made_for(s, "publisher", check.output) is not None]
     return _Controller(case, owners[0], check) if len(owners) == 1 else None
-
-
-def _switches(source: Source, limit: float | None = None) -> list[_Switch]:
-    """Return the comparisons with one number, with that limit if given."""
-    found = []
-    for node in source.all(ast.Compare):
-        if len(node.ops) != 1:
-            continue
-        left, right = constant(source, node.left), constant(source, node.comparators[0])
-        op: ast.cmpop = node.ops[0]
-        if right is not None and left is None and isinstance(op, _ORDERS):
-            found.append(_Switch(node, op, right, node.left))
-        elif left is not None and right is None and isinstance(op, _ORDERS):
-            found.append(_Switch(node, _TURNED[type(op)](), left, node.comparators[0]))
-    return [s for s in found if limit is None or within(s.limit.value, limit, EXACT)]
 
 
 def _rows(case: Case) -> tuple[AnswerRow, ...]:
@@ -186,11 +160,10 @@ def _put_off(late: _Subscriber) -> Clue | None:
 @hint_rule(*ANSWERS, priority=13040)
 def _compared_as_text(case: Case) -> Clue | None:
     """`str(msg.data) > '25'` compares alphabetically."""
-    for source, test in _compared(case):
-        sides = [text_in_code(source, side) for side in (test.left, test.comparators[0])]
-        constant = next((side for side in sides if side is not None), None)
-        is_number = constant is not None and constant.strip().replace(".", "", 1).isdigit()
-        if not is_number or not isinstance(test.ops[0], _ORDERS):
+    for subscriber in _subscribers(case):
+        source = subscriber.source
+        test = next(iter(text_comparisons(source, subscriber.reached)), None)
+        if test is None:
             continue
         limit = number(case.check.threshold)
         hint = f"{source.code(test, 50)} compares strings, not numbers: compare the number itself with {limit}"
@@ -233,7 +206,7 @@ def _at_the_threshold(controller: _Controller) -> Clue | None:
     wrong = _wrong_inputs(controller.case)
     if not wrong or any(not within(v, check.threshold, EXACT) for v in wrong):
         return None
-    for switch in _switches(source, check.threshold):
+    for switch in switches(source, check.threshold):
         code = source.code(switch.node, 40)
         if isinstance(switch.op, ast.GtE):
             hint = f"{code} is true at exactly {number(check.threshold)}: write > instead of >="
@@ -252,18 +225,18 @@ def _inverted(controller: _Controller) -> Clue | None:
     away = [(v, got) for v, got in known if not within(v, check.threshold, EXACT)]
     flipped = [within(got, check.otherwise if v > check.threshold else check.above, EXACT) for v, got in away]
     both = len({v > check.threshold for v, _ in away}) == 2
-    switches = _switches(source, check.threshold)
-    if not both or not all(flipped) or len(switches) != 1:
+    found = switches(source, check.threshold)
+    if not both or not all(flipped) or len(found) != 1:
         return None
-    if not _says_inverted(source, switches[0], check):
+    if not _says_inverted(source, found[0], check):
         return None
-    code = source.code(switches[0].node, 40)
+    code = source.code(found[0].node, 40)
     limit = number(check.threshold)
     hint = f"the branches of {code} are the wrong way round: {number(check.above)} belongs above {limit}"
-    return Clue(f"{hint}, {number(check.otherwise)} at or below it", source.place(switches[0].node), key="inverted")
+    return Clue(f"{hint}, {number(check.otherwise)} at or below it", source.place(found[0].node), key="inverted")
 
 
-def _says_inverted(source: Source, switch: _Switch, check: Any) -> bool:
+def _says_inverted(source: Source, switch: Switch, check: Any) -> bool:
     """Return whether the text, too, gives each side the answer of the other."""
     negated = isinstance(source.parents.get(switch.node), ast.UnaryOp)
     choice = next((n for n in source.around(switch.node, ast.AST) if isinstance(n, (ast.If, ast.IfExp))), None)
@@ -284,7 +257,7 @@ def _rounded(controller: _Controller) -> Clue | None:
     wrong = _wrong_inputs(controller.case)
     if not wrong or any(not 0 < abs(v - check.threshold) < 1 for v in wrong):
         return None
-    for switch in _switches(source, check.threshold):
+    for switch in switches(source, check.threshold):
         calls = [n for n in subtree(switch.tested) if isinstance(n, ast.Call)]
         calls = [c for c in calls if last_name(c.func) in ("int", "round", "floor", "ceil", "trunc")]
         if calls:
@@ -296,7 +269,7 @@ def _rounded(controller: _Controller) -> Clue | None:
 @hint_rule(ALONE, given=_controller, priority=13100)
 def _other_threshold(controller: _Controller) -> Clue | None:
     source, check = controller.source, controller.check
-    known = _switches(source)
+    known = switches(source)
     away = [s for s in known if not within(s.limit.value, check.threshold, EXACT) and s.limit.value > 1]
     others = [s for s in away if abs(s.limit.value - check.threshold) <= 10 or len(known) == 1]
     wrong = _wrong_inputs(controller.case)
@@ -306,7 +279,7 @@ def _other_threshold(controller: _Controller) -> Clue | None:
     if any(not lower - EXACT <= v <= upper + EXACT for v in wrong):
         return None
     hint = f"{source.code(others[0].node, 40)} compares with {number(others[0].limit.value)}: the limit is "
-    if _switches(source, check.threshold):
+    if switches(source, check.threshold):
         hint = f"{source.code(others[0].node, 40)} keeps the old answer between {number(lower)} and {number(upper)}: "
         hint += "the only limit is "
     return Clue(f"{hint}{number(check.threshold)}", source.place(others[0].limit.origin), key="other_threshold")
@@ -416,7 +389,7 @@ def _one_branch(controller: _Controller) -> Clue | None:
 
 def _tests_threshold(source: Source, test: ast.expr, threshold: float) -> bool:
     inside = set(subtree(test))
-    return any(s.node in inside for s in _switches(source, threshold))
+    return any(s.node in inside for s in switches(source, threshold))
 
 
 @hint_rule(*ANSWERS, given=_controller, priority=13160)
@@ -525,13 +498,15 @@ def _slow_timer(controller: _Controller) -> Clue | None:
 
 @hint_rule(*ANSWERS, outcome=Outcome.NOT_MET, priority=13210)
 def _callback_sleeps(case: Case) -> Clue | None:
-    """The callback sleeps, and what comes meanwhile is answered late."""
+    """A callback sleeps, or the loop that spins, and what comes meanwhile is answered late."""
     for late in _subscribers(case):
-        for node in late.reached:
-            slept = number_in_code(late.source, node.args[0]) if isinstance(node, ast.Call) and node.args else None
-            if isinstance(node, ast.Call) and last_name(node.func) == "sleep" and (slept or 0) > _PROMPT_S:
-                hint = f"{late.source.code(node, 50)} blocks the callback, so later messages are answered late"
-                return Clue(f"{hint}; remove it", late.source.place(node), key="late_answer")
+        for pause in pauses(late.source):
+            if (pause.seconds or 0) > _PROMPT_S:
+                hint = pause.hint(late.source, "the answers")
+                if pause.spun is None:
+                    code = late.source.code(pause.call, 50)
+                    hint = f"{code} blocks the callback, so later messages are answered late; remove it"
+                return Clue(hint, late.source.place(pause.call), key="late_answer")
     return None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -235,6 +236,10 @@ def _answered_ns(call: Call) -> int:
 
 #: Whether an output complains, and its shape: what outputs of the same wording share.
 _Text = tuple[bool, str]
+#: A word or a sign of a text; a number is one sign, whatever its value.
+_TOKEN = re.compile(r"[+-]?\d+(?:[.,]\d+)*|\w+|[^\w\s]")
+#: A word of fewer letters says nothing about whether two texts say the same.
+_LETTERS = 2
 _Output = LogRecord | OutputLine
 #: A client that has sent no request for this long is not expected to send another.
 _ASKS_AGAIN_NS = 5 * NS_PER_S
@@ -312,9 +317,40 @@ def _texts(outputs: Iterable[_Output]) -> frozenset[_Text]:
     return frozenset(map(_text_of, outputs))
 
 
+def _tokens(text: str) -> tuple[str, ...]:
+    """Return the words and signs of a text, with every number as `#`."""
+    return tuple("#" if t[-1].isdigit() and not t[0].isalpha() else t.lower() for t in _TOKEN.findall(text[:1000]))
+
+
+def _words_in(outputs: Iterable[_Output]) -> set[str]:
+    """Return the words of some outputs, without very short ones."""
+    return {t for o in outputs for t in _tokens(o.text) if len(t) > _LETTERS and t.isalpha()}
+
+
+def _origin(output: _Output) -> tuple[str, int]:
+    """Return what wrote an output, as far as that is known: the line of the call, or a stream."""
+    return (output.file, output.line) if isinstance(output, LogRecord) else (output.stream, 0)
+
+
+def _common(texts: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the tokens that all texts begin with, and those that all of them end with."""
+    shortest = min(map(len, texts))
+    begin = next((k for k in range(shortest) if len({t[k] for t in texts}) > 1), shortest)
+    ends = [t[begin:] for t in texts]
+    shortest = min(map(len, ends))
+    end = next((k for k in range(shortest) if len({t[-1 - k] for t in ends}) > 1), shortest)
+    return texts[0][:begin], texts[0][len(texts[0]) - end :]
+
+
 def _quotes(output: _Output, episode: Episode) -> bool:
     shown = "" if episode.number is None else number(episode.number)
     return bool(episode.text and episode.text in output.text) or bool(shown and shown in output.text)
+
+
+def _not_taken_back(outputs: Sequence[_Output]) -> list[_Output]:
+    """Return the outputs that no warning follows."""
+    last = max((k for k, o in enumerate(outputs) if complaints((o,))), default=-1)
+    return list(outputs[last + 1 :])
 
 
 @dataclass(frozen=True, slots=True)
@@ -326,16 +362,19 @@ class _Going:
         view: The outputs of an episode among which they are sought.
         clear: Whether each output belongs to one response, and there is another kind of response to compare with.
         compared: Whether that kind is a low number; otherwise text that shows a response does not signal continuing.
+        taken_back: Whether a warning that follows shows that the client does not continue after all.
     """
 
     texts: frozenset[_Text]
     view: _View
     clear: bool
     compared: bool
+    taken_back: bool = False
 
     def outputs(self, episode: Episode) -> list[_Output]:
         """Return the outputs of an episode that show that the client continues."""
-        found = [o for o in self.view(episode) if _text_of(o) in self.texts]
+        seen = _not_taken_back(self.view(episode)) if self.taken_back else self.view(episode)
+        found = [o for o in seen if _text_of(o) in self.texts]
         return found if self.compared else [o for o in found if not _quotes(o, episode)]
 
 
@@ -367,7 +406,21 @@ class _Words:
         if not low or not self.clear:
             return None
         texts = self._new(_texts(episode.outputs)) - frozenset.intersection(*(_texts(e.sure) for e in low))
+        texts = texts or self.taken_back
         return [o for o in episode.outputs if _text_of(o) in texts]
+
+    @property
+    def taken_back(self) -> frozenset[_Text]:
+        """The texts after every good response that follow a low number only before a warning: a start, taken back.
+
+        What shows the response itself is no start.
+        """
+        good, low = self.of(CallKind.GOOD), self.of(CallKind.LOW)
+        if not good or not low or not self.clear:
+            return frozenset()
+        each = self._new(frozenset.intersection(*(_texts(e.sure) for e in good)))
+        shown = {_text_of(o) for e in (*good, *low) for o in e.outputs if _quotes(o, e)}
+        return each - shown - {_text_of(o) for e in low for o in _not_taken_back(e.outputs)}
 
     @property
     def only_good(self) -> frozenset[_Text] | None:
@@ -375,7 +428,46 @@ class _Words:
         good, low = self.of(CallKind.GOOD), self.of(CallKind.LOW)
         if not good or not low or not self.clear:
             return None
-        return self._contrast(good, low, _loose)
+        return self._contrast(good, low, _loose) or self.taken_back
+
+    def cautions(self, episode: Episode, warned: Sequence[LogRecord]) -> bool:
+        """Return whether warnings after a good number are a level of their own between going on and aborting.
+
+        Then higher numbers come without a warning and lower ones do not, no low number has the same one, and the client
+        says that it goes on all the same: in other records, or in words that it uses for higher numbers and for no low
+        one.
+        """
+        low = self.of(CallKind.LOW)
+        higher = [e for e in self.of(CallKind.GOOD) if not complaints(e.sure)]
+        below = [e.number is not None and episode.number is not None and e.number > episode.number for e in higher]
+        lows = {shape_of(o.text) for e in low for o in e.outputs}
+        if not low or not higher or not all(below) or not self.clear or any(shape_of(r.text) in lows for r in warned):
+            return False
+        going = _words_in(o for e in higher for o in e.sure) - _words_in(o for e in low for o in e.outputs)
+        return bool(self.telling(episode)) or bool(_words_in(warned) & going)
+
+    def in_other_words(self, episode: Episode) -> _Output | None:
+        """Return output after a useless response that tells of a start in words that no good response had.
+
+        The same call writes after each good response, and after no low one: its texts begin and end alike, and differ
+        only in between, such as in the name of a mission.
+        """
+        good, low = self.of(CallKind.GOOD), self.of(CallKind.LOW)
+        elsewhere = {_origin(o) for e in low for o in e.outputs if isinstance(o, LogRecord)}
+        for output in episode.sure:
+            origin = _origin(output)
+            told = [[o for o in e.sure if _origin(o) == origin and self._new((_text_of(o),))] for e in good]
+            if not self._new((_text_of(output),)) or origin in elsewhere or len(told) < 2 or not all(told):
+                continue
+            texts = [_tokens(outputs[0].text) for outputs in told]
+            begin, end = _common(texts)
+            mine = _tokens(output.text)
+            named = any(len(t) >= _LETTERS and t.isalpha() for t in (*begin, *end))
+            behind = len(mine) - len(end)
+            alike = behind > len(begin) and mine[: len(begin)] == begin and mine[behind:] == end
+            if len(set(texts)) > 1 and named and alike:
+                return output
+        return None
 
     @property
     def shared(self) -> tuple[_Output, float] | None:
@@ -418,8 +510,16 @@ class _Words:
         some = {view: self._contrast(good, others, view) for view in views}
         common = {view: some[view].intersection(*(_texts(view(e)) for e in good)) for view in views}
         found = [(choice[view], view) for choice in (common, some) for view in views if choice[view]]
-        texts, view = found[0] if found else (frozenset[_Text](), _sure)
-        return _Going(texts, view, self.clear, bool(low))
+        if found:
+            return _Going(*found[0], self.clear, bool(low))
+        if self.taken_back:
+            return _Going(self.taken_back, _sure, self.clear, bool(low), taken_back=True)
+        return _Going(self._own_warnings(good, others), _sure, self.clear, bool(low))
+
+    def _own_warnings(self, good: Sequence[Episode], others: Sequence[Episode]) -> frozenset[_Text]:
+        """Return the texts of warnings after good numbers whose wording follows no other response."""
+        known = self.before.union(*({t[1] for t in _texts(e.outputs)} for e in others))
+        return frozenset(t for e in good for t in _texts(e.sure) if t[1] not in known)
 
 
 @dataclass(frozen=True, slots=True)
@@ -555,10 +655,11 @@ class ReactsToResponses(_Decides):
     """A client continues after a response with a number above a threshold, and warns if the number is at or below it.
 
     A warning is a record of severity WARN or higher between the response and the next request. Continuing means output
-    in that time without such a record, in words that do not follow every number at or below the threshold as well. A
-    warning shows nothing if no words are kept for the numbers above, or if words that follow each of these come after
-    a later low number. The wording is free. Responses without success or without a number are ignored. Printing instead
-    of logging gives half the points.
+    in that time without such a record, in words that do not follow every number at or below the threshold as well, or
+    only before the warning there. Numbers just above the threshold may have a warning of their own, beside words about
+    continuing that higher numbers have too. A warning shows nothing if no words are kept for the numbers above, or if
+    words that follow each of these come after a later low number. The wording is free. Responses without success or
+    without a number are ignored. Printing instead of logging gives half the points.
 
     Attributes:
         process: File name of the client.
@@ -598,22 +699,30 @@ class ReactsToResponses(_Decides):
         return self._explain(trace, wrong, evidence)
 
     def _wrong(self, episode: Episode, episodes: Sequence[Episode], words: _Words) -> str:
-        """Describe what is wrong with the reaction to a response; empty if nothing is."""
+        """Say what a client does after a response that it should not do; empty if it does right."""
         if episode.kind is CallKind.LOW:
             if not complaints(episode.outputs):
-                return "no record of severity WARN"
+                return "it logs no warning"
             started = words.start_after_abort(episode)
-            return f"{quote(started.text, 80)!r} at {moment(started.t_ns)}" if started is not None else ""
+            return f"it writes {quote(started.text, 80)!r} at {moment(started.t_ns)}" if started is not None else ""
         before = episodes[episode.place - 2] if episode.place > 1 else None
         late = before is not None and before.kind is not CallKind.GOOD
         # a client that reads a response only when it calls again warns then about the previous one
         early = () if late else episode.awaiting
         warned = [r for r in complaints((*early, *episode.sure)) if not (late and r.t_ns <= episode.asked_ns)]
-        if warned:
-            return f"{warned[0].severity} at {moment(warned[0].t_ns)}: {quote(warned[0].text, 80)}"
+        if warned and not words.cautions(episode, warned):
+            return f"it logs {quote(warned[0].text, 80)!r} at level {warned[0].severity}"
         if not episode.outputs:
-            return "nothing is written"
-        return "only text that also follows low numbers" if words.telling(episode) == [] else ""
+            return "it writes nothing"
+        return self._the_same(episode, words) if not warned and words.telling(episode) == [] else ""
+
+    def _the_same(self, episode: Episode, words: _Words) -> str:
+        """Say that everything after a number above the threshold also follows one that is not above it."""
+        low = words.of(CallKind.LOW)[-1]
+        alike = _texts(low.sure)
+        shown = next((o for o in reversed(episode.sure) if _text_of(o) in alike), None)
+        such = f", such as {quote(shown.text, 80)!r}" if shown is not None else ""
+        return f"it writes nothing else than after {number(low.number or 0.0)}{such}"
 
     def _only_warned(self, mine: Sequence[Episode], words: _Words, evidence: dict[str, object]) -> Finding | None:
         """Return a finding if warnings do not show that a mission is aborted, because none is ever seen to start."""
@@ -650,12 +759,12 @@ class ReactsToResponses(_Decides):
 
     def _explain(self, trace: Trace, wrong: Sequence[tuple[Episode, str]], evidence: dict[str, object]) -> Finding:
         episode, flaw = wrong[0]
-        rule = "go on" if episode.kind is CallKind.GOOD else "log a warning"
+        rule = "it to say that it goes on" if episode.kind is CallKind.GOOD else "one"
         if episode.kind is CallKind.LOW and complaints(episode.outputs):
-            rule = "start nothing"
+            rule = "it to start nothing"
         side = "above" if episode.kind is CallKind.GOOD else "at or below"
-        reason = f"{moment(episode.start_ns)}, {self.process}: {flaw} after {number(episode.number or 0.0)}; expected "
-        reason += f"it to {rule}, as after every number {side} {number(self.threshold)}"
+        reason = f"{moment(episode.start_ns)}, {self.process}: after {number(episode.number or 0.0)} {flaw}; expected "
+        reason += f"{rule}, as after every number {side} {number(self.threshold)}"
         fault = first_fault(trace, self.process)
         if fault is not None and episode.start_ns <= fault.t_ns <= episode.stop_ns:
             return faulted(fault, reason, evidence, last=True)
@@ -679,7 +788,8 @@ class NoGoWithoutAnswer(_Decides):
     What the client writes when it continues is learned from the responses above the threshold: words that follow each
     of them, or else some of them, and come neither before the first response, nor after a number at or below the
     threshold, nor after a useless response of another kind. None of these may come between a useless response and the
-    next request. If there are no such words, nothing shows whether the client continues. A crash at a useless response
+    next request, nor may the call that writes them write a text that begins and ends alike, as with the name of another
+    mission. If there are no such words, nothing shows whether the client continues. A crash at a useless response
     is reported and costs nothing. The server should respond with a delay, to separate output before and after a
     response, and one of its responses should be of another kind; without these, unclear cases are accepted.
 
@@ -713,8 +823,9 @@ class NoGoWithoutAnswer(_Decides):
                 reason += f"so nothing shows that it does not go on after {_SAID[episode.kind]}"
                 return self._unshown(reason, evidence)
             found = [o for o in going.outputs(episode) if not self._due(o, episode, episodes, going)]
-            if found:
-                return self._went_on(episode, found[0], evidence)
+            other = words.in_other_words(episode) if not found else None
+            if found or other is not None:
+                return self._went_on(episode, other or found[0], evidence, same=other is None)
         reason = f"{self.process}: does not go on after any of {counted(len(useless), 'unusable response')}"
         reason += f" ({', '.join(dict.fromkeys(_SAID[e.kind] for e in useless))})"
         fault = first_fault(trace, self.process)
@@ -729,9 +840,10 @@ class NoGoWithoutAnswer(_Decides):
             return False
         return not any(_text_of(o) in going.texts for o in before.sure)
 
-    def _went_on(self, episode: Episode, found: _Output, evidence: dict[str, object]) -> Finding:
+    def _went_on(self, episode: Episode, found: _Output, evidence: dict[str, object], *, same: bool) -> Finding:
         reason = f"{moment(found.t_ns)}, {self.process}: {quote(found.text, 80)!r} after {_SAID[episode.kind]} "
-        reason += f"(request {episode.place}), the same text as when it goes on; expected it not to go on"
+        alike = "the same text as" if same else "a text such as it writes"
+        reason += f"(request {episode.place}), {alike} when it goes on; expected it not to go on"
         hint = "go on only if there is a response, response.success is true and its number could be read"
         return not_met(reason, evidence | {"first_wrong_s": seconds(found.t_ns)}, hint=hint)
 

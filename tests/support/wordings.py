@@ -48,8 +48,6 @@ RIGHT: dict[str, Writer] = {
     "padded": lambda x, y: f"x={x:8.3f} y={y:8.3f}",
     "3f": lambda x, y: f"X: {x:3f} Y: {y:3f}",
     "numpy array": lambda x, y: f"pose [{x:11.8f} {y:11.8f}]",
-    "whole metres": lambda x, y: f"x={int(x)}, y={int(y)}",
-    "rounded to metres": lambda x, y: f"at {round(x)} {round(y)}",
     "cut off": lambda x, y: f"x={int(x * 100) / 100} y={int(y * 100) / 100}",
     "json": lambda x, y: json.dumps({"x": x, "y": y}),
     "json y first": lambda x, y: json.dumps({"y": y, "x": x}),

@@ -31,6 +31,7 @@ class DrawFacts:
     least: float  # smallest value
     most: float  # largest value
     outside: int = 0  # values out of range
+    narrow: bool = False  # whether they leave out an end of the range
     pattern: str = ""  # what they follow instead of chance, such as `constant`; empty if they are random
 
 

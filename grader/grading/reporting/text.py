@@ -85,9 +85,8 @@ def _fix_first(page: Page, exercise: ExerciseReport, verdict: Verdict) -> None:
     where = verdict.location
     if where is not None:
         place = wording.place(where.file, where.line)
-        line = Text(f"  {place}: {shown(code)}" if (code := _source_line(exercise, verdict)) else f"  at {place}")
-        line.truncate(page.width, overflow="ellipsis")
-        page.put(line, style="bold")
+        code = _source_line(exercise, verdict)
+        page.put(f"{place}: {shown(code)}" if code else f"at {place}", prefix="  ", style="bold")
     if verdict.hint:
         page.put(shown(verdict.hint), prefix=Text.assemble(("  hint: ", "cyan")), style="cyan")
 

@@ -51,6 +51,24 @@ def test_a_wrong_position_earns_nothing_and_is_named(write: Writer, cause: str) 
         assert finding.evidence["cause"] == cause, finding.reason
 
 
+@pytest.mark.parametrize(
+    ("write", "credit"),
+    [
+        (lambda x, y: f"x={x:.0f}, y={y:.0f}", Fraction(1, 2)),
+        (lambda x, y: f"x={round(x)} y={round(y)}", Fraction(1, 2)),
+        (lambda x, y: f"x={x:.1f}, y={y:.1f}", 1),
+        (lambda x, y: f"x={x:.2f}, y={y:.2f}".replace(".", ","), 1),
+        (lambda x, y: f"x={100 * x:.0f} cm, y={100 * y:.0f} cm", 1),
+        (lambda x, y: f"x={x:.0f}, y={y:.0f} (exactly x={x:.3f}, y={y:.3f})", 1),
+    ],
+)
+def test_whole_metres_are_half(write: Writer, credit: Fraction) -> None:
+    """But for whole centimetres, a decimal comma, or decimals beside them."""
+    finding = POSITION.judge(position_logs(write, [6.0 + k for k in range(12)]).trace())
+    assert finding.credit == credit, finding.reason
+    assert ("have no decimals" in finding.reason) == (credit != 1)
+
+
 def test_swapped_positions_keep_their_period() -> None:
     """What is wrong with the values does not cost the period."""
     assert PERIOD.judge(position_logs(WRONG["swapped"][0]).trace()).credit == 1

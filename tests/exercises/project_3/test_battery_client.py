@@ -27,7 +27,7 @@ from grader.grading.judging.findings import FAULT_KEY
 from grader.grading.model.exercise import Check
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.runtime.model.errors import HarnessError
-from grader.runtime.model.trace import ClockKind, Request
+from grader.runtime.model.trace import ClockKind, LogRecord, Request
 
 WAITS = known_checks()["waits_for_service"](CLIENT, BATTERY)
 REACTS = known_checks()["reacts_to_responses"](CLIENT, BATTERY, 20.0)
@@ -127,24 +127,32 @@ def looks_later_at_a_refusal(answer: Answer) -> Said:
 @pytest.mark.parametrize(
     ("write", "check", "said"),
     [
-        (silent_go, ABOVE, "only text that also follows low numbers after 84.5"),
+        (silent_go, ABOVE, "after 84.5 it writes nothing else than after 15, such as 'the answer: "),
         (silent_go, BELOW, "so nothing shows that it aborts"),
         (silent_go, STILL, "('the answer: Battery: 15.0% remaining' also follows 15)"),
-        (warns_and_goes, ABOVE, "only text that also follows low numbers"),
+        (
+            warns_and_goes,
+            ABOVE,
+            "it writes nothing else than after 15, such as 'charge is fine, off it goes'; expected",
+        ),
         (warns_and_goes, BELOW, "('charge is fine, off it goes' also follows 15)"),
         (goes_at_the_second_low, BELOW, "'charge is fine, off it goes' at t = "),
-        (same_for_all, ABOVE, "only text that also follows low numbers"),
+        (same_for_all, ABOVE, "such as 'charge is asked for, off it goes'; expected it to say that it goes on"),
         (same_for_all, STILL, "so nothing shows that it does not go on after a response without success"),
-        (deciding(lambda v: f"{v}" > "20.0"), BELOW, "no record of severity WARN after 7.5"),
+        (deciding(lambda v: f"{v}" > "20.0"), BELOW, "after 7.5 it logs no warning"),
         (looks_later_at_a_refusal, STILL, "'off it goes' after a response without success (request 4)"),
-        (deciding(lambda v: v >= 20), BELOW, "no record of severity WARN after 20; expected it to log a warning"),
-        (deciding(lambda v: v > 10), BELOW, "no record of severity WARN after 20"),
-        (deciding(lambda v: v > 30), ABOVE, "WARN at t = 4.450 s: low, it stays after 20.1; expected it to go on"),
-        (deciding(lambda v: v <= 20), REACTS, "WARN at t = 3.350 s: low, it stays after 84.5"),
+        (deciding(lambda v: v >= 20), BELOW, "after 20 it logs no warning; expected one, as after every number"),
+        (deciding(lambda v: v > 10), BELOW, "after 20 it logs no warning"),
+        (
+            deciding(lambda v: v > 30),
+            ABOVE,
+            "after 20.1 it logs 'low, it stays' at level WARN; expected it to say that",
+        ),
+        (deciding(lambda v: v <= 20), REACTS, "after 84.5 it logs 'low, it stays' at level WARN"),
         (deciding(lambda v: False), ABOVE, "after 84.5"),
-        (low_is_info, BELOW, "no record of severity WARN after 20"),
-        (says_nothing, ABOVE, "nothing is written after"),
-        (always_warns, ABOVE, "WARN at"),
+        (low_is_info, BELOW, "after 20 it logs no warning"),
+        (says_nothing, ABOVE, "it writes nothing; expected"),
+        (always_warns, ABOVE, "at level WARN; expected it to say that it goes on"),
         (deciding(lambda v: v > 20, 60.0), STILL, "after a response without success (request 4)"),
         (goes_on([FAILED]), STILL, "'charge is fine, off it goes' after a response without success (request 4)"),
         (goes_on([UNREADABLE]), STILL, "after a response without a number (request 5)"),
@@ -233,6 +241,97 @@ def test_each_start_may_have_its_own_words() -> None:
     for check in (ABOVE, BELOW, STILL):
         finding = check.judge(rec.trace())
         assert finding.credit == 1, finding.reason
+
+
+def cautious(answer: Answer, *, between: Said = (("WARN", "middling, off it goes"),)) -> Said:
+    level = level_of(answer)
+    if level is None:
+        return [("ERROR", "no charge")]
+    if level > 70:
+        return [("INFO", "plenty, off it goes")]
+    return list(between) if level > 20 else [("ERROR", "low, it stays")]
+
+
+def starts_and_takes_back(answer: Answer) -> Said:
+    level = level_of(answer)
+    if level is None:
+        return [("ERROR", "no charge")]
+    return [("INFO", "it sets off"), *([] if level > 20 else [("WARN", "low, it stays")])]
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        cautious,
+        lambda a: cautious(a, between=[("WARN", "getting low"), ("INFO", "plenty, off it goes")]),
+        lambda a: cautious(a, between=[("INFO", "plenty, off it goes"), ("WARN", "getting low")]),
+        starts_and_takes_back,
+    ],
+)
+@pytest.mark.parametrize("check", [REACTS, ABOVE, BELOW, STILL], ids=lambda c: type(c).__name__)
+def test_a_warning_may_have_levels_and_may_take_a_start_back(check: Check, write: Callable[[Answer], Said]) -> None:
+    """A client that warns just above the limit and goes on, and one that says that it starts before it warns."""
+    finding = check.judge(asking(write).trace())
+    assert finding.credit == 1, finding.reason
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda a: cautious(a, between=[("WARN", "middling, at home")]),  # no word of what it says when it goes on
+        lambda a: cautious(a, between=[("WARN", "low, it stays")]),  # what it says at low numbers
+        lambda a: cautious(battery(63.0) if a == battery(84.5) else battery(84.5) if a == battery(63.0) else a),
+    ],
+)
+def test_a_warning_above_the_limit_without_a_start_is_wrong(write: Callable[[Answer], Said]) -> None:
+    """And so is one at a number that is higher than another one without a warning."""
+    assert ABOVE.judge(asking(write).trace()).credit == 0
+
+
+def test_a_start_that_nothing_takes_back_is_one() -> None:
+    """After a response without success, too."""
+
+    def ignores_success(answer: Answer) -> Said:
+        return [("INFO", "it sets off")] if answer == FAILED else starts_and_takes_back(answer)
+
+    finding = STILL.judge(asking(ignores_success).trace())
+    assert finding.credit == 0
+    assert "'it sets off' after a response without success (request 4)" in finding.reason
+
+
+def at_lines(rec: Recording, lines: dict[str, int]) -> Recording:
+    """Return a recording whose logs come from the lines of the texts that they begin with."""
+    for place, item in enumerate(rec.items):
+        line = next((n for text, n in lines.items() if text in getattr(item, "text", "")), 0)
+        if isinstance(item, LogRecord) and line:
+            rec.items[place] = dataclasses.replace(item, file=CLIENT, line=line)
+    return rec
+
+
+@pytest.mark.parametrize(
+    ("said", "line", "credit"),
+    [
+        ("off to the market", 30, 0),  # by the call that tells of each start
+        ("off to the market", 40, 1),  # elsewhere in the file
+        ("nothing off to the market", 30, 1),  # by a method that logs everything
+        ("no charge, no mission", 30, 1),
+    ],
+)
+def test_a_start_in_new_words_is_known_by_its_call(said: str, line: int, credit: int) -> None:
+    """Each mission has a name, and a client that ignores the refusal names another one."""
+    answers = (battery(84.5), FAILED, battery(63.0), battery(15.0))
+    places = {84.5: "field", 63.0: "river"}
+
+    def write(answer: Answer) -> Said:
+        level = level_of(answer)
+        if answer == FAILED or level is None:
+            return [("INFO", said)]
+        return [("INFO", f"off to the {places[level]}")] if level > 20 else [("WARN", "low")]
+
+    lines = {"off to the field": 30, "off to the river": 30, said: line}
+    finding = STILL.judge(at_lines(asking(write, answers), lines).trace())
+    assert finding.credit == credit, finding.reason
+    assert ("a text such as it writes when it goes on" in finding.reason) == (credit == 0)
 
 
 def test_a_crash_at_an_unreadable_answer_is_told_and_free() -> None:

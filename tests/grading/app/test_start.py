@@ -61,7 +61,7 @@ def test_what_holds_no_file_to_run_is_graded_without_a_process(tmp_path: Path, m
     def refuse(*given: object, **options: object) -> None:
         if "grader.grading.submissions.submission_reader" not in str(given[1:]):
             pytest.fail("a process was started")
-        started(*given, **options)  # type: ignore[arg-type, misc]
+        started(*given, **options)  # type: ignore[call-overload]
 
     find_ros()  # once for each process, perhaps by asking another one
     monkeypatch.setattr(subprocess.Popen, "__init__", refuse)

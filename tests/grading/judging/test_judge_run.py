@@ -220,7 +220,10 @@ def test_what_a_busy_machine_can_have_delayed_is_undecided_for_every_check(
     late_s: float, waited_s: float, outcome: str
 ) -> None:
     """A delay passes through several threads, each of which waits: their waits together bound it."""
-    waits = {"most_starved_ns": SECOND // 10 if waited_s else 0, "all_starved_ns": round(waited_s * SECOND)}
+    waits: dict[str, Any] = {
+        "most_starved_ns": SECOND // 10 if waited_s else 0,
+        "all_starved_ns": round(waited_s * SECOND),
+    }
     first = TraceBuilder(FILE, stop_s=2.0).messages("/cmd_vel", TWIST, {}, rate_hz=10, start_s=late_s)
     answers = TraceBuilder(FILE, stop_s=2.0)
     for at_s in (0.0, 1.0):

@@ -92,6 +92,16 @@ def test_lines_keep_to_the_width_and_end_in_no_space(name: str, width: int, verb
     assert "\n\n\n" not in "\n".join(lines)
 
 
+@pytest.mark.parametrize("width", [40, 80, 120])
+def test_the_line_to_fix_is_shown_whole(width: int) -> None:
+    """In a log of GitHub as well, where nobody can widen the window."""
+    code = "self.publisher = self.create_publisher(geometry_msgs.msg.Twist, '/cmd_velocity', qos_profile=10)"
+    verdict = criterion("c", "C", 1, Outcome.NOT_MET, reason="no message", location=Location("a.py", 7))
+    shown_ = render(report(exercise("e", "1", "E", verdict, excerpts=(Excerpt("a.py", 7, 7, (code,)),))), width)
+    assert squeezed(f"a.py:7: {code}") in squeezed(shown_)
+    assert "…" not in shown_
+
+
 def test_a_long_word_opens_no_gap_above_itself() -> None:
     """A blank line ends an exercise and nothing else."""
     verdict = criterion("c", "C", 1, Outcome.NOT_MET, reason=f"long {'A' * 200}")

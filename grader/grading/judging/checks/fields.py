@@ -446,6 +446,15 @@ class FieldFunction:
 
 #: Rounding to single precision must not push a value out of its range.
 _EDGE = 1e-5
+#: Values that are spread evenly should reach the lowest and the highest fifth of their range. That so many miss one of
+#: them happens with a chance of one in a million: 2 * 0.8**65.
+_OUTER, _FEWEST_FOR_RANGE = 0.2, 65
+#: Share of the values in the outer fifths of what they cover: about 0.4 if they are spread evenly, below 0.25 if they
+#: gather around a mean, as a normal distribution does, which may leave a fifth of its range empty.
+_EVENLY = 0.28
+#: Mean step from one value to the next, as a share of what they cover: a third if each one is drawn anew, far less for
+#: a random walk, which takes its time to get anywhere.
+_DRAWN_ANEW = 0.2
 #: Up to this many equal values may be random: whole numbers repeat.
 _FEWEST_FOR_CONSTANT = 5
 _RANDOM_HINT = "draw a new value for every message: random.uniform({low}, {high})"
@@ -454,6 +463,9 @@ _RANDOM_HINT = "draw a new value for every message: random.uniform({low}, {high}
 @dataclass(frozen=True, slots=True)
 class RandomInRange:
     """Every number on a topic is in a range, and the numbers are random: no constant, cycle, ramp or smooth curve.
+
+    Numbers that are drawn evenly have to come from the whole range: of 65 or more, some are in its lowest fifth, and
+    some in its highest one. Other distributions and random walks may stay near the middle.
 
     Attributes:
         topic: Topic name as on the wire.
@@ -490,7 +502,7 @@ class RandomInRange:
             reason = f"{self.topic}: {quote(messages[0].type)} carries no number"
             return not_met(reason, {"type": messages[0].type}, problem=ProblemKind.NO_NUMBER)
         # The range first: a constant outside of it would be called constant, and mending that would not help.
-        return self._outside(values) or self._computed(values) or self._drawn(values)
+        return self._outside(values) or self._computed(values) or self._narrow(values) or self._drawn(values)
 
     @property
     def _hint(self) -> str:
@@ -536,6 +548,25 @@ class RandomInRange:
         reason = f"{self.topic}: the values are not random but {shown}"
         evidence, facts = self._evidence(values) | {"pattern": pattern}, DrawFacts(min(got), max(got), pattern=pattern)
         return not_met(reason, evidence, hint=self._hint, problem=problem, facts=facts)
+
+    def _narrow(self, values: Sequence[Reading]) -> Finding | None:
+        """Return a finding if values that are drawn evenly leave out an end of the range; None otherwise."""
+        got = [r.value for r in values]
+        least, most = min(got), max(got)
+        edge, extent = _OUTER * (self.high - self.low), most - least
+        reaches = least <= self.low + edge and most >= self.high - edge
+        if reaches or len(got) < _FEWEST_FOR_RANGE or not extent:
+            return None
+        outer = sum(not least + _OUTER * extent <= v <= most - _OUTER * extent for v in got)
+        steps = sum(abs(b - a) for a, b in pairwise(got)) / (len(got) - 1)
+        if outer < _EVENLY * len(got) or steps < _DRAWN_ANEW * extent:
+            return None
+        unit = in_unit(self.unit)
+        brief = f"{self.topic}: only values from {number(least)} to {number(most)}{unit}, "
+        brief += f"expected them from all of {number(self.low)} to {number(self.high)}{unit}"
+        problem, facts = Problem(ProblemKind.WRONG_VALUE, detail="narrow"), DrawFacts(least, most, narrow=True)
+        reason = f"{brief}; {len(got)} values are drawn evenly, and do not come near both ends"
+        return not_met(reason, self._evidence(values), hint=self._hint, problem=problem, facts=facts, brief=brief)
 
     def _drawn(self, values: Sequence[Reading]) -> Finding:
         got = [r.value for r in values]

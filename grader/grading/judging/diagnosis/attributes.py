@@ -15,7 +15,9 @@ from grader.grading.judging.diagnosis.names import (
     NODE_SLIPS,
     PUBLISHER,
     RCLPY,
+    RCLPY_CLASSES,
     RCLPY_MODULES,
+    ROS_1_CALLS,
     SINGLE_NUMBERS,
     article,
     closest,
@@ -141,8 +143,12 @@ def _rclpy_module(crash: Crash, name: str) -> Clue | None:
 
 
 def _rclpy_name(name: str) -> Clue | None:
-    if name == "Node":
-        return Clue("Node is in rclpy.node: from rclpy.node import Node, then class ...(Node)")
+    if name in RCLPY_CLASSES:
+        used = "class ...(Node)" if name == "Node" else name
+        return Clue(f"{name} is in {RCLPY_CLASSES[name]}: from {RCLPY_CLASSES[name]} import {name}, then {used}")
+    if name in ROS_1_CALLS and name not in RCLPY:
+        right = ROS_1_CALLS[name]
+        return Clue(f"rclpy.{name} is a name of ROS 1: in ROS 2 write {right if ' ' in right else right + '(...)'}")
     near = closest(name, RCLPY)
     return Clue(f"rclpy.{name} should be rclpy.{near}") if near else None
 
@@ -320,8 +326,18 @@ def _misspelt(source: Source, name: str) -> Clue | None:
     methods = [f for f in source.functions() if source.is_method(f) and not f.name.startswith("__")]
     unused = [f for f in methods if not used(source, f)]
     near = closest(name, [*stored, *(f.name for f in methods)], 0.8) or closest(name, NODE_METHODS, 0.85)
-    near = near or closest(name, [f.name for f in unused], 0.7)
+    near = near or closest(name, [f.name for f in unused], 0.7) or _doubled(name, stored)
     return Clue(f"self.{name} should be self.{near}") if near else None
+
+
+def _doubled(name: str, known: list[str]) -> str:
+    """Return the only known name that differs by a letter that was typed twice, or once instead of twice."""
+
+    def single(text: str) -> str:
+        return re.sub(r"(.)\1+", r"\1", text)
+
+    near = [other for other in dict.fromkeys(known) if other != name and single(other) == single(name)]
+    return near[0] if len(near) == 1 else ""
 
 
 def _local_only(source: Source, owner: str, name: str) -> Clue | None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Container
 
 from grader.grading.judging.diagnosis.names import NODE_PROPERTIES, closest
 from grader.grading.judging.diagnosis.rules import Clue, Crash, crash_rule, lines_of
-from grader.grading.judging.diagnosis.wiring import Made, bare_statements, made
+from grader.grading.judging.diagnosis.wiring import Made, bare_statements, made, target_of
 from grader.grading.judging.source import (
     Function,
     Source,
@@ -48,6 +49,33 @@ def _returns_nothing(source: Source, call: ast.Call) -> bool:
     return bool(functions) and not returns
 
 
+@crash_rule(
+    r"callback should be either be callable|positional argument|has no attribute|is not defined|NoneType", priority=4015
+)
+def _defined_twice(crash: Crash) -> Clue | None:
+    """Two methods have one name, as after copy and paste: the second one replaces the first."""
+    source, inside = crash.source, {name for _, name in crash.frames()}
+    named = {last_name(m.callback) for m in made(source, "timer", "subscription") if covers(m.call, crash.line)}
+    called = crash.said(r"(\w+)\(\) (?:takes|missing|got)")
+    named |= {called[1].rpartition(".")[2]} if called else set()
+    return twice(source, named | (inside - {"<module>", "__init__", "main"}))
+
+
+def twice(source: Source, names: Container[str]) -> Clue | None:
+    """Return a clue if one of these functions is defined twice in one class or file."""
+    seen: dict[tuple[ast.AST | None, str], Function] = {}
+    for function in source.functions():
+        place = source.parents.get(function), function.name
+        first = seen.setdefault(place, function)
+        plain = not function.decorator_list and not first.decorator_list
+        if first is not function and function.name in names and plain and not isinstance(place[0], (ast.If, ast.Try)):
+            hint = (
+                f"{function.name} is defined twice, in {lines_of(first, function)}, and only this second one counts: "
+            )
+            return Clue(f"{hint}give one of them another name", source.place(function))
+    return None
+
+
 @crash_rule(priority=4020)
 def _callback_signature(crash: Crash) -> Clue | None:
     """A callback does not accept the arguments that it is called with."""
@@ -56,7 +84,29 @@ def _callback_signature(crash: Crash) -> Clue | None:
         or _timed_with_message(crash, crash.source)
         or _subscription_signature(crash)
         or _service_signature(crash)
+        or _filter_signature(crash)
     )
+
+
+def _filter_signature(crash: Crash) -> Clue | None:
+    """The callback of a message filter takes another number of messages than the filter passes."""
+    source, found = crash.source, crash.said(r"(\w+)\(\) (?:takes|missing) ")
+    for call in source.calls("registerCallback") if found else ():
+        functions = source.functions(last_name(argument(call, 0, "cb")))
+        if found is None or len(functions) != 1 or functions[0].name != found[1]:
+            continue
+        owner = chain(call.func).rpartition(".")[0]
+        makers = [
+            c for c in source.calls("TimeSynchronizer", "ApproximateTimeSynchronizer") if target_of(source, c) == owner
+        ]
+        first = makers[0].args[0] if len(makers) == 1 and makers[0].args else None
+        count = len(first.elts) if isinstance(first, (ast.List, ast.Tuple)) else 1
+        names = ["msg"] if count == 1 else [f"msg_{k}" for k in range(1, count + 1)]
+        own = ["self"] if source.is_method(functions[0]) else []
+        passes = "one message" if count == 1 else f"{count} messages"
+        hint = f"the filter passes {passes}: def {functions[0].name}({', '.join([*own, *names])}):"
+        return Clue(hint, source.place(functions[0]))
+    return None
 
 
 def _lacks_self(crash: Crash, source: Source) -> Clue | None:
@@ -146,7 +196,7 @@ def _no_data_yet(crash: Crash) -> Clue | None:
         stored_by = {source.function_name(n) for n in stores} - {""}
         if not stored_by & callbacks:
             continue
-        begin = f"begin {function.name} with: if {name} is None: return"
+        begin = _begin(crash, function, name)
         turned = _turned_test(source, function, name)
         if turned is not None:
             hint = f"'if {source.code(turned.test, 40)}' is the wrong way round: write if {name} is None"
@@ -155,8 +205,24 @@ def _no_data_yet(crash: Crash) -> Clue | None:
             return Clue(f"{name} is None until the first message arrives: {begin}")
         unset = crash.said(rf"object has no attribute '{re.escape(node.attr)}'")
         if unset and "__init__" not in stored_by:
-            return Clue(f"{name} does not exist before the first message: set {name} = None in __init__, and {begin}")
+            early = function.name == "__init__" and not _in_lambda(crash)
+            first = "" if early else f"set {name} = None in __init__, and "
+            return Clue(f"{name} does not exist before the first message: {first}{begin}")
     return None
+
+
+def _in_lambda(crash: Crash) -> bool:
+    return crash.frames()[-1][1] == "<lambda>"
+
+
+def _begin(crash: Crash, function: Function, name: str) -> str:
+    """Return what to do in a function that reads a value which only a callback sets."""
+    if _in_lambda(crash):
+        return f"put a method in place of the lambda that begins with: if {name} is None: return"
+    if function.name == "__init__":
+        line = crash.line
+        return f"line {line} runs before anything can arrive: move it into a callback"
+    return f"begin {function.name} with: if {name} is None: return"
 
 
 def _turned_test(source: Source, function: Function, name: str) -> ast.If | None:

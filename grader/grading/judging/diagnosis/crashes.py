@@ -10,14 +10,16 @@ from grader.grading.judging.diagnosis.wiring import (
     bare_statements,
     head_of,
     made,
+    names_called,
     node_made,
     reached,
     received,
     returns_nothing,
+    roots,
     spins,
     variable_of,
 )
-from grader.grading.judging.source import Loop, Source, chain, covers, first_line, last_name, subtree, text_of
+from grader.grading.judging.source import Loop, Source, argument, chain, covers, first_line, last_name, subtree, text_of
 from grader.grading.model.wording import named
 from grader.runtime.model.trace import FaultKind
 
@@ -149,7 +151,32 @@ def _declared_twice(crash: Crash) -> Clue | None:
     return Clue(f"the parameter {named(crash.found[1], 60)} is declared twice: remove one declare_parameter")
 
 
-@crash_rule(r"undeclared parameter\(s\): ([\w./]+)", in_file=False, priority=5040)
+@crash_rule(r"^(?:\w+\.)*ParameterUninitializedException: .*'([\w./]+)'", in_file=False, priority=5035)
+def _parameter_without_value(crash: Crash) -> Clue | None:
+    """A parameter is declared with a type and without a value, and nobody sets it."""
+    name = crash.found[1]
+    declared = [c for c in crash.case.source.calls("declare_parameter") if c.args and text_of(c.args[0]) == name]
+    hint = f"the parameter {name[:60]} has no value: give it a default, declare_parameter('{name[:60]}', value)"
+    return Clue(hint, crash.case.source.place(declared[0]) if len(declared) == 1 else None)
+
+
+@crash_rule("^ValueError: generator already executing", in_file=False, priority=5038)
+def _spun_by_two(crash: Crash) -> Clue | None:
+    """`rclpy.spin` of several threads uses one executor, which only one thread may run."""
+    source = crash.case.source
+    threads = [
+        c for c in source.calls("Thread") if (w := argument(c, 1, "target")) is not None and _spins_in(source, w)
+    ]
+    hint = "rclpy.spin and spin_once share one executor, which only one thread may run: spin in one thread, or give "
+    return Clue(f"{hint}each thread an executor of its own", source.place(threads[0]) if threads else None)
+
+
+def _spins_in(source: Source, target: ast.expr) -> bool:
+    """Return whether a thread's function is, or calls, one that spins."""
+    return last_name(target) in SPINS or bool(names_called(source, roots(source, target)) & set(SPINS))
+
+
+@crash_rule(r"undeclared parameter\(s\): \[?'?([\w./]+)", in_file=False, priority=5040)
 def _undeclared_parameter(crash: Crash) -> Clue | None:
     name = crash.found[1][:60]
     return Clue(f"declare the parameter first, in __init__: self.declare_parameter('{name}', default_value)")

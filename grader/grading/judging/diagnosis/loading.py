@@ -146,7 +146,8 @@ def _python_2(fault: Fault, row: str) -> Clue | None:
 def _newer_f_string(fault: Fault, row: str) -> Clue | None:
     if not fault.said("f-string") or fault.python is None or fault.python >= (3, 12):
         return None
-    nested = re.search(r"""[fF](['"])[^'"]*\{[^}'"]*\1""", row[:500])
+    # a text in the braces, and the closing brace behind it: without one, it is the brace that is missing
+    nested = re.search(r"""[fF](['"])[^'"]*\{[^}'"]*\1[^'"{}]*\1[^'"{}]*\}""", row[:500])
     if nested is None:
         return None
     other = '"' if nested[1] == "'" else "'"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import re
 
 from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, log_call
@@ -15,6 +16,7 @@ from grader.grading.judging.diagnosis.wiring import (
     made_for,
     names_in,
     number_in_code,
+    pauses,
     python_loggers,
     reached,
     roots,
@@ -27,6 +29,8 @@ from grader.grading.judging.source import Source, argument, chain, last_name, te
 from grader.grading.model.exercise import Location, Outcome, ProblemKind
 from grader.grading.model.wording import number
 
+#: A sleep from this length on in a callback probably explains what is late or missing.
+_LONG_PAUSE_S = 0.2
 _HANDLERS = ("FileHandler", "RotatingFileHandler", "TimedRotatingFileHandler", "WatchedFileHandler")
 _OPENS = ("open", "io.open", "codecs.open")
 #: Levels that hide records of level INFO.
@@ -304,6 +308,26 @@ def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: 
     return Clue(hint, source.place(worth.origin), key="log_pace")
 
 
+def _rare(case: Case) -> Case | None:
+    """Return a case whose check misses logs or responses that a sleep may hold up."""
+    missing, pace = case.found(LogFacts), case.found(LogPaceFacts)
+    late = case.is_about(ProblemKind.TOO_LATE) and bool(case.serves)
+    few = missing is not None and missing.missing > 0
+    slow = pace is not None and (pace.average_s > pace.wanted_s or case.is_about(ProblemKind.STOPPED))
+    heard = case.is_about(ProblemKind.NOT_LOGGED) and (bool(case.logs) or case.criterion.check_name.startswith("logs_"))
+    return case if late or few or slow or heard else None
+
+
+@hint_rule(given=_rare, priority=11105)
+def _logs_held_up(case: Case) -> Clue | None:
+    """A sleep in a callback, or beside spin_once, holds up the other callbacks."""
+    for source in [case.source] if case.process else case.sources.values():
+        pause = next((p for p in pauses(source) if (p.seconds or 0.0) >= _LONG_PAUSE_S), None)
+        if pause is not None:
+            return Clue(pause.hint(source), source.place(pause.call), key="old_messages")
+    return None
+
+
 @hint_rule("logs_received", priority=11110)
 def _received_not_logged(case: Case) -> Clue | None:
     """The callback of the subscription does not log, or does not log what it received."""
@@ -336,6 +360,64 @@ def _wrong_log(source: Source, log: ast.Call, inside: list[ast.AST]) -> Clue | N
     return Clue(f"{source.code(log, 60)} does not show what was received: log msg.data", source.place(log))
 
 
+#: Functions that convert an angle to radians.
+_TO_RADIANS = ("radians", "deg2rad")
+#: How many operators of a conversion are followed.
+_DEEPEST_FACTOR = 12
+#: A factor beyond this makes degrees of radians.
+_DEGREES = 50.0
+
+
+@hint_rule("logs_values", outcome=Outcome.NOT_MET, problem=ProblemKind.WRONG_VALUE, priority=11140)
+def _converted_wrongly(case: Case) -> Clue | None:
+    """The line that converts the received number, or the only one that logs it."""
+    source, advice = case.source, case.verdict.hint or case.criterion.hint
+    item = made_for(source, "subscription", case.check.topic)
+    inside = runs(source, item) if item is not None else []
+    wants_degrees = max(map(abs, case.check.unit_factors), default=0.0) > _DEGREES
+    for node in inside:
+        if isinstance(node, ast.Call) and last_name(node.func) in _TO_RADIANS and wants_degrees:
+            code, given = source.code(node, 40), source.code(node.args[0], 30) if node.args else "..."
+            return Clue(f"{code} converts degrees to radians: write math.degrees({given})", source.place(node))
+    scaled = [n for n in inside if isinstance(n, ast.BinOp) and isinstance(n.op, (ast.Mult, ast.Div))]
+    whole = [n for n in scaled if source.parents.get(n) not in scaled]
+    wrong = [n for n in whole if _factor(source, n) not in (None, 1.0) and not _is_degrees(_factor(source, n))]
+    if len(wrong) == 1 and wants_degrees and advice:
+        return Clue(advice, source.place(wrong[0]))
+    logs = [n for n in inside if isinstance(n, ast.Call) and is_log(source, n)]
+    return Clue(advice, source.place(logs[0])) if len(logs) == 1 and advice else None
+
+
+def _factor(source: Source, node: ast.AST, depth: int = 0) -> float | None:
+    """Return what a product or quotient multiplies its only unknown part by; None if the text does not show it."""
+    if not isinstance(node, ast.BinOp) or depth > _DEEPEST_FACTOR:
+        worth = number_in_code(source, node)
+        return 1.0 if worth is None else worth
+    left, right = _factor(source, node.left, depth + 1), _factor(source, node.right, depth + 1)
+    if left is None or right is None or not isinstance(node.op, (ast.Mult, ast.Div)):
+        return None
+    return left * right if isinstance(node.op, ast.Mult) else left / right if right else None
+
+
+def _is_degrees(factor: float | None) -> bool:
+    return factor is not None and math.isclose(factor, math.degrees(1.0), rel_tol=1e-3)
+
+
+def _logged_at_one_number(source: Source, test: ast.If, every: int) -> Clue | None:
+    """Return a clue if a condition compares the counter itself, as in `count == 10`."""
+    asked = test.test
+    if (
+        not isinstance(asked, ast.Compare)
+        or len(asked.ops) != 1
+        or not isinstance(asked.left, (ast.Name, ast.Attribute))
+    ):
+        return None
+    if number_in_code(source, asked.comparators[0]) is None:
+        return None
+    hint = f"'{source.code(asked, 40)}' does not hold for every {every}th message: write "
+    return Clue(f"{hint}{source.code(asked.left, 30)} % {every} == 0", source.place(test))
+
+
 def _inner(node: ast.AST) -> list[ast.AST]:
     """Return the nodes that may determine the value of a text; the test of a conditional does not."""
     if isinstance(node, ast.IfExp):
@@ -364,6 +446,17 @@ def _error_while_waiting(case: Case) -> Clue | None:
     return Clue(f"this is not a failure of the node: use info or warn instead of {last_name(call.func)}")
 
 
+@hint_rule("logs_every", priority=11125)
+def _limited_by_time(case: Case) -> Clue | None:
+    """The log has `throttle_duration_sec` where one for every ten messages is asked for."""
+    call = log_call(case)
+    limit = next((k for k in call.keywords if k.arg in ("throttle_duration_sec", "once")), None) if call else None
+    if limit is None:
+        return None
+    hint = f"{case.source.code(limit, 40)} goes by time, not by messages: put the log under if count % "
+    return Clue(f"{hint}{case.check.every} == 0", case.source.place(limit))
+
+
 @hint_rule("logs_every", priority=11130)
 def _log_every(case: Case) -> Clue | None:
     """`count % 100 == 0` where one log for every ten messages is asked for, or no condition at all."""
@@ -374,6 +467,8 @@ def _log_every(case: Case) -> Clue | None:
     test = next(source.around(call, ast.If), None) if call is not None else None
     if call is not None and call in timed and test is None:
         return Clue(f"this logs every message: put it under if count % {every} == 0", source.place(call))
+    if test is not None and (clue := _logged_at_one_number(source, test, every)) is not None:
+        return clue
     divisions = [n for n in ast.walk(test.test) if isinstance(n, ast.BinOp)] if test is not None else []
     by = [n for n in divisions if isinstance(n.op, ast.Mod)]
     worth = constant(source, by[0].right) if len(by) == 1 else None

@@ -33,6 +33,35 @@ ROS_1_CALLS = {
     "is_shutdown": "rclpy.ok",
     "Service": "self.create_service",
     "get_param": "self.get_parameter",
+    "ServiceProxy": "self.create_client",
+    "wait_for_service": "client.wait_for_service",
+    "logwarn": "self.get_logger().warn",
+    "logerr": "self.get_logger().error",
+    "logdebug": "self.get_logger().debug",
+    "logfatal": "self.get_logger().fatal",
+    "sleep": "time.sleep, or a timer",
+    "get_name": "self.get_name",
+    "set_param": "self.set_parameters",
+    "has_param": "self.has_parameter",
+    "get_rostime": "self.get_clock().now",
+    "signal_shutdown": "rclpy.shutdown",
+    "wait_for_message": "rclpy.wait_for_message.wait_for_message",
+    "Time": "rclpy.time.Time",
+    "Duration": "rclpy.duration.Duration",
+}
+#: Classes of rclpy that are not in the package itself, with their module.
+RCLPY_CLASSES = {
+    "Node": "rclpy.node",
+    "SingleThreadedExecutor": "rclpy.executors",
+    "MultiThreadedExecutor": "rclpy.executors",
+    "QoSProfile": "rclpy.qos",
+    "ReentrantCallbackGroup": "rclpy.callback_groups",
+    "MutuallyExclusiveCallbackGroup": "rclpy.callback_groups",
+    "Duration": "rclpy.duration",
+    "Time": "rclpy.time",
+    "Clock": "rclpy.clock",
+    "ActionClient": "rclpy.action",
+    "ActionServer": "rclpy.action",
 }
 #: Read-only properties of Node.
 NODE_PROPERTIES = words(

@@ -18,6 +18,7 @@ from grader.grading.judging.diagnosis.wiring import (
     made,
     made_for,
     names_called,
+    pauses,
     publish_calls,
     reached,
     roots,
@@ -217,6 +218,17 @@ def _stopped_itself(paced: _Paced) -> Clue | None:
         tests = [n for c in inside if c in paced.calls for n in conditions(source, c) if changes(source, n.test)]
         if len(tests) == 1:
             return Clue(f"'if {source.code(tests[0].test, 40)}' {advice}", source.place(tests[0]))
+    return None
+
+
+@hint_rule("topic_rate", given=_paced, priority=9055)
+def _held_up_beside_spinning(paced: _Paced) -> Clue | None:
+    """A loop sleeps between two calls of spin_once, so that the timer fires as rarely as the loop turns."""
+    if not paced.timers() or not paced.found_hz < (1 - _SAME) * paced.wanted_hz:
+        return None
+    for pause in pauses(paced.source):
+        if pause.spun is not None and pause.seconds is not None and pause.seconds > 0.5 * paced.period_s:
+            return Clue(pause.hint(paced.source), paced.source.place(pause.call), key="spins_and_sleeps")
     return None
 
 

@@ -50,6 +50,7 @@ def _undefined_name(crash: Crash) -> Clue | None:
         or _stored(source, name, inside)
         or _misspelt(source, name)
         or _message_number(crash, name, function)
+        or _of_another_callback(source, name, function)
         or _never_assigned(source, name)
     )
 
@@ -179,6 +180,18 @@ def _message_number(crash: Crash, name: str, function: Function | None) -> Clue 
     if message.type in SINGLE_NUMBERS and whole:
         return Clue(f"{name} is not defined in {function.name}: the received number is {message.name}.data")
     return None
+
+
+def _of_another_callback(source: Source, name: str, function: Function | None) -> Clue | None:
+    """Only another function has a parameter of this name, such as `msg`."""
+    owners = [f for f in source.functions() if name in parameters(f)]
+    if function is None or len(owners) != 1 or owners[0] is function or name in source.stored:
+        return None
+    owner = owners[0]
+    hint = f"{name} exists only in {owner.name}: "
+    if source.is_method(owner) and source.is_method(function):
+        return Clue(f"{hint}store what you need there, such as self.{name} = {name}, and read that here")
+    return Clue(f"{hint}pass it to {function.name}, which needs a parameter for it")
 
 
 def _never_assigned(source: Source, name: str) -> Clue | None:

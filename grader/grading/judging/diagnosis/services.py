@@ -7,13 +7,12 @@ import ast
 from grader.grading.judging.diagnosis.names import SPINS
 from grader.grading.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
 from grader.grading.judging.diagnosis.wiring import (
+    callback_nodes,
     elsewhere_because,
     goes_to,
-    made,
     names_called,
     reached,
     roots,
-    runs,
     short,
     target_of,
     text_in_code,
@@ -127,13 +126,6 @@ def _other_service_type(end: _End) -> Clue | None:
     return None
 
 
-def _callbacks(source: Source) -> list[ast.AST]:
-    """Return every node that may run in a callback of a timer, a subscription or a service."""
-    found = [n for m in made(source, "timer", "subscription") for n in runs(source, m)]
-    servers = [argument(c, 2, "callback") for c in _ends(source, "service")]
-    return found + [n for callback in servers for n in reached(source, roots(source, callback))]
-
-
 @hint_rule(given=_calling, priority=3030)
 def _synchronous_call(case: Case) -> Clue | None:
     """`client.call()` waits for an answer that only a spinning node takes."""
@@ -144,7 +136,7 @@ def _synchronous_call(case: Case) -> Clue | None:
     grouped = any(k.arg == "callback_group" for k in source.all(ast.keyword))
     for call in calls:
         code = source.code(call)
-        if call in _callbacks(source) and not (grouped and "MultiThreadedExecutor" in names):
+        if call in callback_nodes(source) and not (grouped and "MultiThreadedExecutor" in names):
             hint = f"{code} waits in a callback for a response that can only arrive after the callback returns"
             return Clue(f"{hint}: use call_async and add_done_callback", source.place(call), key="waits_in_callback")
         if not names & {*_THREADS, "MultiThreadedExecutor"}:
@@ -157,7 +149,7 @@ def _synchronous_call(case: Case) -> Clue | None:
 def _spins_in_callback(case: Case) -> Clue | None:
     """A callback spins the node that is spinning already."""
     source = case.source
-    inside = _callbacks(source)
+    inside = callback_nodes(source)
     call = next((c for c in source.calls("spin_until_future_complete", "spin_once") if c in inside), None)
     if call is None or not any(last_name(n) == "spin" for n in source.names()):
         return None

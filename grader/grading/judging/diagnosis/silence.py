@@ -486,6 +486,23 @@ def _stopped_listening(case: Case) -> Clue | None:
     return Clue(f"after {source.code(ends)} no message can arrive any more: keep the subscription", source.place(ends))
 
 
+@hint_rule(given=_unseen_or_once, priority=8185)
+def _taken_from_executor(unseen: _Unseen) -> Clue | None:
+    """`rclpy.spin_once(node)` takes the node from the executor that it was added to."""
+    source = unseen.source
+    added = {chain(c.args[0]): c for c in source.calls("add_node") if c.args}
+    for call in source.calls("spin_once", "spin_until_future_complete"):
+        node = chain(call.args[0]) if call.args and chain(call.func).startswith(("rclpy.", "spin")) else ""
+        owner = added.get(node)
+        executor = chain(owner.func).rpartition(".")[0] if owner is not None else ""
+        if not executor or argument(call, 1, "executor") is not None or first_line(call) < first_line(owner or call):
+            continue
+        if any(chain(c.func) == f"{executor}.spin" for c in source.calls("spin")):
+            hint = f"{source.code(call)} takes {node} from {executor}, which then has nothing to spin: write "
+            return Clue(f"{hint}{executor}.{last_name(call.func)}(...)", source.place(call))
+    return None
+
+
 @hint_rule(given=_unseen, priority=8190)
 def _waits_for_service(unseen: _Unseen) -> Clue | None:
     call = next(unseen.source.calls("wait_for_service"), None)
@@ -599,6 +616,29 @@ def _only_when_told(unseen: _Unseen) -> Clue | None:
         if not _heard(unseen.case, item.topic) and not any(c in timed for c in calls):
             hint = f"this runs only when a message arrives on {quote(item.topic, 60)}, and none does: use a timer"
             return Clue(hint, source.place(item.call), key=f"told:{item.call.lineno}")
+    return None
+
+
+@hint_rule(outcome=Outcome.NOT_MET, given=_unseen, priority=8255)
+def _guarded(unseen: _Unseen) -> Clue | None:
+    """A callback hears messages, and a condition keeps it from publishing or logging each time."""
+    source, calls = unseen.source, unseen.calls
+    for item in made(source, "subscription"):
+        inside = set(runs(source, item))
+        heard = len(unseen.case.trace.deliveries(f"/{(item.topic or '').strip('/')}"))
+        if not heard or not calls or not all(c in inside for c in calls):
+            continue
+        tests = [t for t in conditions(source, calls[0]) if all(t in conditions(source, c) for c in calls)]
+        if not tests:
+            continue
+        test = min(tests, key=first_line)
+        does = "publishes" if silent_topic(unseen.case) else "logs"
+        name = last_name(item.callback) or "the callback"
+        ended = "left it" if calls[0] not in set(subtree(test)) else "was never true"
+        hint = (
+            f"{name} ran for each of {heard} messages, but 'if {source.code(test.test, 40)}' {ended} each time before "
+        )
+        return Clue(f"{hint}it {does}: check the condition", source.place(test), key=f"guard:{first_line(test)}")
     return None
 
 

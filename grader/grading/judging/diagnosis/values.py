@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -31,6 +32,8 @@ _DRAWS = words(
     "uniform randint random randrange gauss normalvariate choice choices normal rand randn triangular integers sample "
     "betavariate random_sample randbelow urandom getrandom randbytes token_bytes getrandbits randbits standard_normal"
 )
+#: Functions that convert an angle.
+_TO_DEGREES, _TO_RADIANS = ("degrees", "rad2deg"), ("radians", "deg2rad")
 #: How many levels of an expression around a random draw are followed.
 _DEEPEST = 12
 
@@ -203,14 +206,16 @@ def _exchanged(case: Case, path: str, other: str, value: float) -> bool:
 
 @hint_rule("field_values", given=_wrong, priority=10030)
 def _strayed_value(wrong: _Wrong) -> Clue | None:
-    """A field that must be zero holds the value expected in another field."""
+    """A field holds the value expected in another field, which does not have it."""
     numbers = leaves(wrong.message.value)
     others = {p: v for check in wrong.case.asked("field_values") for p, v in check.values.items()}
     for path, value in wrong.found.items():
         homes = [p for p, v in others.items() if _is(v, value) and p in numbers and not _is(numbers[p], v)]
         places = [g for g in _given_values(wrong.source, path) if g.worth is not None and _is(g.worth.value, value)]
-        if _is(wrong.wanted[path], 0.0) and len(homes) == 1 and len(places) == 1:
+        if len(homes) == 1 and len(places) == 1:
+            want = wrong.wanted[path]
             hint = f"{wrong.source.code(places[0].node)} puts {number(value)} into {path}: it belongs in {homes[0]}"
+            hint += "" if _is(want, 0.0) else f", and {path} must be {number(want)}"
             return Clue(hint, wrong.source.place(places[0].node), key=f"astray:{first_line(places[0].node)}")
     return None
 
@@ -257,6 +262,19 @@ def _not_assigned(wrong: _Wrong) -> Clue | None:
                 code = source.code(node)
                 hint = f"{code} sets nothing: write {source.code(target)} = {source.code(value, 40)}"
                 return Clue(hint, source.place(node))
+    return None
+
+
+@hint_rule("field_values", given=_wrong, priority=10055)
+def _added_to_field(wrong: _Wrong) -> Clue | None:
+    """`msg.linear.x += 0.5` on a message that is kept adds up from one message to the next."""
+    source = wrong.source
+    for path in wrong.found:
+        for statement in source.all(ast.AugAssign):
+            if chain(statement.target).endswith(f".{path}"):
+                target = source.code(statement.target)
+                hint = f"{source.code(statement)} changes the value with each message: write {target} = "
+                return Clue(f"{hint}{number(wrong.wanted[path])}", source.place(statement))
     return None
 
 
@@ -346,15 +364,16 @@ def _publishes(call: ast.Call, name: str) -> bool:
 
 @hint_rule("field_function", problem=ProblemKind.WRONG_VALUE, priority=10090)
 def _in_degrees(case: Case) -> Clue | None:
-    """The argument of a sine is turned into degrees."""
+    """The argument of a sine is converted between degrees and radians."""
     source = case.source
     places = given_leaf(source, case.check.field.rpartition(".")[2])
     inside = [n for p in places for n in ast.walk(p) if isinstance(n, ast.Call)]
-    turned = [n for n in inside if last_name(n.func) in ("degrees", "rad2deg")]
+    turned = [n for n in inside if last_name(n.func) in (*_TO_DEGREES, *_TO_RADIANS)]
     if len(turned) != 1 or "deg" in str(case.check.formula) or len(turned[0].args) != 1:
         return None
     argument = source.code(turned[0].args[0], 40)
-    hint = f"{source.code(turned[0])} converts radians to degrees: write {argument}"
+    way = "radians to degrees" if last_name(turned[0].func) in _TO_DEGREES else "degrees to radians"
+    hint = f"{source.code(turned[0])} converts {way}: write {argument}"
     return Clue(hint, source.place(turned[0]))
 
 
@@ -434,6 +453,21 @@ def _needless_pi(case: Case) -> Clue | None:
     return None
 
 
+@hint_rule("field_function", priority=10135)
+def _counts_by_another_step(case: Case) -> Clue | None:
+    """The counter grows by another number than 1."""
+    source = case.source
+    for counter in _counters(case):
+        for store in source.stores(counter):
+            statement = source.parents.get(store)
+            step = number_in_code(source, statement.value) if isinstance(statement, ast.AugAssign) else None
+            adds = isinstance(statement, ast.AugAssign) and isinstance(statement.op, ast.Add)
+            if statement is not None and adds and step not in (None, 1.0) and "n" in str(case.check.formula):
+                hint = f"{source.code(statement)} counts {number(step or 0.0)} for each message: write {counter} += 1"
+                return Clue(hint, source.place(statement))
+    return None
+
+
 @hint_rule("field_function", priority=10140)
 def _counter_never_changes(case: Case) -> Clue | None:
     """The counter never changes."""
@@ -444,6 +478,20 @@ def _counter_never_changes(case: Case) -> Clue | None:
         if all(case.source.function_name(s) == "__init__" for s in case.source.stores(counter)):
             return Clue(f"{counter} never changes: write {counter} += 1 after each message")
     return None
+
+
+@hint_rule("field_function", priority=10145)
+def _from_the_clock(case: Case) -> Clue | None:
+    """The value follows the clock, where the formula follows the number of the message."""
+    source, places = case.source, given_leaf(case.source, case.check.field.rpartition(".")[2])
+    if len(places) != 1 or any(source.all(ast.AugAssign)) or re.search(r"\bt\b", str(case.check.formula)):
+        return None
+    function = source.function_of(places[0])
+    clocks = [c for c in source.calls("now", "time", "monotonic", "perf_counter") if source.function_of(c) is function]
+    if not clocks:
+        return None
+    hint = f"{source.code(places[0], 50)} follows the clock: {case.check.formula} follows the number of the message, "
+    return Clue(f"{hint}so count the messages", source.place(places[0]))
 
 
 @hint_rule("field_function", problem=ProblemKind.COUNT_START, priority=10150)
@@ -492,6 +540,15 @@ def _attributes(value: ast.expr) -> Iterator[str]:
             yield chain(node)
 
 
+@hint_rule("field_function", problem=ProblemKind.WRONG_VALUE, priority=10155)
+def _value_line(case: Case) -> Clue | None:
+    """Only the line that computes the value is known, and what the check says about it."""
+    places = given_leaf(case.source, case.check.field.rpartition(".")[2])
+    if len(places) != 1 or not case.verdict.hint:
+        return None
+    return Clue(case.verdict.hint, case.source.place(places[0]))
+
+
 @hint_rule("random_in_range", problem=ProblemKind.NO_NUMBER, priority=10160)
 def _drawn_as_text(case: Case) -> Clue | None:
     """The type of the messages has no number."""
@@ -508,7 +565,7 @@ def _draw_limits(case: Case) -> Clue | None:
     source, check = case.source, case.check
     calls = draws(source)
     facts = case.found(DrawFacts)
-    if facts is None or not facts.outside or len(calls) != 1:
+    if facts is None or not (facts.outside or facts.narrow) or len(calls) != 1:
         return None
     call, low, high = calls[0], number(check.low), number(check.high)
     right = f"random.uniform({float(check.low)}, {float(check.high)})"
@@ -520,11 +577,12 @@ def _draw_limits(case: Case) -> Clue | None:
         if limits == [check.low, check.high]:
             return None
         right = right if last_name(call.func) == "uniform" else f"{chain(call.func)}({low}, {high})"
-        return Clue(f"{source.code(call)} draws outside {low} to {high}: use {right}", source.place(call), key="draw")
-    return _scaled_draw(source, check, call)
+        where = f"outside {low} to {high}" if facts.outside else f"only a part of {low} to {high}"
+        return Clue(f"{source.code(call)} draws {where}: use {right}", source.place(call), key="draw")
+    return _scaled_draw(source, check, call, facts)
 
 
-def _scaled_draw(source: Source, check: Any, call: ast.Call) -> Clue | None:
+def _scaled_draw(source: Source, check: Any, call: ast.Call, facts: DrawFacts) -> Clue | None:
     """`random.random() * 10`: a draw from 0 to 1, scaled to other limits."""
     whole: ast.AST = call
     while isinstance(source.parents.get(whole), ast.BinOp):
@@ -532,7 +590,9 @@ def _scaled_draw(source: Source, check: Any, call: ast.Call) -> Clue | None:
     ends = [_with(source, whole, call, drawn) for drawn in (0.0, 1.0)]
     known = [end for end in ends if end is not None]
     plain = last_name(call.func) in ("random", "rand", "random_sample") and not call.args
-    if not plain or len(known) < 2 or (check.low <= min(known) and max(known) <= check.high):
+    if not plain or len(known) < 2 or {min(known), max(known)} == {check.low, check.high}:
+        return None
+    if check.low <= min(known) and max(known) <= check.high and not facts.narrow:
         return None
     hint = f"{source.code(whole)} goes from {number(min(known))} to {number(max(known))}"
     right = f"random.uniform({float(check.low)}, {float(check.high)})"

@@ -5,8 +5,9 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
+from typing import TypeGuard
 
 from grader.grading.judging.diagnosis.names import LOG_METHODS, SPINS
 from grader.grading.judging.source import (
@@ -323,6 +324,108 @@ def names_called(source: Source, start: Sequence[ast.AST]) -> set[str]:
 def runs(source: Source, item: Made) -> list[ast.AST]:
     """Return every node that may run in the callback of a subscription or timer."""
     return list(reached(source, roots(source, item.callback)))
+
+
+def callback_nodes(source: Source) -> list[ast.AST]:
+    """Return every node that may run in a callback of a timer, a subscription or a service."""
+    found = [n for m in made(source, "timer", "subscription") for n in runs(source, m)]
+    servers = [argument(c, 2, "callback") for c in islice(source.calls("create_service"), MOST_MADE)]
+    return found + [n for callback in servers for n in reached(source, roots(source, callback))]
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """A `time.sleep` that holds callbacks up.
+
+    Attributes:
+        call: The sleep.
+        seconds: How long it takes; None if the text does not show it.
+        spun: The `spin_once` of the loop that it stands in; None if it stands in a callback.
+    """
+
+    call: ast.Call
+    seconds: float | None
+    spun: ast.Call | None = None
+
+    def hint(self, source: Source, held: str = "every callback of the node") -> str:
+        """Return what it does, and what to do.
+
+        Args:
+            source: Its file.
+            held: What it holds up.
+        """
+        code = source.code(self.call, 50)
+        if self.spun is None:
+            name = source.function_name(self.call) or "the callback"
+            return f"{code} in {name} holds up {held}: remove it"
+        node = self.spun.args[0] if self.spun.args else None
+        given = source.code(node, 30) if node is not None else "node"
+        return f"{code} beside spin_once holds up {held}: call rclpy.spin({given}) in place of the loop"
+
+
+def pauses(source: Source) -> list[Pause]:
+    """Return the sleeps that hold callbacks up: those in a callback, and those beside `spin_once` in a loop."""
+    found: dict[ast.Call, Pause] = {}
+    for node in callback_nodes(source):
+        if _sleeps(node, source):
+            found.setdefault(node, Pause(node, number_in_code(source, argument(node, 0, "secs"))))
+    for loop in source.loops():
+        inside = list(reached(source, [loop]))
+        spun = next((n for n in inside if isinstance(n, ast.Call) and last_name(n.func) == "spin_once"), None)
+        for node in inside if spun is not None else ():
+            if _sleeps(node, source):
+                found.setdefault(node, Pause(node, number_in_code(source, argument(node, 0, "secs")), spun))
+    return sorted(found.values(), key=lambda pause: first_line(pause.call))
+
+
+def _sleeps(node: ast.AST, source: Source) -> TypeGuard[ast.Call]:
+    if not isinstance(node, ast.Call) or not (node.args or node.keywords):
+        return False
+    return chain(node.func) in ("time.sleep", "sleep") or source.resolved(node.func) == "time.sleep"
+
+
+@dataclass(frozen=True, slots=True)
+class Switch:
+    """A comparison with a number, turned so that the number is on the right."""
+
+    node: ast.Compare
+    op: ast.cmpop
+    limit: Constant
+    tested: ast.expr
+
+
+#: Comparison -> the same one with its sides exchanged.
+_TURNED: dict[type[ast.cmpop], type[ast.cmpop]] = {ast.Gt: ast.Lt, ast.GtE: ast.LtE, ast.Lt: ast.Gt, ast.LtE: ast.GtE}
+ORDERS = tuple(_TURNED)
+#: Largest difference of a number from a limit that it is taken for.
+_SAME_LIMIT = 1e-6
+
+
+def switches(source: Source, limit: float | None = None) -> list[Switch]:
+    """Return the comparisons of something with a number that the text shows, with that limit if one is given."""
+    found = []
+    for node in source.all(ast.Compare):
+        if len(node.ops) != 1:
+            continue
+        left, right = constant(source, node.left), constant(source, node.comparators[0])
+        op: ast.cmpop = node.ops[0]
+        if right is not None and left is None and isinstance(op, ORDERS):
+            found.append(Switch(node, op, right, node.left))
+        elif left is not None and right is None and isinstance(op, ORDERS):
+            found.append(Switch(node, _TURNED[type(op)](), left, node.comparators[0]))
+    return [s for s in found if limit is None or abs(s.limit.value - limit) <= _SAME_LIMIT]
+
+
+def text_comparisons(source: Source, nodes: Iterable[ast.AST]) -> list[ast.Compare]:
+    """Return the comparisons among nodes that compare with a number in quotes, letter by letter."""
+    found = []
+    for node in nodes:
+        if not isinstance(node, ast.Compare) or len(node.ops) != 1 or not isinstance(node.ops[0], ORDERS):
+            continue
+        texts = [text_in_code(source, side) for side in (node.left, node.comparators[0])]
+        if any(text is not None and text.strip().replace(".", "", 1).isdigit() for text in texts):
+            found.append(node)
+    return found
 
 
 def names_in(node: ast.AST) -> set[str]:

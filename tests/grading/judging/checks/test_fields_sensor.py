@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -74,6 +75,46 @@ def test_a_constant_is_not_random(value: float) -> None:
 def test_a_ramp_is_not_random() -> None:
     """The pattern is named."""
     assert "ramp" in RANGE.judge(sensed([20 + k / 10 for k in range(60)]).trace()).reason
+
+
+def evenly(low: float, high: float, count: int = 100) -> list[float]:
+    rng = random.Random(8)
+    return [rng.uniform(low, high) for _ in range(count)]
+
+
+@pytest.mark.parametrize(("low", "high"), [(22, 28), (20, 25), (25.5, 30), (23.0, 27.0), (20, 27.5)])
+def test_an_even_draw_from_a_part_of_the_range_is_told(low: float, high: float) -> None:
+    """With what it covers, and what was asked for."""
+    finding = RANGE.judge(sensed(evenly(low, high)).trace())
+    assert finding.credit == 0
+    assert "only values from " in finding.reason
+    assert "expected them from all of 20 to 30 °C" in finding.reason
+    assert finding.problem == Problem(ProblemKind.WRONG_VALUE, detail="narrow")
+    assert RANGE.judge(sensed(evenly(low, high, 64)).trace()).credit == 1  # too few to tell
+
+
+def wandering(step: float) -> list[float]:
+    rng, values = random.Random(8), [25.0]
+    for _ in range(99):
+        values.append(min(28.0, max(22.0, values[-1] + rng.uniform(-step, step))))
+    return values
+
+
+OTHERWISE = {
+    "evenly": evenly(20, 30),
+    "whole": [float(round(v)) for v in evenly(20, 30)],
+    "few": [random.Random(k).choice([21.0, 24.0, 26.0, 29.0]) for k in range(100)],
+    "gathered around 25": [random.Random(k).gauss(25.0, 0.9) for k in range(100)],
+    "wandering": wandering(0.5),
+    "wandering far": wandering(1.5),
+}
+
+
+@pytest.mark.parametrize("values", OTHERWISE.values(), ids=OTHERWISE)
+def test_other_draws_may_stay_near_the_middle(values: list[float]) -> None:
+    """A normal distribution and a random walk need not come near the ends."""
+    finding = RANGE.judge(sensed(values).trace())
+    assert finding.credit == 1, finding.reason
 
 
 def test_one_value_leaves_the_question_open() -> None:
