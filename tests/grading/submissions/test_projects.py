@@ -205,7 +205,6 @@ def test_what_a_hostile_file_holds_becomes_a_note(
     assert {path.name for path in tmp_path.iterdir()} == {"ws", "prefix"}
 
 
-@pytest.mark.long
 def test_a_trusted_process_stays_small_whatever_the_files_are(tmp_path: Path) -> None:
     """All hostile files, one after the other, in a process that does nothing else."""
     roots = [str(made(tmp_path / str(number), files)) for number, (files, _) in enumerate(HOSTILE.values())]
@@ -324,12 +323,7 @@ def test_more_than_the_total_is_not_read(tmp_path: Path) -> None:
         (tmp_path / f"p{number:02}").mkdir()
         (tmp_path / f"p{number:02}" / "package.xml").write_bytes(b" " * projects.MOST_BYTES)
     asked: list[bytes] = []
-
-    def told(given: bytes) -> bytes:
-        asked.append(given)
-        return b""
-
-    read_projects(tmp_path, told)
+    read_projects(tmp_path, lambda given: asked.append(given) or b"")
     assert projects.TOTAL_BYTES <= len(asked[0]) < projects.TOTAL_BYTES + 10_000
 
 
