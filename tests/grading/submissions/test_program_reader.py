@@ -96,7 +96,8 @@ def test_a_tree_that_is_told_is_one_that_the_parser_makes(tmp_path: Path) -> Non
         assert ast.dump(made, include_attributes=True) == ast.dump(tree, include_attributes=True)
     row = json.loads(json_of(ast.parse("x = f(1, b'2', 3j, ..., 10 ** 99, None)\n")))
     for place in paths(row):
-        for odd in (None, -1, 10**9, "x", [], [[]], {}, True, 1.5):
+        odd_values: tuple[object, ...] = (None, -1, 10**9, "x", [], [[]], {}, True, 1.5)
+        for odd in odd_values:
             changed = json.loads(json.dumps(row))
             here = changed
             for step in place[:-1]:
