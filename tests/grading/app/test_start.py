@@ -3,6 +3,7 @@
 import os
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -56,12 +57,12 @@ def test_an_exercise_may_be_named_as_its_task_sheet_or_its_file(name: str, id_: 
 
 def test_what_holds_no_file_to_run_is_graded_without_a_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """But for the one that reads it: names show it before anything is started, or texts before anything is run."""
-    started = subprocess.Popen.__init__
+    started: Any = subprocess.Popen.__init__
 
     def refuse(*given: object, **options: object) -> None:
         if "grader.grading.submissions.submission_reader" not in str(given[1:]):
             pytest.fail("a process was started")
-        started(*given, **options)  # type: ignore[call-overload]
+        started(*given, **options)
 
     find_ros()  # once for each process, perhaps by asking another one
     monkeypatch.setattr(subprocess.Popen, "__init__", refuse)
