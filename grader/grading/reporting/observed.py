@@ -89,8 +89,8 @@ def _contents(topic: TopicSummary) -> Iterator[str]:
             if (most == 0) is empty:
                 limits, flags = topic.ranges.get(f"{name}[]"), topic.flags.get(f"{name}[]")
                 size = counted(most, "element") if least == most else f"{least} to {counted(most, 'element')}"
-                inside = _range(*limits) if limits else _flags(flags) if flags else ""
-                yield f"{shown(name)}: {size}{f', {inside}' if inside else ''}"
+                held = _range(*limits) if limits else _flags(flags) if flags else ""
+                yield f"{shown(name)}: {size}{f', {held}' if held else ''}"
         yield from (f"{shown(n)}: {_range(*limits)}" for n, limits in rest.items() if (limits == (0, 0)) is empty)
 
 
