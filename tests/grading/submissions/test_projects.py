@@ -323,7 +323,12 @@ def test_more_than_the_total_is_not_read(tmp_path: Path) -> None:
         (tmp_path / f"p{number:02}").mkdir()
         (tmp_path / f"p{number:02}" / "package.xml").write_bytes(b" " * projects.MOST_BYTES)
     asked: list[bytes] = []
-    read_projects(tmp_path, lambda given: asked.append(given) or b"")
+
+    def tell(given: bytes) -> bytes:
+        asked.append(given)
+        return b""
+
+    read_projects(tmp_path, tell)
     assert projects.TOTAL_BYTES <= len(asked[0]) < projects.TOTAL_BYTES + 10_000
 
 
