@@ -153,7 +153,12 @@ def check(  # noqa: PLR0913  what to check, with what, and where progress goes
             if busy:
                 found[key] = _unchecked(found[key], suspect=checks.suspects(key, traces))
         if difference is not None:
-            found |= _decided(difference, {k: j for k, j in jobs.items() if k[0] == exercise}, traces, record)
+            decided = _decided(difference, {k: j for k, j in jobs.items() if k[0] == exercise}, traces, record)
+            suspect = any(checks.suspects(key, traces) for key in own)
+            # A machine that is too busy to decide may have caused such a difference as well.
+            if difference.by_load and not suspect and any(trace.harness_problem for trace in decided.values()):
+                decided = {key: _unchecked(traces[key], suspect=False) for key in decided}
+            found |= decided
         for key in (key for key in jobs if key[0] == exercise):
             finished(key, found[key])
     return found

@@ -239,6 +239,13 @@ def test_slowness_that_a_busy_machine_explains_is_no_difference() -> None:
     assert checked(Recorder(hardly, hardly, hardly), reaches=(), share=1.0).clock is ClockKind.WALL
 
 
+def test_a_machine_that_is_too_busy_to_decide_takes_no_points() -> None:
+    """A difference that load can cause leaves virtual time, and is not final; what a check is about is undecided."""
+    open_ = checked(Recorder(OTHER, OTHER, BUSY), reaches=(), share=1.0)
+    assert (open_.clock, bool(open_.unchecked), open_.harness_problem) == (ClockKind.VIRTUAL, True, "")
+    assert checked(Recorder(OTHER, OTHER, BUSY)).harness_problem == BUSY.harness_problem
+
+
 def test_a_busy_machine_is_given_another_try() -> None:
     """A check that was held up counts neither way, unless the clocks agree all the same."""
     assert checked(Recorder(BUSY, BUSY, SAME)) == trace()
