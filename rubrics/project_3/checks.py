@@ -413,7 +413,7 @@ class _Words:
     def taken_back(self) -> frozenset[_Text]:
         """The texts after every good response that follow a low number only before a warning: a start, taken back.
 
-        What shows the response itself is no start.
+        What shows the response itself is not a start.
         """
         good, low = self.of(CallKind.GOOD), self.of(CallKind.LOW)
         if not good or not low or not self.clear:

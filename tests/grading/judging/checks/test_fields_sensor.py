@@ -17,6 +17,7 @@ from grader.grading.judging.checks.received import LogsReceived
 from grader.grading.model.exercise import Problem, ProblemKind
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import Trace
 
 RANGE = RandomInRange("/temperature", 20, 30, unit="°C")
 LOGS = LogsReceived("temperature_sensor.py", "/fan_speed")
@@ -77,6 +78,13 @@ def test_a_ramp_is_not_random() -> None:
     assert "ramp" in RANGE.judge(sensed([20 + k / 10 for k in range(60)]).trace()).reason
 
 
+def sent(values: list[float]) -> Trace:
+    rec = Recording(0.2 * len(values) + 0.4, process="temperature_sensor.py")
+    for k, value in enumerate(values, 1):
+        rec.number(0.2 * k, "/temperature", value)
+    return rec.trace()
+
+
 def evenly(low: float, high: float, count: int = 100) -> list[float]:
     rng = random.Random(8)
     return [rng.uniform(low, high) for _ in range(count)]
@@ -85,12 +93,12 @@ def evenly(low: float, high: float, count: int = 100) -> list[float]:
 @pytest.mark.parametrize(("low", "high"), [(22, 28), (20, 25), (25.5, 30), (23.0, 27.0), (20, 27.5)])
 def test_an_even_draw_from_a_part_of_the_range_is_told(low: float, high: float) -> None:
     """With what it covers, and what was asked for."""
-    finding = RANGE.judge(sensed(evenly(low, high)).trace())
+    finding = RANGE.judge(sent(evenly(low, high)))
     assert finding.credit == 0
     assert "only values from " in finding.reason
     assert "expected them from all of 20 to 30 °C" in finding.reason
     assert finding.problem == Problem(ProblemKind.WRONG_VALUE, detail="narrow")
-    assert RANGE.judge(sensed(evenly(low, high, 64)).trace()).credit == 1  # too few to tell
+    assert RANGE.judge(sent(evenly(low, high, 64))).credit == 1  # too few to tell
 
 
 def wandering(step: float) -> list[float]:
@@ -113,7 +121,7 @@ OTHERWISE = {
 @pytest.mark.parametrize("values", OTHERWISE.values(), ids=OTHERWISE)
 def test_other_draws_may_stay_near_the_middle(values: list[float]) -> None:
     """A normal distribution and a random walk need not come near the ends."""
-    finding = RANGE.judge(sensed(values).trace())
+    finding = RANGE.judge(sent(values))
     assert finding.credit == 1, finding.reason
 
 
