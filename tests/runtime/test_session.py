@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -42,6 +43,7 @@ def session_of(recorder: Recorder) -> RecordingSession:
     """Return a session that has a recorder and a folder, and nothing else."""
     make: Any = RecordingSession
     session: RecordingSession = make(*(None,) * (len(RecordingSession.__slots__) - 2), recorder, Path("nowhere"))
+    object.__setattr__(session, "ros", SimpleNamespace(distro="jazzy"))
     return session
 
 
@@ -153,6 +155,7 @@ def decided(recorder: PacedRecorder, clock: str = AUTO) -> Trace:
     heard: list[str] = []
     make: Any = RecordingSession
     session: RecordingSession = make(*(None,) * (len(RecordingSession.__slots__) - 2), recorder, Path("nowhere"))
+    object.__setattr__(session, "ros", SimpleNamespace(distro="jazzy"))
     traces = session.record({"a": job("a")}, clock, lambda step: None, lambda key, _: heard.append(key))
     assert heard == ["a"]
     return traces["a"]

@@ -492,7 +492,7 @@ def exercises_of(report: ReportData | None) -> Sequence[ExerciseData]:
 
 
 def unchecked(report: ReportData | None) -> list[str]:
-    """Return why checks on the wall clock came to no result, each reason once."""
+    """Return why checks on the wall clock ended without a result, each reason once."""
     return list(dict.fromkeys(filter(None, (exercise.get("unchecked", "") for exercise in exercises_of(report)))))
 
 

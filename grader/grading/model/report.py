@@ -100,7 +100,7 @@ class ExerciseReport:
     situations: Mapping[str, str] = field(default_factory=dict)
     variant: Variant | None = None  # the values of this student's variant; None if there are none
     starts: tuple[Start, ...] = ()  # how each file was started; empty in reports on evidence of earlier versions
-    unchecked: str = ""  # why a check on the wall clock came to no result; empty if it did, or none was due
+    unchecked: str = ""  # why a check on the wall clock ended without a result; empty if it had one, or none was due
 
     @property
     def score(self) -> Fraction:

@@ -80,7 +80,7 @@ class Asked:
         return b"".join((*self._contents, header, len(header).to_bytes(8, "big")))
 
 
-class Answer:
+class ReaderAnswer:
     """What the process said, as far as it came.
 
     Args:
@@ -103,7 +103,7 @@ class Answer:
         return found if isinstance(found, dict) else None
 
     def part(self, size: object) -> bytes | None:
-        """Return the next bytes; None if the size is none, or so many did not come."""
+        """Return the next bytes; None if the size is invalid, or fewer came."""
         if type(size) is not int or not 0 <= size <= len(self._told) - self._at:
             return None
         self._at += size

@@ -11,7 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from grader.grading.submissions.collected import name_problem
-from grader.grading.submissions.contained_reader import Answer, Asked, Tell, content_of, first_line, told_by_process
+from grader.grading.submissions.contained_reader import (
+    Asked,
+    ReaderAnswer,
+    Tell,
+    content_of,
+    first_line,
+    told_by_process,
+)
 from grader.runtime.model.limits import MAX_FILES, MAX_NAME_BYTES, MAX_PATH_BYTES
 from grader.runtime.model.projects import Project
 from grader.runtime.model.wording import first_of
@@ -59,7 +66,7 @@ def read_projects(root: Path, tell: Tell = told_by_process) -> tuple[tuple[Proje
     if not packages.folders:
         return (), ()
     packages.ask(asked)
-    return packages.told(Answer(tell(asked.input())))
+    return packages.told(ReaderAnswer(tell(asked.input())))
 
 
 class Packages:
@@ -107,7 +114,7 @@ class Packages:
             self._numbers[path] = asked.add(content)
         return content or b""
 
-    def told(self, answer: Answer) -> tuple[tuple[Project, ...], tuple[str, ...]]:
+    def told(self, answer: ReaderAnswer) -> tuple[tuple[Project, ...], tuple[str, ...]]:
         """Return the packages as the process says what their files hold, and notes."""
         found, problems = [], dict(self._problems)
         ended = False

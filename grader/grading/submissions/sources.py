@@ -20,9 +20,9 @@ from grader.grading.submissions.answers import (
     NAME_CHARACTERS,
     UNREADABLE,
 )
-from grader.grading.submissions.contained_reader import Answer, Asked, Tell, content_of, told_by_process
+from grader.grading.submissions.contained_reader import Asked, ReaderAnswer, Tell, content_of, told_by_process
 from grader.runtime.model.limits import MAX_PROGRAM_BYTES, MAX_SOURCE_BYTES
-from grader.runtime.model.submission import CompileError, Program, SourceText, Submission
+from grader.runtime.model.submission import CompileError, ReadProgram, SourceText, Submission
 from grader.runtime.model.wording import first_of
 
 __all__ = ["COMPILED", "HASHES", "LONG_FILE", "UNREADABLE", "Programs", "read_programs", "read_reaches", "read_sources"]
@@ -39,7 +39,7 @@ _REASONS = {
 }
 _CONSEQUENCE = "hints do not name its lines, and spot checks also run it on the wall clock"
 #: What stands for a program of which the process said nothing.
-_UNTOLD = Program(reaches=(LONG_FILE,))
+_UNTOLD = ReadProgram(reaches=(LONG_FILE,))
 
 
 class Programs:
@@ -54,7 +54,7 @@ class Programs:
         self._root = root
         self._likely = frozenset(likely)
         self._asked: list[str] = []
-        self._found: dict[str, Program] = {}
+        self._found: dict[str, ReadProgram] = {}
         self._problems: dict[tuple[str, str], None] = {}
 
     def ask(self, asked: Asked) -> None:
@@ -76,7 +76,7 @@ class Programs:
     def _is_likely(self, path: str) -> bool:
         return path in self._likely or posixpath.basename(path) in self._likely
 
-    def told(self, answer: Answer) -> tuple[dict[str, Program], tuple[str, ...]]:
+    def told(self, answer: ReaderAnswer) -> tuple[dict[str, ReadProgram], tuple[str, ...]]:
         """Return the programs by path as the process says what they hold, and notes on those that it does not."""
         found, problems = dict(self._found), dict(self._problems)
         for path, program, problem in _programs(answer, self._asked):
@@ -86,7 +86,7 @@ class Programs:
         return found, tuple(_notes(problems))
 
 
-def _programs(answer: Answer, asked: Sequence[str]) -> Iterator[tuple[str, Program, str]]:
+def _programs(answer: ReaderAnswer, asked: Sequence[str]) -> Iterator[tuple[str, ReadProgram, str]]:
     """Yield what the process says of each program, checked, and why one was not examined; empty if it was."""
     left = dict.fromkeys(asked)
     while left and (row := answer.row()) is not None:
@@ -99,7 +99,7 @@ def _programs(answer: Answer, asked: Sequence[str]) -> Iterator[tuple[str, Progr
     yield from ((path, _UNTOLD, COSTLY) for path in left)
 
 
-def _checked(row: Mapping[str, Any], text: bytes, tree: bytes) -> Program:
+def _checked(row: Mapping[str, Any], text: bytes, tree: bytes) -> ReadProgram:
     reaches, error = row.get("reaches"), row.get("error")
     names = [name for name in reaches if isinstance(name, str)] if isinstance(reaches, list) else [LONG_FILE]
     read = None
@@ -108,7 +108,7 @@ def _checked(row: Mapping[str, Any], text: bytes, tree: bytes) -> Program:
             read = SourceText(text.decode(), tree if "tree" in row else None)
         except UnicodeDecodeError:
             read = None
-    return Program(
+    return ReadProgram(
         read,
         inert=row.get("inert") is True,
         error=_error(error),
@@ -137,7 +137,7 @@ def _notes(problems: Mapping[tuple[str, str], None]) -> Iterator[str]:
 
 def read_programs(
     root: Path, likely: Iterable[str] = (), tell: Tell = told_by_process
-) -> tuple[dict[str, Program], tuple[str, ...]]:
+) -> tuple[dict[str, ReadProgram], tuple[str, ...]]:
     """Return the Python files of a staged submission by path, and notes on those that were not examined.
 
     Raises:
@@ -145,7 +145,7 @@ def read_programs(
     """
     programs, asked = Programs(root, likely), Asked()
     programs.ask(asked)
-    return programs.told(Answer(tell(asked.input()))) if asked.programs else programs.told(Answer(b""))
+    return programs.told(ReaderAnswer(tell(asked.input()))) if asked.programs else programs.told(ReaderAnswer(b""))
 
 
 def read_sources(submission: Submission, tell: Tell = told_by_process) -> dict[str, SourceText]:
@@ -168,7 +168,7 @@ def read_files(submission: Submission, paths: Iterable[str], tell: Tell = told_b
         contents = {path: content_of(submission.root / path, MAX_SOURCE_BYTES) for path in missing}
         kept = {path: content for path, content in contents.items() if content is not None}
         asked.programs += [(path, asked.add(content)) for path, content in kept.items()]
-        answer = Answer(tell(asked.input()) if kept else b"")
+        answer = ReaderAnswer(tell(asked.input()) if kept else b"")
         known |= {path: program for path, program, _ in _programs(answer, list(kept))}
     return {path: program.text for path, program in known.items() if program.text is not None}
 
@@ -182,14 +182,14 @@ def read_texts(texts: Mapping[str, str], tell: Tell = told_by_process) -> dict[s
             asked = Asked(likely=list(texts), decoded=True)
             asked.programs += [(one, asked.add(text.encode("utf-8", "replace"))) for one, text in texts.items()]
             trees.update(dict.fromkeys(texts))
-            for one, program, _ in _programs(Answer(tell(asked.input())), list(texts)):
+            for one, program, _ in _programs(ReaderAnswer(tell(asked.input())), list(texts)):
                 trees[one] = program.text.tree if program.text is not None else None
         return trees[name]
 
     return {name: SourceText(text, partial(tree_of, name)) for name, text in texts.items()}
 
 
-def read_reaches(root: Path, programs: Mapping[str, Program] | None = None) -> tuple[str, ...]:
+def read_reaches(root: Path, programs: Mapping[str, ReadProgram] | None = None) -> tuple[str, ...]:
     """Return the names by which the files of a staged submission reach into their process, without duplicates.
 
     A module that is not text, or has more text than is read, counts as reaching, and so does an archive that modules

@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
 from grader.grading.submissions.collected import Collected
-from grader.grading.submissions.contents import Contents, read_contents
+from grader.grading.submissions.contents import SubmissionContents, read_contents
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.staging import collect_folder, read_start, write_files
 from grader.runtime.model.errors import SubmissionError
@@ -109,7 +109,7 @@ def stage_collected(
     digest = write_files(collected, into)
     likely = {name for one in wanted for last in [one.rpartition("/")[2]] for name in (last, f"{last}.py")}
     # without wanted files, it is staged for its digest alone
-    contents = read_contents(into, likely | set(meant.values())) if wanted else Contents((), {}, ())
+    contents = read_contents(into, likely | set(meant.values())) if wanted else SubmissionContents((), {}, ())
     projects, programs = contents.projects, executables(into, contents.projects)
     files = {
         name: _look_for_executable(name, into, projects, programs, collected.files, wanted)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 RELEASE = "jazzy"
 
 
-class Kind(NamedTuple):
+class NameKind(NamedTuple):
     """A class of ROS: the names that it takes and has."""
 
     base: str  # the class that it is derived from, as a key of `CLASSES`; empty for one of other packages
@@ -607,68 +607,68 @@ MODULES: Mapping[str, str] = {
     "launch_yaml.parser": "Entity FilePath Parser frontend",
 }
 #: Classes by their name; by the package in front of it where two have the same.
-CLASSES: Mapping[str, Kind] = {
-    "Action": Kind(
+CLASSES: Mapping[str, NameKind] = {
+    "Action": NameKind(
         "LaunchDescriptionEntity",
         "* condition=",
         "condition execute get_sub_entities parse",
     ),
-    "AllSubstitution": Kind(
+    "AllSubstitution": NameKind(
         "Substitution",
         "*args",
         "args parse",
     ),
-    "AndSubstitution": Kind(
+    "AndSubstitution": NameKind(
         "Substitution",
         "left right",
         "left parse right",
     ),
-    "AnonName": Kind(
+    "AnonName": NameKind(
         "Substitution",
         "name",
         "compute_name name parse",
     ),
-    "AnyLaunchDescriptionSource": Kind(
+    "AnyLaunchDescriptionSource": NameKind(
         "LaunchDescriptionSource",
         "launch_file_path",
         "",
     ),
-    "AnySubstitution": Kind(
+    "AnySubstitution": NameKind(
         "Substitution",
         "*args",
         "args parse",
     ),
-    "AppendEnvironmentVariable": Kind(
+    "AppendEnvironmentVariable": NameKind(
         "Action",
         "name value prepend= separator= * condition=",
         "name prepend separator value",
     ),
-    "AsyncSafeSignalManager": Kind(
+    "AsyncSafeSignalManager": NameKind(
         "",
         "loop",
         "handle",
     ),
-    "BaseEventHandler": Kind(
+    "BaseEventHandler": NameKind(
         "",
         "* matcher handle_once=",
         "describe handle handle_once handler_description matcher_description matches",
     ),
-    "ChangeState": Kind(
+    "ChangeState": NameKind(
         "Event",
         "* lifecycle_node_matcher transition_id",
         "lifecycle_node_matcher transition_id valid_states valid_transitions",
     ),
-    "Command": Kind(
+    "Command": NameKind(
         "Substitution",
         "command * on_stderr=",
         "command on_stderr parse",
     ),
-    "ComposableNode": Kind(
+    "ComposableNode": NameKind(
         "",
         "* package plugin name= namespace= parameters= remappings= extra_arguments= condition=",
         "condition extra_arguments node_name node_namespace node_plugin package parameters parse remappings",
     ),
-    "ComposableNodeContainer": Kind(
+    "ComposableNodeContainer": NameKind(
         "Node",
         "* name namespace composable_node_descriptions= executable package= exec_name= parameters= remappings= "
         "ros_arguments= arguments= prefix= cwd= env= additional_env= shell= sigterm_timeout= sigkill_timeout= "
@@ -676,247 +676,247 @@ CLASSES: Mapping[str, Kind] = {
         "respawn_max_retries= condition=",
         "",
     ),
-    "Condition": Kind(
+    "Condition": NameKind(
         "",
         "* predicate=",
         "describe evaluate",
     ),
-    "DeclareLaunchArgument": Kind(
+    "DeclareLaunchArgument": NameKind(
         "Action",
         "name * default_value= description= choices= condition=",
         "choices default_value description name",
     ),
-    "EmitEvent": Kind(
+    "EmitEvent": NameKind(
         "Action",
         "* event condition=",
         "event",
     ),
-    "EnvironmentVariable": Kind(
+    "EnvironmentVariable": NameKind(
         "Substitution",
         "name * default_value=",
         "default_value name parse",
     ),
-    "EqualsSubstitution": Kind(
+    "EqualsSubstitution": NameKind(
         "Substitution",
         "left right",
         "left parse right",
     ),
-    "Event": Kind(
+    "Event": NameKind(
         "",
         "**",
         "name",
     ),
-    "EventHandler": Kind(
+    "EventHandler": NameKind(
         "BaseEventHandler",
         "* matcher entities= handle_once=",
         "entities",
     ),
-    "Executable": Kind(
+    "Executable": NameKind(
         "",
         "* cmd prefix= name= cwd= env= additional_env= arguments=",
         "additional_env arguments cmd cwd env final_cmd final_cwd final_env final_name name prefix prepare",
     ),
-    "ExecutableInPackage": Kind(
+    "ExecutableInPackage": NameKind(
         "FindPackagePrefix",
         "executable package",
         "executable",
     ),
-    "ExecuteLocal": Kind(
+    "ExecuteLocal": NameKind(
         "Action",
         "* process_description shell= sigterm_timeout= sigkill_timeout= emulate_tty= output= output_format= "
         "cached_output= log_cmd= on_exit= respawn= respawn_delay= respawn_max_retries= condition=",
         "emulate_tty get_stderr get_stdout output prepare process_description process_details return_code shell "
         "sigkill_timeout sigterm_timeout",
     ),
-    "ExecuteProcess": Kind(
+    "ExecuteProcess": NameKind(
         "ExecuteLocal",
         "* cmd prefix= name= cwd= env= additional_env= shell= sigterm_timeout= sigkill_timeout= emulate_tty= "
         "output= output_format= cached_output= log_cmd= on_exit= respawn= respawn_delay= respawn_max_retries= "
         "condition=",
         "additional_env cmd cwd env name",
     ),
-    "ExecutionComplete": Kind(
+    "ExecutionComplete": NameKind(
         "Event",
         "* action",
         "action",
     ),
-    "FileContent": Kind(
+    "FileContent": NameKind(
         "Substitution",
         "path",
         "parse path",
     ),
-    "FindExecutable": Kind(
+    "FindExecutable": NameKind(
         "Substitution",
         "* name",
         "name parse",
     ),
-    "FindPackage": Kind(
+    "FindPackage": NameKind(
         "Substitution",
         "package",
         "find package parse",
     ),
-    "FindPackagePrefix": Kind(
+    "FindPackagePrefix": NameKind(
         "FindPackage",
         "package",
         "",
     ),
-    "FindPackageShare": Kind(
+    "FindPackageShare": NameKind(
         "FindPackage",
         "package",
         "",
     ),
-    "FrontendLaunchDescriptionSource": Kind(
+    "FrontendLaunchDescriptionSource": NameKind(
         "LaunchDescriptionSource",
         "launch_file_path * method= parser=",
         "",
     ),
-    "GroupAction": Kind(
+    "GroupAction": NameKind(
         "Action",
         "actions * scoped= forwarding= launch_configurations= condition=",
         "",
     ),
-    "IfCondition": Kind(
+    "IfCondition": NameKind(
         "Condition",
         "predicate_expression",
         "",
     ),
-    "IfElseSubstitution": Kind(
+    "IfElseSubstitution": NameKind(
         "Substitution",
         "condition if_value= else_value=",
         "condition else_value if_value parse",
     ),
-    "launch.actions.IncludeLaunchDescription": Kind(
+    "launch.actions.IncludeLaunchDescription": NameKind(
         "Action",
         "launch_description_source * launch_arguments= condition=",
         "launch_arguments launch_description_source",
     ),
-    "launch.events.IncludeLaunchDescription": Kind(
+    "launch.events.IncludeLaunchDescription": NameKind(
         "Event",
         "launch_description",
         "launch_description",
     ),
-    "InvalidConditionExpressionError": Kind(
+    "InvalidConditionExpressionError": NameKind(
         "",
         "expression unexpanded_expression valid_expressions",
         "",
     ),
-    "InvalidFrontendLaunchFileError": Kind(
+    "InvalidFrontendLaunchFileError": NameKind(
         "InvalidLaunchFileError",
         "extension= * likely_errors=",
         "",
     ),
-    "InvalidLaunchFileError": Kind(
+    "InvalidLaunchFileError": NameKind(
         "",
         "extension= * likely_errors=",
         "",
     ),
-    "InvalidPythonLaunchFileError": Kind(
+    "InvalidPythonLaunchFileError": NameKind(
         "",
         "**",
         "",
     ),
-    "InvalidResourceNameError": Kind(
+    "InvalidResourceNameError": NameKind(
         "",
         "**",
         "",
     ),
-    "InvalidResourceTypeNameError": Kind(
+    "InvalidResourceTypeNameError": NameKind(
         "",
         "**",
         "",
     ),
-    "LaunchConfig": Kind(
+    "LaunchConfig": NameKind(
         "",
         "",
         "file_formatter file_handlers get_log_file_handler get_log_file_path get_screen_handler level log_dir "
         "log_handler_factory reset screen_formatter screen_handler set_log_format set_screen_format",
     ),
-    "LaunchConfiguration": Kind(
+    "LaunchConfiguration": NameKind(
         "Substitution",
         "variable_name * default=",
         "parse variable_name",
     ),
-    "LaunchConfigurationEquals": Kind(
+    "LaunchConfigurationEquals": NameKind(
         "Condition",
         "launch_configuration_name expected_value",
         "",
     ),
-    "LaunchConfigurationNotEquals": Kind(
+    "LaunchConfigurationNotEquals": NameKind(
         "LaunchConfigurationEquals",
         "launch_configuration_name expected_value",
         "",
     ),
-    "LaunchContext": Kind(
+    "LaunchContext": NameKind(
         "",
         "* argv= noninteractive=",
         "add_completion_future argv asyncio_loop emit_event emit_event_sync environment extend_globals "
         "extend_locals get_locals_as_dict is_shutdown launch_configurations locals noninteractive "
         "perform_substitution register_event_handler unregister_event_handler would_handle_event",
     ),
-    "LaunchDescription": Kind(
+    "LaunchDescription": NameKind(
         "LaunchDescriptionEntity",
         "initial_entities= * deprecated_reason=",
         "add_action add_entity deprecated deprecated_reason entities get_launch_arguments "
         "get_launch_arguments_with_include_launch_description_actions",
     ),
-    "LaunchDescriptionEntity": Kind(
+    "LaunchDescriptionEntity": NameKind(
         "",
         "**",
         "describe describe_conditional_sub_entities describe_sub_entities get_asyncio_future visit",
     ),
-    "LaunchDescriptionSource": Kind(
+    "LaunchDescriptionSource": NameKind(
         "",
         "launch_description= location= method=",
         "get_launch_description location method try_get_launch_description_without_context",
     ),
-    "LaunchIntrospector": Kind(
+    "LaunchIntrospector": NameKind(
         "",
         "**",
         "format_launch_description",
     ),
-    "LaunchLogDir": Kind(
+    "LaunchLogDir": NameKind(
         "Substitution",
         "",
         "parse",
     ),
-    "LaunchLogger": Kind(
+    "LaunchLogger": NameKind(
         "",
         "*args **kwargs",
         "all_loggers propagate",
     ),
-    "LaunchService": Kind(
+    "LaunchService": NameKind(
         "",
         "* argv= noninteractive= debug=",
         "context emit_event event_loop include_launch_description run run_async shutdown task",
     ),
-    "LifecycleNode": Kind(
+    "LifecycleNode": NameKind(
         "Node",
         "* name namespace executable package= exec_name= parameters= remappings= ros_arguments= arguments= prefix= "
         "cwd= env= additional_env= shell= sigterm_timeout= sigkill_timeout= emulate_tty= output= output_format= "
         "cached_output= log_cmd= on_exit= respawn= respawn_delay= respawn_max_retries= condition=",
         "",
     ),
-    "LifecycleTransition": Kind(
+    "LifecycleTransition": NameKind(
         "Action",
         "* lifecycle_node_names transition_ids condition=",
         "transition_targets",
     ),
-    "LoadComposableNodes": Kind(
+    "LoadComposableNodes": NameKind(
         "Action",
         "* composable_node_descriptions target_container condition=",
         "",
     ),
-    "LocalSubstitution": Kind(
+    "LocalSubstitution": NameKind(
         "Substitution",
         "expression description=",
         "description expression",
     ),
-    "LogInfo": Kind(
+    "LogInfo": NameKind(
         "Action",
         "* msg condition=",
         "msg",
     ),
-    "Node": Kind(
+    "Node": NameKind(
         "ExecuteProcess",
         "* executable package= name= namespace= exec_name= parameters= remappings= ros_arguments= arguments= "
         "prefix= cwd= env= additional_env= shell= sigterm_timeout= sigkill_timeout= emulate_tty= output= "
@@ -924,332 +924,332 @@ CLASSES: Mapping[str, Kind] = {
         "UNSPECIFIED_NODE_NAME UNSPECIFIED_NODE_NAMESPACE expanded_node_namespace expanded_remapping_rules "
         "is_node_name_fully_specified node_executable node_name node_package parse_nested_parameters",
     ),
-    "NodeActionExtension": Kind(
+    "NodeActionExtension": NameKind(
         "",
         "",
         "EXTENSION_POINT_VERSION NAME prepare_for_execute",
     ),
-    "NotEqualsSubstitution": Kind(
+    "NotEqualsSubstitution": NameKind(
         "EqualsSubstitution",
         "left right",
         "",
     ),
-    "NotSubstitution": Kind(
+    "NotSubstitution": NameKind(
         "Substitution",
         "value",
         "parse value",
     ),
-    "OnActionEventBase": Kind(
+    "OnActionEventBase": NameKind(
         "BaseEventHandler",
         "* action_matcher on_event target_event_cls target_action_cls handle_once=",
         "",
     ),
-    "OnExecutionComplete": Kind(
+    "OnExecutionComplete": NameKind(
         "OnActionEventBase",
         "* target_action= on_completion handle_once=",
         "",
     ),
-    "OnIncludeLaunchDescription": Kind(
+    "OnIncludeLaunchDescription": NameKind(
         "EventHandler",
         "* handle_once=",
         "",
     ),
-    "OnProcessExit": Kind(
+    "OnProcessExit": NameKind(
         "OnActionEventBase",
         "* target_action= on_exit handle_once=",
         "",
     ),
-    "OnProcessIO": Kind(
+    "OnProcessIO": NameKind(
         "OnActionEventBase",
         "* target_action= on_stdin= on_stdout= on_stderr= handle_once=",
         "",
     ),
-    "OnProcessStart": Kind(
+    "OnProcessStart": NameKind(
         "OnActionEventBase",
         "* target_action= on_start handle_once=",
         "",
     ),
-    "OnShutdown": Kind(
+    "OnShutdown": NameKind(
         "BaseEventHandler",
         "* on_shutdown handle_once=",
         "",
     ),
-    "OnStateTransition": Kind(
+    "OnStateTransition": NameKind(
         "EventHandler",
         "* entities target_lifecycle_node= transition= start_state= goal_state= matcher= handle_once=",
         "",
     ),
-    "OpaqueCoroutine": Kind(
+    "OpaqueCoroutine": NameKind(
         "Action",
         "* coroutine args= kwargs= ignore_context= condition=",
         "",
     ),
-    "OpaqueFunction": Kind(
+    "OpaqueFunction": NameKind(
         "Action",
         "* function args= kwargs= condition=",
         "",
     ),
-    "OrSubstitution": Kind(
+    "OrSubstitution": NameKind(
         "Substitution",
         "left right",
         "left parse right",
     ),
-    "PackageNotFoundError": Kind(
+    "PackageNotFoundError": NameKind(
         "",
         "**",
         "",
     ),
-    "launch_ros.parameter_descriptions.Parameter": Kind(
+    "launch_ros.parameter_descriptions.Parameter": NameKind(
         "",
         "name value * value_type=",
         "evaluate name value value_type",
     ),
-    "launch_ros.substitutions.Parameter": Kind(
+    "launch_ros.substitutions.Parameter": NameKind(
         "Substitution",
         "name * default=",
         "name parse",
     ),
-    "ParameterFile": Kind(
+    "ParameterFile": NameKind(
         "",
         "param_file * allow_substs=",
         "allow_substs cleanup evaluate param_file",
     ),
-    "ParameterValue": Kind(
+    "ParameterValue": NameKind(
         "",
         "value * value_type=",
         "evaluate value value_type",
     ),
-    "PathJoinSubstitution": Kind(
+    "PathJoinSubstitution": NameKind(
         "Substitution",
         "substitutions",
         "substitutions",
     ),
-    "PluginException": Kind(
+    "PluginException": NameKind(
         "",
         "**",
         "",
     ),
-    "PopEnvironment": Kind(
+    "PopEnvironment": NameKind(
         "Action",
         "* condition=",
         "",
     ),
-    "PopLaunchConfigurations": Kind(
+    "PopLaunchConfigurations": NameKind(
         "Action",
         "* condition=",
         "",
     ),
-    "ProcessExited": Kind(
+    "ProcessExited": NameKind(
         "RunningProcessEvent",
         "* returncode action name cmd cwd env pid",
         "returncode",
     ),
-    "ProcessIO": Kind(
+    "ProcessIO": NameKind(
         "RunningProcessEvent",
         "* text fd action name cmd cwd env pid",
         "from_stderr from_stdin from_stdout text",
     ),
-    "ProcessStarted": Kind(
+    "ProcessStarted": NameKind(
         "RunningProcessEvent",
         "* action name cmd cwd env pid",
         "",
     ),
-    "ProcessStderr": Kind(
+    "ProcessStderr": NameKind(
         "ProcessIO",
         "* text action name cmd cwd env pid",
         "",
     ),
-    "ProcessStdin": Kind(
+    "ProcessStdin": NameKind(
         "ProcessIO",
         "* text action name cmd cwd env pid",
         "",
     ),
-    "ProcessStdout": Kind(
+    "ProcessStdout": NameKind(
         "ProcessIO",
         "* text action name cmd cwd env pid",
         "",
     ),
-    "ProcessTargetedEvent": Kind(
+    "ProcessTargetedEvent": NameKind(
         "Event",
         "* process_matcher",
         "process_matcher",
     ),
-    "PushEnvironment": Kind(
+    "PushEnvironment": NameKind(
         "Action",
         "* condition=",
         "",
     ),
-    "PushLaunchConfigurations": Kind(
+    "PushLaunchConfigurations": NameKind(
         "Action",
         "* condition=",
         "",
     ),
-    "PushROSNamespace": Kind(
+    "PushROSNamespace": NameKind(
         "Action",
         "namespace * condition=",
         "namespace",
     ),
-    "PythonExpression": Kind(
+    "PythonExpression": NameKind(
         "Substitution",
         "expression python_modules=",
         "expression parse python_modules",
     ),
-    "PythonLaunchDescriptionSource": Kind(
+    "PythonLaunchDescriptionSource": NameKind(
         "LaunchDescriptionSource",
         "launch_file_path",
         "",
     ),
-    "ROSAdapter": Kind(
+    "ROSAdapter": NameKind(
         "",
         "* argv= autostart=",
         "argv ros_context ros_executor ros_node shutdown start",
     ),
-    "ROSTimer": Kind(
+    "ROSTimer": NameKind(
         "TimerAction",
         "* period actions cancel_on_shutdown= condition=",
         "",
     ),
-    "RegisterEventHandler": Kind(
+    "RegisterEventHandler": NameKind(
         "Action",
         "event_handler * condition=",
         "event_handler",
     ),
-    "ResetEnvironment": Kind(
+    "ResetEnvironment": NameKind(
         "Action",
         "* condition=",
         "",
     ),
-    "ResetLaunchConfigurations": Kind(
+    "ResetLaunchConfigurations": NameKind(
         "Action",
         "launch_configurations= * condition=",
         "",
     ),
-    "RunningProcessEvent": Kind(
+    "RunningProcessEvent": NameKind(
         "Event",
         "* action name cmd cwd env pid",
         "action cmd cwd env execute_process_action pid process_name",
     ),
-    "SetEnvironmentVariable": Kind(
+    "SetEnvironmentVariable": NameKind(
         "Action",
         "name value * condition=",
         "name value",
     ),
-    "SetLaunchConfiguration": Kind(
+    "SetLaunchConfiguration": NameKind(
         "Action",
         "name value * condition=",
         "name value",
     ),
-    "SetParameter": Kind(
+    "SetParameter": NameKind(
         "Action",
         "name value * condition=",
         "name value",
     ),
-    "SetParametersFromFile": Kind(
+    "SetParametersFromFile": NameKind(
         "Action",
         "filename * condition=",
         "",
     ),
-    "SetROSLogDir": Kind(
+    "SetROSLogDir": NameKind(
         "Action",
         "new_log_dir * condition=",
         "log_dir",
     ),
-    "SetRemap": Kind(
+    "SetRemap": NameKind(
         "Action",
         "src dst * condition=",
         "dst src",
     ),
-    "SetUseSimTime": Kind(
+    "SetUseSimTime": NameKind(
         "Action",
         "value * condition=",
         "value",
     ),
-    "launch.actions.Shutdown": Kind(
+    "launch.actions.Shutdown": NameKind(
         "EmitEvent",
         "* reason= condition=",
         "",
     ),
-    "launch.events.Shutdown": Kind(
+    "launch.events.Shutdown": NameKind(
         "Event",
         "* reason= due_to_sigint=",
         "due_to_sigint reason",
     ),
-    "ShutdownProcess": Kind(
+    "ShutdownProcess": NameKind(
         "ProcessTargetedEvent",
         "* process_matcher",
         "",
     ),
-    "SignalProcess": Kind(
+    "SignalProcess": NameKind(
         "ProcessTargetedEvent",
         "* signal_number process_matcher",
         "signal signal_name",
     ),
-    "StateTransition": Kind(
+    "StateTransition": NameKind(
         "Event",
         "* action msg",
         "action goal_state msg start_state timestamp transition",
     ),
-    "Substitution": Kind(
+    "Substitution": NameKind(
         "",
         "**",
         "describe perform",
     ),
-    "SubstitutionFailure": Kind(
+    "SubstitutionFailure": NameKind(
         "",
         "msg",
         "",
     ),
-    "TextSubstitution": Kind(
+    "TextSubstitution": NameKind(
         "Substitution",
         "* text",
         "text",
     ),
-    "ThisLaunchFile": Kind(
+    "ThisLaunchFile": NameKind(
         "Substitution",
         "",
         "parse",
     ),
-    "ThisLaunchFileDir": Kind(
+    "ThisLaunchFileDir": NameKind(
         "Substitution",
         "",
         "parse",
     ),
-    "TimerAction": Kind(
+    "TimerAction": NameKind(
         "Action",
         "* period actions cancel_on_shutdown= condition=",
         "actions cancel handle period",
     ),
-    "TimerEvent": Kind(
+    "TimerEvent": NameKind(
         "Event",
         "* timer_action",
         "timer_action",
     ),
-    "UnlessCondition": Kind(
+    "UnlessCondition": NameKind(
         "IfCondition",
         "predicate_expression",
         "",
     ),
-    "UnregisterEventHandler": Kind(
+    "UnregisterEventHandler": NameKind(
         "Action",
         "event_handler * condition=",
         "event_handler",
     ),
-    "UnsetEnvironmentVariable": Kind(
+    "UnsetEnvironmentVariable": NameKind(
         "Action",
         "name * condition=",
         "name",
     ),
-    "UnsetLaunchConfiguration": Kind(
+    "UnsetLaunchConfiguration": NameKind(
         "Action",
         "name * condition=",
         "name",
     ),
-    "XMLLaunchDescriptionSource": Kind(
+    "XMLLaunchDescriptionSource": NameKind(
         "FrontendLaunchDescriptionSource",
         "launch_file_path",
         "",
     ),
-    "YAMLLaunchDescriptionSource": Kind(
+    "YAMLLaunchDescriptionSource": NameKind(
         "FrontendLaunchDescriptionSource",
         "launch_file_path",
         "",

@@ -15,7 +15,7 @@ from importlib.machinery import ModuleSpec, PathFinder
 from types import FrameType, ModuleType
 from typing import Any
 
-#: Never hidden: the program itself, modules of the grader, whose names no program has, and what replaces clocks: its
+#: Never hidden: the program itself, the grader's modules, which programs cannot name, and what replaces clocks: its
 #: functions are looked up in sys.modules at each call.
 _OWN = ("__main__", "sitecustomize", "_grader_host", "_launcher", "_sandbox", "time_machine", "_time_machine")
 

@@ -51,7 +51,7 @@ class CompileError:
 
 
 @dataclass(frozen=True, slots=True)
-class Program:
+class ReadProgram:
     """What the contained process found in one Python file of a submission."""
 
     text: SourceText | None = None  # None if it cannot be decoded, or is too long
@@ -87,7 +87,7 @@ class Submission:
     files: Mapping[str, StudentFile] = field(default_factory=dict)  # wanted file name -> the file that was found for it
     notes: tuple[str, ...] = ()  # sentences about the files that readers must know
     projects: tuple[Project, ...] = ()  # its ROS packages, outermost first
-    programs: Mapping[str, Program] = field(default_factory=dict)  # path inside the submission -> its Python file
+    programs: Mapping[str, ReadProgram] = field(default_factory=dict)  # path inside the submission -> its Python file
 
 
 @dataclass(frozen=True, slots=True)

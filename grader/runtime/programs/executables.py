@@ -21,8 +21,9 @@ MOST_FILES = 2_000
 MOST_LEVELS = 8
 #: With a file of this name in it, a folder is none of those that colcon builds.
 IGNORED = "COLCON_IGNORE"
-#: Files that name the packages that theirs needs, and the most bytes of one of them and of a package.xml that are read.
+#: Files that name the packages that theirs needs.
 _NAMING = frozenset({".py", ".xml", ".yaml", ".txt", ".cfg", ".msg", ".srv", ".action", ".idl"})
+#: The most bytes of one of them and of a package.xml that are read: no real one is nearly as long.
 MOST_NAMING_BYTES, MOST_MANIFEST_BYTES = 1 << 20, 64 << 10
 _PACKAGE_NAME = re.compile(rb"<name>\s*([A-Za-z0-9_-]{1,100})\s*</name>")
 _WORD = re.compile(rb"[A-Za-z][A-Za-z0-9_]{1,99}")

@@ -33,7 +33,7 @@ from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import NS_PER_S, size
 from grader.runtime.model.scenario import is_launch_file
-from grader.runtime.model.submission import Program
+from grader.runtime.model.submission import ReadProgram
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Trace
 from grader.runtime.recording.codec import to_json
 from grader.runtime.ros_installation import PythonRuntime
@@ -488,7 +488,7 @@ class Job:
     plan: Plan
     budget: RealTimeBudget = field(default_factory=RealTimeBudget, compare=False)
     parallel: bool = False  # on the wall clock, whether other jobs like it may be recorded at the same time
-    programs: Mapping[str, Program] = field(default_factory=dict, compare=False)
+    programs: Mapping[str, ReadProgram] = field(default_factory=dict, compare=False)
 
 
 class Recorder:

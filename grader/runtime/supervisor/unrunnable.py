@@ -7,17 +7,17 @@ from pathlib import Path
 
 from grader.runtime.host.packages import PackageLayout, layout_of
 from grader.runtime.model.scenario import is_launch_file
-from grader.runtime.model.submission import Program
+from grader.runtime.model.submission import ReadProgram
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, GraphSnapshot, Mark, Start, StartWay, Trace
 from grader.runtime.plan import Plan
 from grader.runtime.worker.ending import ending, reported_fault
 from grader.runtime.worker.notes import Places
 
 #: A file of which nothing is known: only a process finds out.
-_UNKNOWN = Program()
+_UNKNOWN = ReadProgram()
 
 
-def trace_without_run(plan: Plan, programs: Mapping[str, Program]) -> Trace | None:
+def trace_without_run(plan: Plan, programs: Mapping[str, ReadProgram]) -> Trace | None:
     """Return what a run of the plan would record of its processes; None if any of them has to be run.
 
     Args:

@@ -255,7 +255,7 @@ class ResourceMonitor:
     def _look_for_waiting(self) -> None:
         pids = [pid for family in self._families.values() for pid in family]
         self._used_ns = max(self._used_ns, self._kernel.usage(pids).processor_ns)
-        # Of each program by itself: what several have used in their first threads is no program's second one.
+        # For each program alone: the first threads of several programs are not the second thread of one.
         families = self._families.values()
         used = [
             (self._kernel.usage(family).processor_ns, self._kernel.busiest_thread_ns(family)) for family in families

@@ -63,7 +63,7 @@ def test_what_is_said_to_be_missing_is_missing() -> None:
             if isinstance(node, (ast.FunctionDef, ast.ClassDef))
         }
         assert not {*defined, *(path.stem for path in files)} & {*names}
-        assert defined, package
+        assert defined or not names, package
 
 
 # --- tf2_py ---

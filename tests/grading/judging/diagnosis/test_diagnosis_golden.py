@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tokenize
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -345,6 +346,7 @@ def test_a_near_miss_is_not_blamed(
 
 #: Rules that say what a program does wrong, whatever was recorded: a right program must never get them.
 TEXTUAL = {rule.id for rule in EVERY} - {
+    "guarded",  # which messages were heard, and that nothing followed
     "log_line",  # where a log is written
     "log_period",
     "late_timer",
@@ -391,7 +393,11 @@ OTHERWISE = [
 def right_programs(file: str) -> dict[str, str]:
     """The graded files of that name among the correct submissions."""
     found = sorted(path for folder in folders_in("correct", "threads") for path in folder.rglob(file))
-    return {path.parent.name: path.read_text(encoding="utf-8") for path in found}
+    texts = {}
+    for path in found:
+        with tokenize.open(path) as lines:  # in the encoding that it declares
+            texts[path.parent.name] = lines.read()
+    return texts
 
 
 @pytest.mark.slow
