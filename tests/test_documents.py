@@ -80,6 +80,7 @@ _SCRIPT = re.compile(r"\bpython3? ((?:benchmarks|docs|tests)/[\w/]+\.py)")
 _LOAD = "import os, runpy, sys; p = sys.argv[1]; sys.path[0] = os.path.dirname(p); runpy.run_path(p, run_name='loaded')"
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_scripts_in_documents_find_what_they_import(tmp_path: Path) -> None:
     """In a shell, which has no settings of pytest; each in a process of its own."""

@@ -48,6 +48,7 @@ def test_an_index_takes_the_packages(packages: Path) -> None:
     assert done.stdout.count("PASSED") == 2
 
 
+@pytest.mark.long
 def test_the_description_leads_to_the_repository(wheel: Path) -> None:
     """No link of the README is relative, each leads to this version, and the addresses are those of one repository."""
     archive = zipfile.ZipFile(wheel)
@@ -172,6 +173,7 @@ def test_a_failure_of_npm_is_told_in_its_own_words(npm: Path, tmp_path: Path) ->
         HOOK["fetch"](tmp_path / "vendor")
 
 
+@pytest.mark.long
 def test_an_installed_rubric_has_all_its_names(wheel: Path, tmp_path: Path) -> None:
     """The folder of its exercise, the file in it, and the file that it was before: each is read, none is a copy."""
     place = tmp_path / "installed"

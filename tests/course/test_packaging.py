@@ -48,6 +48,7 @@ def test_classroom50_s_bundle_fits() -> None:
     assert sum(map(len, files.values())) < CLASSROOM50_BYTES / 4
 
 
+@pytest.mark.long
 def test_a_seed_key_goes_into_the_zip_for_its_owner_alone(tmp_path: Path) -> None:
     """No student sees the zip; without a key it holds none, and one that could be guessed is refused now."""
     (tmp_path / "key").write_text("a seed key of enough bytes\r\n")
@@ -119,6 +120,7 @@ def test_an_installation_that_does_not_know_its_requirements_is_refused() -> Non
         packaging._refuse_stale(importlib.metadata.distribution("click"))
 
 
+@pytest.mark.long
 def test_the_command_warns_of_an_autograder_without_a_sandbox(tmp_path: Path) -> None:
     """Whoever wants that learns what it means."""
     done = CliRunner().invoke(app, ["export", "gradescope", str(tmp_path / "a.zip"), "--isolation", "none"])

@@ -106,6 +106,7 @@ def test_what_is_wrong_in_a_brought_type_costs_points() -> None:
     assert "undecided" not in outcomes(report).values(), told
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_other_tools_read_brought_types_in_the_evidence(kept: tuple[Report, Path]) -> None:
     """Their definitions are in the recording, with nested and installed types, and judging again gives the same."""
@@ -267,6 +268,7 @@ def test_what_fails_with_definitions_alone_is_their_mistake(
     assert len(told.problems[0]) < 400
 
 
+@pytest.mark.long
 @pytest.mark.sandbox
 def test_a_build_that_ends_at_a_limit_is_a_note_that_is_remembered(
     session: RecordingSession, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -382,6 +382,7 @@ SAID = {
 }
 
 
+@pytest.mark.long
 def test_a_mistake_of_the_test_is_no_mark(grade: Grade) -> None:
     """What the author has to correct is undecided, names its place, and leaves the other tests alone."""
     report = grade(RIGHT, MISTAKES)
@@ -429,6 +430,7 @@ def test_a_file_that_cannot_be_imported_is_no_mark(grade: Grade) -> None:
     assert verdicts(report)["test_rate"].reason == expected
 
 
+@pytest.mark.long
 def test_a_recording_keeps_the_verdict(grade: Grade, tmp_path: Path) -> None:
     """Evidence holds what the tests have found; judging again keeps it, and says that nothing was judged."""
     evidence = tmp_path / "evidence"

@@ -105,6 +105,7 @@ def test_a_world_of_a_fixture(echo):
 """
 
 
+@pytest.mark.long
 def test_a_mistake_in_a_test_is_shown_at_its_line_with_a_hint(suite: pytest.Pytester) -> None:
     """A file that is not there, or an object of a wrong class; nothing of the grader's own code is shown."""
     text = run(suite, MISSING).stdout.str()

@@ -180,6 +180,7 @@ def test_nothing_is_written_over(tmp_path: Path) -> None:
     assert (tmp_path / "r.yaml").read_text() == "mine"
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_the_reference_scores_full_under_its_skeleton(tmp_path: Path) -> None:
     """A node that publishes, listens and logs: seen, given numbers, asked, checked and graded for real."""

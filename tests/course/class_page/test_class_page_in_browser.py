@@ -283,6 +283,7 @@ def test_the_numbers_of_a_large_class_fit_into_the_chart(browser: Browser, resul
     assert min(box["x"] for box in boxes) >= outer["x"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", *more(["dark"])])
 def test_nothing_sticks_out_on_a_phone(browser: Browser, results: Path, scheme: str) -> None:
     """The page scrolls downwards only, and so does the table of students: the final score is first in each row."""

@@ -126,6 +126,7 @@ criteria:
 """
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_a_hole_in_a_rubric_is_found(tmp_path: Path) -> None:
     """A rubric that asks for a publisher only lets ten times the period survive, and notices a misspelt topic."""

@@ -99,6 +99,7 @@ def reports(data: bytes, found: list[Any]) -> tuple[list[Any], bytes]:
     return reports(text[end:].encode("utf-8", "surrogateescape"), [*found, whole])
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_a_platform_that_ends_the_run_finds_what_was_earned(tmp_path: Path) -> None:
     """Each exercise that is done adds its points to the file; killed after the first, they are there."""

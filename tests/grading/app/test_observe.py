@@ -211,6 +211,7 @@ def test_nodes_are_observed_for_real() -> None:
     assert "/temperature_sensor ──/temperature──▶ /fan_controller" in text
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_a_file_of_a_package_may_import_the_package(tmp_path: Path) -> None:
     """As `ros2 run` lets it: by the name of the package, from wherever in it the file is."""
@@ -241,6 +242,7 @@ def test_a_traceback_begins_with_the_program(tmp_path: Path) -> None:
         assert not any("grader" in line for line in lines)
 
 
+@pytest.mark.long
 @pytest.mark.ros
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"])])
 def test_a_class_that_needs_arguments_is_not_started(tmp_path: Path, clock: str) -> None:
@@ -275,6 +277,7 @@ def a_package(folder: Path, name: str, **files: str) -> None:
 LOGS = "import rclpy\n{}\ndef main():\n    rclpy.init()\n    rclpy.create_node('n').get_logger().info({})\n"
 
 
+@pytest.mark.long
 @pytest.mark.ros
 @pytest.mark.parametrize("above", each(["src/repository", "src", "anything"], 3))
 @pytest.mark.parametrize("target", each(["two/two/speaker.py", "two/speaker", "two/launch/all.launch.py"], 3))
@@ -314,6 +317,7 @@ def an_interface_package(folder: Path) -> None:
     (folder / "CMakeLists.txt").write_text('rosidl_generate_interfaces(${PROJECT_NAME} "msg/Say.msg")\n')
 
 
+@pytest.mark.long
 @pytest.mark.ros
 @pytest.mark.parametrize(
     ("package", "beside"), [("src", "src"), ("PYTHON", "CPP"), ("src/repository/packages", "src/repository/packages")]
@@ -386,6 +390,7 @@ def generate_launch_description():
 """
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_a_built_in_simulation_brings_its_types(tmp_path: Path) -> None:
     """Although no program names the package turtlesim."""
@@ -455,6 +460,7 @@ TARGETS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.ros
 @pytest.mark.parametrize(("path", "processes", "nodes"), each(TARGETS.values(), 3), ids=TARGETS)
 def test_packages_are_observed(path: Path, processes: tuple[str, ...], nodes: tuple[str, ...]) -> None:
@@ -537,6 +543,7 @@ def test_a_fault_has_the_hint_of_the_report(tmp_path: Path, clock: str) -> None:
     assert not any("site-packages" in line or "and 1" in line for line in shown)
 
 
+@pytest.mark.long
 @pytest.mark.ros
 @CLOCKS
 @pytest.mark.parametrize(("package", "hint"), each(LACKING.items(), 2))
@@ -545,6 +552,7 @@ def test_a_package_that_is_not_installed_is_no_mistake(tmp_path: Path, clock: st
     assert seen(tmp_path, clock, node=f"import rclpy\nimport {package}\n").hints == (hint,)
 
 
+@pytest.mark.long
 @pytest.mark.ros
 @CLOCKS
 @pytest.mark.parametrize("given", ["domain_id=7", *more(["args=None"])])
@@ -559,6 +567,7 @@ def test_a_node_in_another_domain_is_told(tmp_path: Path, clock: str, given: str
     )
 
 
+@pytest.mark.long
 @pytest.mark.ros
 @CLOCKS
 def test_two_nodes_of_one_name_are_told_apart_by_a_note(tmp_path: Path, clock: str) -> None:
@@ -621,6 +630,7 @@ def test_output_that_only_looks_like_a_traceback_stays() -> None:
     ]
 
 
+@pytest.mark.long
 @pytest.mark.ros
 @CLOCKS
 def test_services_of_others_are_in_the_graph(clock: str) -> None:

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import pytest
 from program_shapes import DEPTHS, ENCODINGS, SHAPES
+from tiers import each
 
 from grader.grading.judging.diagnosis import hint_for, placed_in
 from grader.grading.judging.source import Source, parsed, read
@@ -55,7 +56,7 @@ def dump(tree: ast.AST) -> str:
         sys.set_int_max_str_digits(limit)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", each(SHAPES, 5))
 def test_no_shape_of_a_program_takes_more_than_its_size_allows(shape: str) -> None:
     """At any depth it is examined, or is one that Python cannot compile, or is said to be too long or too deep."""
     for depth in DEPTHS:
@@ -71,7 +72,7 @@ def test_no_shape_of_a_program_takes_more_than_its_size_allows(shape: str) -> No
             assert dump(tree) == dump(ast.parse(content))
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", each(SHAPES, 5))
 def test_no_shape_of_a_program_makes_a_rule_raise(shape: str, caplog: pytest.LogCaptureFixture) -> None:
     """All hint rules look at the deepest trees that there are, in bounded work."""
     for depth in (95, 180, 3_000):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 import weakref
 from typing import Any
 
@@ -79,6 +80,7 @@ def ledger(monkeypatch: pytest.MonkeyPatch, waits: list[float], context: Context
     import launcher  # type: ignore[import-not-found]
 
     launcher.load_package()
+    sys.modules["_grader_host.unseen"].IMPORTS.end()
     module = importlib.import_module("_grader_host.ledger")
     made = module.Ledger(lambda receiver, context, *_: receiver.handle.look(), waits.append)
     made.contexts.append(weakref.ref(context))

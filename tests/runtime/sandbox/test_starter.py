@@ -201,6 +201,7 @@ def test_a_node_has_the_same_surroundings_in_both_ways(session: RecordingSession
     assert found == expected
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tier", tiers("bubblewrap-flat", "landlock", usual="landlock"))
 def test_a_folder_of_a_forked_process_has_a_size_and_ends_with_it(tier: str, tmp_path: Path) -> None:
     """In tiers without namespaces another fork sees to both, in real time, whatever the host makes of the clock."""
@@ -381,6 +382,7 @@ def starters() -> list[int]:
     return found
 
 
+@pytest.mark.long
 def test_a_starter_that_is_killed_costs_no_recording(run: Callable[..., Trace]) -> None:
     """The recording is done again with a new worker, which has a new starter."""
     assert len(run(hostile()).messages("/cmd_vel")) > 20

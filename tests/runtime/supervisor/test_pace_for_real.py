@@ -162,6 +162,7 @@ def of_each(programs: dict[str, str]) -> list[object]:
     return [pytest.param(program, id=name, marks=marks[name]) for name, program in programs.items()]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("program", of_each(RELATIVE))
 def test_a_loop_that_pauses_after_its_work_is_as_slow_as_it_is(run: Record, program: str) -> None:
     """20 ms of work and a pause of 50: 14 Hz, by the wall clock, or by the measured work if the machine is too busy."""

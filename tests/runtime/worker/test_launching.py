@@ -221,6 +221,7 @@ def test_what_ros_has_and_the_grader_lacks_costs_no_points(
     assert any(said in note for note in report.notes), report.notes
 
 
+@pytest.mark.long
 def test_what_ros_lacks_too_is_the_mistake_of_the_launch_file(graded: Callable[..., ExerciseReport]) -> None:
     """Although no node needs it."""
     share = '    share = get_package_share_directory("robot")\n'
@@ -230,6 +231,7 @@ def test_what_ros_lacks_too_is_the_mistake_of_the_launch_file(graded: Callable[.
     assert fault.text.startswith("ImportError: cannot import name 'EmitEvnt' from 'launch.actions'")
 
 
+@pytest.mark.long
 def test_a_launch_file_of_viewers_alone_has_no_fault(graded: Callable[..., ExerciseReport]) -> None:
     """It shows what others do, and lacks nodes of its own."""
     viewer = 'return LaunchDescription([Node(package="rviz2", executable="rviz2")])\n    share = ""\n'
@@ -308,6 +310,7 @@ def test_a_launch_file_that_does_harm_is_a_fault(graded: Callable[..., ExerciseR
     assert any(said in fault.text for fault in report.faults), report.faults
 
 
+@pytest.mark.long
 def test_a_forged_description_starts_nothing_but_the_submission(graded: Callable[..., ExerciseReport]) -> None:
     """Whatever a launch file writes to its connection only names programs, and every field of it is checked."""
     forged = '{"kind": "launched", "nodes": [{"package": "", "executable": "../../../bin/sh", "line": []}, 5, null]}'
@@ -411,6 +414,7 @@ def test_executables_are_found_by_their_names(graded: Callable[..., ExerciseRepo
     assert set(outcomes(graded(rubric="installed.yaml")).values()) == {"met"}
 
 
+@pytest.mark.long
 def test_a_launch_file_of_the_rubric_starts_what_was_handed_in() -> None:
     """Two loose files, each by its name; what they log is told apart."""
     request = GradeRequest(str(HERE / "loose"), rubrics=(HERE / "rubrics" / "provided.yaml",), clock="virtual")

@@ -53,6 +53,7 @@ def test_a_real_node_that_does_it_right_meets_every_check(folder: Path, rubric: 
     assert {outcome for _, outcome in found} == {"met"}, told
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_a_real_node_that_does_it_wrong_meets_none() -> None:
     """But that it lives; what it does after Ctrl-C is a question of its own."""

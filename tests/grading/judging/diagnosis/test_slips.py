@@ -22,7 +22,7 @@ TABLES = [*SLIPS, *rows("crashes.yaml"), *rows("behaviours.yaml")]
 #: One of so many is graded before a change lands.
 _SAMPLE = 30
 #: And of these, by default, one of so many.
-_SHORT = 5
+_SHORT = 8
 _LOST = (Outcome.NOT_MET, Outcome.PARTLY)
 
 

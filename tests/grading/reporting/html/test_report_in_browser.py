@@ -122,6 +122,7 @@ def test_hostile_text_stays_text_wherever_it_is_shown(visit: Open, text: str) ->
     assert len(asked) == 1
 
 
+@pytest.mark.long
 def test_a_pointer_over_a_chart_is_told_the_value(visit: Open) -> None:
     """The tooltip shows the time and the value of what is under it."""
     page, said, _ = visit(render_html(graded.perfect()))
@@ -272,6 +273,7 @@ def test_the_graph_lights_up_and_grows(visit: Open) -> None:
     assert said == []
 
 
+@pytest.mark.long
 def test_both_directions_are_in_the_graph(visit: Open) -> None:
     """The last situation shows temperature going one way and the fan speed the other."""
     page, _, _ = visit(render_html(graded.perfect()))
