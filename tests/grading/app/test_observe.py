@@ -417,7 +417,8 @@ def test_where_the_machine_is_too_busy_for_the_wall_clock_virtual_time_is_shown(
     """With the reason, and what it may hide; nothing is judged by a summary."""
     session, scenario = Recorder(problem), Scenario("observed", ("a.py",), Span(NS_PER_S))
     held_up = replace(a_trace(), clock=ClockKind.WALL, clock_reason="a.py: it works", harness_problem="too busy")
-    found = observing._in_virtual_time(cast("Any", session), scenario, cast("Any", None), held_up, quiet)
+    job = Job("observing", cast("Any", None))
+    found = observing._in_virtual_time(cast("Any", session), scenario, job, held_up, quiet)
     assert session.clocks == ["virtual"]
     assert found == held_up if problem else found.clock is ClockKind.VIRTUAL
     assert problem or found.notes == (f"{observing._TOO_BUSY} clock: a.py: it works",)
