@@ -105,9 +105,11 @@ class Watch:
         if not arguments or not frame.f_code.co_filename.startswith("<frozen"):
             return False
         file = getattr(arguments[0], "co_filename", "")
-        given = frame.f_locals.get("args", ())  # of the function by which importlib calls exec
+        # Of what importlib calls exec by, or makes and runs a compiled module by: those of numpy run text.
+        given = frame.f_locals.get("args", ())
         names = given[1] if len(given) > 1 and isinstance(given[1], dict) else {}
-        origin = str(getattr(names.get("__spec__"), "origin", None) or file)
+        compiled = getattr(given[0], "__spec__", given[0]) if given else None
+        origin = str(getattr(names.get("__spec__", compiled), "origin", None) or file)
         if file.startswith("<frozen") or origin.startswith((self._library, *self._installed)):
             return False
         return not (origin.startswith(self._root) and origin.endswith(".py") and os.path.isfile(origin))
