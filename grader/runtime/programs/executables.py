@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import posixpath
 import re
@@ -242,11 +243,11 @@ def is_package(folder: Path) -> bool:
 
 def name_of(package: Path) -> str:
     """Return the name of a package: that in its package.xml, or else that of its folder."""
-    try:
-        with (package / "package.xml").open("rb") as manifest:
-            found = _PACKAGE_NAME.search(manifest.read(MOST_MANIFEST_BYTES))
-    except OSError:
-        found = None
+    found, path = None, package / "package.xml"
+    with contextlib.suppress(OSError):
+        if path.is_file():  # reading a pipe would wait for ever
+            with path.open("rb") as manifest:
+                found = _PACKAGE_NAME.search(manifest.read(MOST_MANIFEST_BYTES))
     return found[1].decode() if found is not None else package.name
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -11,7 +12,13 @@ from places import TESTS
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.submission import stage_submission
 from grader.runtime.model.submission import StudentFile
-from grader.runtime.programs.executables import find_executable, ignored_packages, needed_packages, workspace_of
+from grader.runtime.programs.executables import (
+    find_executable,
+    ignored_packages,
+    name_of,
+    needed_packages,
+    workspace_of,
+)
 
 WORKSPACE = TESTS / "packages" / "workspace"
 NODES = "src/robot/robot/nodes.py"
@@ -146,3 +153,10 @@ def test_packages_that_colcon_ignores_are_named(tmp_path: Path) -> None:
     three = a_package(tmp_path / "group", "three")
     (tmp_path / "group" / "COLCON_IGNORE").touch()
     assert ignored_packages(tmp_path) == {"two": tmp_path / "two", "three": three.parent}
+
+
+def test_a_pipe_in_a_neighbouring_folder_is_not_waited_for(tmp_path: Path) -> None:
+    """A package that one names is looked for beside others, which may hold anything."""
+    (tmp_path / "piped").mkdir()
+    os.mkfifo(tmp_path / "piped" / "package.xml")
+    assert name_of(tmp_path / "piped") == "piped"
