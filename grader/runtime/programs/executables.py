@@ -245,7 +245,7 @@ def name_of(package: Path) -> str:
     """Return the name of a package: that in its package.xml, or else that of its folder."""
     found, path = None, package / "package.xml"
     with contextlib.suppress(OSError):
-        if path.is_file():  # reading a pipe would wait for ever
+        if path.is_file():  # a pipe would never end
             with path.open("rb") as manifest:
                 found = _PACKAGE_NAME.search(manifest.read(MOST_MANIFEST_BYTES))
     return found[1].decode() if found is not None else package.name
