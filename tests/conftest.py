@@ -7,7 +7,6 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
-from time import process_time
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -89,8 +88,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
 def _processor_time_s(item: pytest.Item) -> float:
     if not item.config.getoption("xmlpath"):
         return 0.0
-    # Looking at all processes costs more than most fast tests do, and these start none.
-    return process_time() if item.get_closest_marker("fast") else processor_time_s()
+    return processor_time_s(cheaply=item.get_closest_marker("fast") is not None)
 
 
 @pytest.hookimpl(wrapper=True)
