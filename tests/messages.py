@@ -22,6 +22,7 @@ from jinja2 import Environment
 from pygments.lexers import JavascriptLexer
 from pygments.token import String
 from ruamel.yaml import YAML
+from source_trees import nodes_of, parsed
 
 ROOT = Path(__file__).resolve().parent.parent
 #: Files with reasons, hints and titles, and those with texts for pages.
@@ -70,10 +71,10 @@ class Sentence(NamedTuple):
     text: str
 
 
-def _documented(tree: ast.Module) -> set[ast.AST]:
+def _documented(source: str) -> set[ast.AST]:
     """Return the docstrings of a module, and the parts of f-strings, which are no sentences of their own."""
     found: set[ast.AST] = set()
-    for node in ast.walk(tree):
+    for node in nodes_of(source):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             found.add(node.value)
         elif isinstance(node, ast.JoinedStr):
@@ -108,8 +109,7 @@ def _kind(above: list[ast.AST]) -> str:
 
 def in_code(source: str, place: str) -> Iterator[Sentence]:
     """Yield the sentences in the source of a module, in the order of its lines."""
-    tree = ast.parse(source)
-    skipped = _documented(tree)
+    skipped = _documented(source)
 
     def visit(node: ast.AST, above: list[ast.AST]) -> Iterator[Sentence]:
         text = words_of(node) if node not in skipped else ""
@@ -118,12 +118,12 @@ def in_code(source: str, place: str) -> Iterator[Sentence]:
         for child in ast.iter_child_nodes(node):
             yield from visit(child, [*above, node])
 
-    yield from sorted(visit(tree, []), key=lambda each: int(each.place.rpartition(":")[2]))
+    yield from sorted(visit(parsed(source), []), key=lambda each: int(each.place.rpartition(":")[2]))
 
 
 def in_remarks(source: str, place: str) -> Iterator[Sentence]:
     """Yield the docstrings and comments in the source of a module, which only authors read."""
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes_of(source):
         if isinstance(node, ast.Expr) and (text := words_of(node.value)):
             yield Sentence("docstring", f"{place}:{node.lineno}", text)
     for token in tokenize.generate_tokens(io.StringIO(source).readline):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+
+from source_trees import nodes_in
 
 PACKAGE = Path(__file__).resolve().parent.parent / "grader"
 #: Module or function -> what it parses. A module stands for everything in it.
@@ -42,9 +44,9 @@ PARSERS: Mapping[str, str] = {
 
 def parsers_of(path: Path) -> set[str]:
     """Return what a module parses."""
-    tree = ast.parse(path.read_bytes())
+    nodes = nodes_in(path)
     names: dict[str, str] = {}
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             for alias in node.names:
                 names[alias.asname or alias.name.partition(".")[0]] = (
@@ -53,24 +55,30 @@ def parsers_of(path: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and not node.level:
             for alias in node.names:
                 names[alias.asname or alias.name] = f"{node.module}.{alias.name}"
-    return {kind for name in _used(tree, names) if (kind := _kind(name))}
+    return {kind for name in _used(nodes, names) if (kind := _kind(name))}
 
 
-def _used(tree: ast.AST, names: Mapping[str, str]) -> Iterator[str]:
+def _used(nodes: Iterable[ast.AST], names: Mapping[str, str]) -> Iterator[str]:
     """Yield the full names of everything that a module imports or uses, and of built-in functions that it calls."""
     yield from names.values()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, (ast.Attribute, ast.Name)):
-            dotted = ast.unparse(node)
-            first, _, rest = dotted.partition(".")
+            first, _, rest = _dotted(node).partition(".")
             if first in names:
                 yield f"{names[first]}.{rest}" if rest else names[first]
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id not in names:
             yield node.func.id
-        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module") and node.args:
+        if isinstance(node, ast.Call) and _dotted(node.func).endswith("import_module") and node.args:
             yield str(getattr(node.args[0], "value", ""))
         if isinstance(node, ast.ImportFrom) and not node.level:
             yield str(node.module)
+
+
+def _dotted(node: ast.AST) -> str:
+    """Return a name with its dots; what is before the first dot may be any expression, and is then left out."""
+    if isinstance(node, ast.Attribute):
+        return f"{_dotted(node.value)}.{node.attr}"
+    return node.id if isinstance(node, ast.Name) else ""
 
 
 def _kind(name: str) -> str:

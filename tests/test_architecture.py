@@ -1,7 +1,6 @@
 """What keeps judging pure and the host apart; `lint-imports` checks which package imports which (pyproject.toml)."""
 
 import ast
-import functools
 import re
 import subprocess
 import sys
@@ -13,9 +12,12 @@ from typing import TYPE_CHECKING
 import pytest
 from places import ROOT
 from sample_folders import GROUPS, folders_in
+from source_trees import nodes_in, parsed
 
 if TYPE_CHECKING:
     import grimp
+
+pytestmark = pytest.mark.xdist_group("source")
 
 PACKAGE = ROOT / "grader"
 
@@ -38,14 +40,9 @@ EXCUSED = {
 HOST_MAY_IMPORT = {"yaml", "rclpy", "time_machine", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "std_srvs"}
 
 
-@functools.cache
-def tree_of(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
 def imports_of(path: Path) -> Iterator[str]:
     """Yield the absolute module names that a file imports, wherever in it; relative ones begin with a dot."""
-    for node in ast.walk(tree_of(path)):
+    for node in nodes_in(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -103,7 +100,7 @@ def text_readers(package: Path) -> list[str]:
     return [
         f"{path.relative_to(package).as_posix()}:{node.lineno}"
         for path in sorted(package.rglob("*.py"))
-        for node in ast.walk(tree_of(path))
+        for node in nodes_in(path)
         if isinstance(node, ast.expr) and reads_text(node)
     ]
 
@@ -228,14 +225,14 @@ def test_a_planted_need_is_found(tmp_path: Path) -> None:
 def test_every_module_says_what_it_holds() -> None:
     """One sentence at the top of every file."""
     for path in sorted(PACKAGE.rglob("*.py")):
-        assert ast.get_docstring(tree_of(path)), path
+        assert ast.get_docstring(parsed(path.read_text(encoding="utf-8"))), path
 
 
 def class_names(package: Path) -> dict[str, list[str]]:
     """Return the modules that define a public class of each name."""
     found: dict[str, list[str]] = {}
     for path in sorted(package.rglob("*.py")):
-        for node in tree_of(path).body:
+        for node in parsed(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 found.setdefault(node.name, []).append(path.relative_to(package).as_posix())
     return found
@@ -315,7 +312,7 @@ def test_no_hint_rule_reads_the_evidence_of_reports() -> None:
     reads = [
         f"{path.name}:{node.lineno}"
         for path in rules
-        for node in ast.walk(tree_of(path))
+        for node in nodes_in(path)
         if isinstance(node, ast.Attribute) and node.attr == "evidence" and path.name != "__init__.py"
     ]
     assert reads == []
@@ -335,7 +332,7 @@ FROM_OUTSIDE = {"cli": r"\bGRADE\b", "world": r'"pytest"|\bpytester\b'}
 
 def parts_imported(path: Path) -> Iterator[str]:
     """Yield what a test imports of the grader, with the names that it takes out of packages."""
-    for node in ast.walk(tree_of(path)):
+    for node in nodes_in(path):
         if isinstance(node, ast.ImportFrom) and node.module:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
     yield from imports_of(path)
@@ -489,7 +486,7 @@ def repeated(tests: Path) -> list[list[str]]:
     """Return the helpers and fixtures that do the same in several modules; those of one or two statements may."""
     found: dict[str, list[str]] = {}
     for path in modules_of(tests):
-        for node in tree_of(path).body:
+        for node in parsed(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and not node.name.startswith("test_"):
                 body = node.body[1:] if ast.get_docstring(node) is not None else node.body
                 if sum(isinstance(part, ast.stmt) for line in body for part in ast.walk(line)) > 2:

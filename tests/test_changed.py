@@ -20,6 +20,7 @@ def test_a_module_breaks_what_imports_it() -> None:
     assert "course/classroom/test_roster.py" not in found
 
 
+@pytest.mark.breadth(1, 3)
 @pytest.mark.parametrize(
     "module", ["grader/runtime/host/clock.py", "grader/runtime/worker/core.py", "grader/runtime/sandbox/probe.py"]
 )
@@ -43,6 +44,7 @@ def test_a_table_breaks_the_tests_of_its_folder() -> None:
     assert {path.split("/")[0] for path in found} == {"grading"}
 
 
+@pytest.mark.breadth(1, 5)
 @pytest.mark.parametrize(
     ("path", "tests"),
     [

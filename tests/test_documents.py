@@ -170,6 +170,8 @@ def _exists(message: str) -> bool:
     return re.search(".*".join(map(re.escape, message.split("..."))), _said()) is not None
 
 
+@pytest.mark.long
+@pytest.mark.breadth(10, 40)
 @pytest.mark.parametrize("message", _messages())
 def test_a_message_explained_still_exists(message: str) -> None:
     """In the code, or in what students of the tests are told; `...` stands for anything."""
@@ -213,6 +215,7 @@ def test_commands_that_were_described_and_parsed_are_as_before(words: list[str])
     assert CliRunner().invoke(app, words, prog_name="grade").exit_code == 0
 
 
+@pytest.mark.long
 def test_the_site_names_every_command_option_check_and_key() -> None:
     """The pages are made from the code; nothing of it is left out."""
     commands, checks, grammar, gallery, examples, interface, _ = (make() for make in generated.NAMES.values())

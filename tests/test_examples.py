@@ -73,6 +73,7 @@ def submissions() -> Iterator[ParameterSet]:
             yield pytest.param(name, folder, id=f"{name}-{folder}", marks=marks)
 
 
+@pytest.mark.breadth(1, 3)
 @pytest.mark.ros
 @pytest.mark.parametrize(("name", "folder"), list(submissions()))
 def test_a_submission_gets_what_it_is_worth(name: str, folder: str) -> None:
@@ -100,6 +101,7 @@ def test_every_rule_of_an_example_names_a_mistake() -> None:
     assert sum(map(len, told.values())) >= 7
 
 
+@pytest.mark.breadth(3, 8)
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_whole(name: str) -> None:
     """A rubric without mistakes, three wrong submissions, and a page that says how to grade it."""

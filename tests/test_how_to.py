@@ -65,8 +65,8 @@ def desk(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.nightly
 @pytest.mark.ros
-@pytest.mark.long
 def test_what_the_pages_say_can_be_done(desk: Path) -> None:
     """Each command of each page ends with 0, or with 1 where points are missing: two exercises are not handed in."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 import pytest
 from messages import ROOT, Sentence, in_code, in_page, in_remarks, in_script, sentences
 
-#: All of them read what users can read, which takes seconds to collect.
-pytestmark = pytest.mark.xdist_group("messages")
+#: All of them read what users can read, and the sources of the grader, which takes seconds.
+pytestmark = pytest.mark.xdist_group("source")
 #: What nobody says to a colleague, with what to write instead.
 PHRASES = {
     r"(?<![Tt]here )\b(?:is|are) no (?!longer\b|more\b)[a-z]": "is not a ...",

@@ -9,6 +9,8 @@ import pytest
 from parsers import PACKAGE, all_parsers, parsers_of
 from places import ROOT
 
+pytestmark = pytest.mark.xdist_group("source")
+
 PAGE = ROOT / "docs" / "reference" / "parsers.md"
 _ROW = re.compile(r"^\| `(grader/[^`]+)` \| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
 

@@ -41,7 +41,7 @@ def repeat(*arguments: Path | str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_failures_are_counted_for_each_test(tmp_path: Path) -> None:
     """With and without load, once for each run; the first failure is shown."""
     (tmp_path / "test_odd.py").write_text(TESTS, encoding="utf-8")

@@ -52,6 +52,7 @@ def run(command: str, folder: Path) -> str:
     return " ".join(done.stdout.split())
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.ros
 @pytest.mark.long
 @pytest.mark.parametrize("series", SERIES)

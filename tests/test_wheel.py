@@ -39,7 +39,7 @@ def wheel(packages: Path) -> Path:
     return next(packages.glob("*.whl"))
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_an_index_takes_the_packages(packages: Path) -> None:
     """Its own checker has no complaint, not even a warning."""
     command = [sys.executable, "-m", "twine", "check", "--strict", *map(str, packages.iterdir())]

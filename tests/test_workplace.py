@@ -57,6 +57,7 @@ def report_of(folder: str) -> Report:
     return judged(recordings()[folder])
 
 
+@pytest.mark.breadth(10, 50)
 @pytest.mark.parametrize("folder", WRONG)
 @pytest.mark.parametrize("task", TASKS, ids=lambda task: task["label"])
 def test_every_place_of_a_report_becomes_clickable(task: dict[str, Any], folder: str) -> None:

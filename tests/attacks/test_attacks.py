@@ -50,6 +50,7 @@ def skip_without(tier: str, usable: dict[str, str]) -> None:
         pytest.skip(usable[tier])
 
 
+@pytest.mark.breadth(0, 2)
 @pytest.mark.ros
 @pytest.mark.long
 @pytest.mark.parametrize("unit", [unit for unit in UNITS if unit not in IN_ONE_TIER])
@@ -63,7 +64,7 @@ def test_attacks_are_contained(tier: str, unit: str, usable: dict[str, str]) -> 
 
 @pytest.mark.ros
 @pytest.mark.long
-@pytest.mark.parametrize("unit", IN_ONE_TIER)
+@pytest.mark.parametrize("unit", [pytest.param("archive", marks=pytest.mark.nightly), "report"])
 def test_archives_and_texts_are_contained(unit: str, usable: dict[str, str]) -> None:
     """Neither what is unpacked nor what is shown depends on the tier, so one of them is enough."""
     skip_without(USUAL, usable)

@@ -73,6 +73,7 @@ def processes_of(scratch: Path) -> list[int]:
     return found
 
 
+@pytest.mark.breadth(1, 3)
 @pytest.mark.parametrize(
     ("make", "said"),
     [
@@ -127,6 +128,7 @@ BAD = {
 }
 
 
+@pytest.mark.breadth(1, 2)
 @pytest.mark.parametrize("name", each(BAD, 4))
 def test_bad_code_ends_in_a_report(scratch: Path, name: str) -> None:
     """What went wrong is in it; the command ends by itself and leaves nothing behind."""

@@ -91,7 +91,7 @@ def test_results_are_whole(class_: Path, tmp_path: Path) -> None:
     assert "judged: 3" in again.stdout, again.stderr
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_download_is_graded_where_a_student_hides_modules(class_: Path, tmp_path: Path) -> None:
     """The command is given in a folder with a `json.py`: it is not imported."""
     (tmp_path / "json.py").write_text("raise SystemExit('imported')\n", encoding="utf-8")
@@ -146,7 +146,7 @@ finally:
         assert len(told) == (name not in ("honest", "width")), (name, notes)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_every_submission_of_a_class_is_checked(tmp_path: Path) -> None:
     """Without asking for it: one that is right in virtual time only is found among honest ones, and only that one."""
     honest = (folder_of("correct/velocity_class") / "velocity_publisher.py").read_text(encoding="utf-8")

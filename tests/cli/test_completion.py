@@ -83,6 +83,7 @@ def test_completion_does_not_wait_for_the_grader() -> None:
     assert done.stdout.splitlines() == ["plain,velocity_publisher", "[]"]
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.slow
 @pytest.mark.parametrize("shell", each(SHELLS, 3))
 def test_tab_completes_in_a_shell(folder: Path, shell: str) -> None:

@@ -59,6 +59,7 @@ def of_this_python(verdict: Mapping[str, str]) -> dict[str, str]:
     return {key: text.replace("(read by Python 3.11)", f"(read by {here})") for key, text in verdict.items()}
 
 
+@pytest.mark.breadth(3, 6)
 @pytest.mark.parametrize("folder", list(live()))
 def test_a_submission_gets_what_it_is_worth(folder: str) -> None:
     """A correct node loses nothing however it is written; a wrong one loses what it got wrong."""
@@ -97,7 +98,7 @@ def test_the_wall_clock_gives_the_same_verdict() -> None:
     assert lost == {}
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_same_files_give_the_same_report() -> None:
     """Byte for byte, but for the duration; the seed follows from the files."""
     texts = []
@@ -108,7 +109,7 @@ def test_the_same_files_give_the_same_report() -> None:
     assert texts[0] == texts[1]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_another_seed_plays_another_part_of_the_recording() -> None:
     """What a student could hard-code is drawn."""
     seeds = [
@@ -120,6 +121,7 @@ def test_another_seed_plays_another_part_of_the_recording() -> None:
     assert evidence[0] != evidence[1]
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.long
 @pytest.mark.parametrize("bag", ["neato_square", "turtlebot3_path/path.mcap", "standing_best_effort"])
 def test_recordings_of_other_robots_can_be_played(bag: str) -> None:

@@ -64,6 +64,7 @@ def test_output_names_no_place_of_the_machine(tmp_path: Path) -> None:
     assert '  File "velocity_publisher.py", line 3, in <module>' in lines
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_other_tools_read_what_both_nodes_said(tmp_path: Path) -> None:
     """Numbers in both directions with their virtual times, log records, output and the graph, all decodable."""

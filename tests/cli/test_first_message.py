@@ -63,6 +63,8 @@ def graded(tmp_path: Path, rubric: str, program: str) -> tuple[float, str]:
     return float(text.partition("submission: ")[2].partition(" of 5 points")[0]), text
 
 
+@pytest.mark.nightly
+@pytest.mark.breadth(0, 1)
 @pytest.mark.parametrize(
     ("rubric", "program", "points", "noted"),
     each([(STRICT, ONCE, 0, True), (USUAL, ONCE, 5, True), (USUAL, TALKER, 5, False), (STRICT, TALKER, 5, False)], 4),
@@ -78,6 +80,7 @@ def test_a_message_without_a_listener_counts_if_the_rubric_says_so(
     assert ("before any subscription could discover it" in text) == (points == 0)
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.long
 @pytest.mark.parametrize(("rubric", "survivors"), [(USUAL, 1), (STRICT, 0)], ids=["usual", "strict"])
 def test_a_self_test_knows_it(tmp_path: Path, rubric: str, survivors: int) -> None:

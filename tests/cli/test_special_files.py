@@ -53,6 +53,7 @@ def run(*arguments: str | Path, cwd: Path) -> tuple[int, str]:
     return done.returncode, done.stdout + done.stderr
 
 
+@pytest.mark.breadth(1, 5)
 @pytest.mark.parametrize("kind", each(KINDS, 4))
 @pytest.mark.parametrize("command", [(), (".",), ("--exercise", "1"), ("velocity_publisher.py",), ("observe", ".")])
 def test_a_file_to_grade(tmp_path: Path, kind: str, command: tuple[str, ...]) -> None:
@@ -76,6 +77,7 @@ def test_a_class(tmp_path: Path, kind: str) -> None:
     assert "refused: ada" in said
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.long
 @pytest.mark.ros
 @pytest.mark.parametrize("kind", each(KINDS, 4))

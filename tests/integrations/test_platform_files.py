@@ -37,6 +37,7 @@ def complaints(program: str, *words: str) -> str:
     return "" if done.returncode == 0 else f"{program} ended with {done.returncode}:\n{done.stdout}{done.stderr}"
 
 
+@pytest.mark.breadth(2, 7)
 @pytest.mark.parametrize(
     ("schema", "paths"),
     [

@@ -92,7 +92,7 @@ def test_the_action_grades_and_a_prying_student_finds_nothing(checkout: Path, tm
     assert (Path(upload["path"]) / "report.html").stat().st_size > 10_000
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_without_a_sandbox_the_prying_student_finds_something(checkout: Path, tmp_path: Path) -> None:
     """The test above can fail."""
@@ -135,7 +135,7 @@ def run_autograder(root: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([root / "run_autograder"], env=environment, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_gradescope_s_zip_leaves_results(autograder: Path) -> None:
     """Unpacked and run as the platform does; the exercise is the one that was chosen."""

@@ -21,6 +21,7 @@ def test_every_submission_is_recorded() -> None:
     assert set(recordings()) == set(expected())
 
 
+@pytest.mark.breadth(90, 530)
 @pytest.mark.parametrize("folder", expected())
 def test_a_recording_is_judged_as_ever(folder: str) -> None:
     """The outcome of every criterion, what the student reads, and the whole report."""

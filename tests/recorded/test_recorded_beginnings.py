@@ -70,7 +70,7 @@ def by_node(one: Observation) -> bool:
     return sent or isinstance(one, (Message, LogRecord, OutputLine))
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_no_correct_submission_loses_a_criterion_to_a_real_clock() -> None:
     """With jitter, and with and without lost messages; and nearly every criterion can be judged from a beginning."""
     lost: list[str] = []

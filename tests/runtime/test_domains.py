@@ -160,6 +160,7 @@ def plan(folder: Path, choice: str, clock: str, **_: object) -> Plan:
     return planned(folder, CHOOSER.format(choice=choice), duration_ns=2 * NS_PER_S, **CLOCKS[clock])
 
 
+@pytest.mark.breadth(2, 4)
 @pytest.mark.ros
 @rows_of(plan)
 @pytest.mark.parametrize(

@@ -97,6 +97,7 @@ def test_nodes_and_grader_use_packages_of_rubric_grader_and_submission(kept: tup
     assert [one["name"] for one in report_to_json(report)["interfaces"]] == sorted(origins)
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_what_is_wrong_in_a_brought_type_costs_points() -> None:
     """Other types, values, rates, answers and transforms."""
@@ -128,6 +129,7 @@ def test_other_tools_read_brought_types_in_the_evidence(kept: tuple[Report, Path
     assert again.interfaces == report.interfaces
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.ros
 @pytest.mark.long
 @pytest.mark.parametrize("options", [{"clock": "wall"}, {"clock": "auto", "spot_checks": 1.0}], ids=["wall", "bare"])

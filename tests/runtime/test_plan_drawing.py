@@ -275,6 +275,7 @@ def missions(decide: Decide, seed: int, scenario: str, *, ends: bool) -> list[st
     return found[: found.index("abort") + 1] if ends and "abort" in found else found
 
 
+@pytest.mark.breadth(12, 40)
 @pytest.mark.parametrize("ends", [False, True], ids=["goes on asking", "ends at the first low charge"])
 @pytest.mark.parametrize("mistaken", CLIENT_MISTAKES.values(), ids=CLIENT_MISTAKES)
 @given(seed=SEEDS)

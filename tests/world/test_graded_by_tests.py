@@ -119,6 +119,7 @@ def test_a_right_program_gets_all_points_twice(grade: Grade, tmp_path: Path) -> 
         assert path.read_bytes() == (tmp_path / "second" / path.relative_to(tmp_path / "first")).read_bytes()
 
 
+@pytest.mark.long
 def test_a_failed_assertion_is_the_reason(grade: Grade) -> None:
     """A wrong program loses the points with the message of the assertion, and the hint of the test."""
     report = grade(RIGHT.replace("0.05", "0.1").replace("self.nearest > self.distance", "True"))
@@ -162,7 +163,7 @@ def test_messages_of_a_test_may_come_late_or_not_at_all(grade: Grade) -> None:
     assert outcomes(grade(RIGHT, ON_THEIR_WAY)) == ["met", "met"]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_what_does_not_fit_is_the_hint(grade: Grade) -> None:
     """Where nobody hears the test, the hint names the topic, whatever the assertion says."""
     deaf = verdicts(grade(RIGHT.replace('"/scan"', '"/scn"')))["test_stops_0_1"]
@@ -199,6 +200,7 @@ def test_commands(ros):
 """
 
 
+@pytest.mark.breadth(1, 2)
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("program", "said"),

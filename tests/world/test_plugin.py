@@ -177,7 +177,7 @@ def test_time_has_passed(robot):
 """
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_wider_scope_and_several_processes(suite: pytest.Pytester) -> None:
     """One world for a module, beside those of single tests; with xdist as well."""
     run(suite, WIDE).assert_outcomes(passed=3)
@@ -205,7 +205,7 @@ def test_it(ros):
 """
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_without_bubblewrap_the_network_is_shared_and_that_is_said(suite: pytest.Pytester) -> None:
     """The nodes run all the same, where they lie."""
     suite.makeconftest(WITHOUT_BUBBLEWRAP)
@@ -289,6 +289,8 @@ def test_it_fails(ros):
 """
 
 
+@pytest.mark.breadth(0, 1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "clock", "seeds"), each([((), "virtual", 3), (("--ros-clock", "wall"), "wall", 1)], 2)
 )
@@ -302,6 +304,7 @@ def test_the_clock_is_an_option_and_a_marker(
     result.stdout.fnmatch_lines(["*StepTimeout: the condition did not hold*", f"seed 0: {repeating} --ros-seed 0"])
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -336,6 +339,7 @@ rclpy.spin(node)
 """
 
 
+@pytest.mark.long
 def test_a_message_package_beside_the_test_is_not_taken_for_a_folder(suite: pytest.Pytester) -> None:
     """Python would find its folder first, as a package without `__init__.py`, in which there is nothing to import."""
     package = suite.mkdir("talk_words")

@@ -28,6 +28,7 @@ def run_as_colcon(package: Path, environment: dict[str, str] | None = None) -> s
     return subprocess.run(command, cwd=package, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.long
 def test_the_tests_of_a_package_pass_without_a_build(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Messages that are only sources are imported by tests and nodes; so is tf2_ros, which no wheel holds."""
     prefix = workspace / "install" / "robot"
@@ -40,7 +41,7 @@ def test_the_tests_of_a_package_pass_without_a_build(workspace: Path, monkeypatc
     assert (suite.tests, suite.failures, suite.errors) == (3, 0, 0)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_tests_may_lie_at_the_top_of_a_workspace(workspace: Path) -> None:
     """A folder that is in no package sees the packages below it."""
     shutil.move(workspace / "src/robot/test/test_battery.py", workspace / "test_battery.py")
@@ -63,7 +64,7 @@ PAGE = ROOT / "docs/how-to/package-ci.md"
 _RUN = re.compile(r"^ +run: (.+)$", re.MULTILINE)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_workflow_of_the_page_tests_a_package(workspace: Path) -> None:
     """Its commands pass for a right package; for a wrong one they leave the files that the page names."""
     workflow = re.findall(r"^```yaml\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)[0]

@@ -242,6 +242,7 @@ def test_pages_of_students_follow_each_other_as_the_table_does(page: Page) -> No
     other.close()
 
 
+@pytest.mark.long
 def test_hostile_names_stay_text(visit: Visit, page: Page) -> None:
     """No element, no handler and no script comes of a name; direction marks are shown as what they are."""
     rows(page)
@@ -263,6 +264,7 @@ def test_hostile_names_stay_text(visit: Visit, page: Page) -> None:
     assert not [url for url in visit.asked if "owned" in url]
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.long
 @pytest.mark.parametrize("most", [833, 98765])
 def test_the_numbers_of_a_large_class_fit_into_the_chart(browser: Browser, results: Path, most: int) -> None:
@@ -339,7 +341,8 @@ def test_without_scripts_everybody_is_there(browser: Browser, results: Path) -> 
     assert "need JavaScript" in text
 
 
-@pytest.mark.long
+@pytest.mark.nightly
+@pytest.mark.breadth(0, 1)
 @pytest.mark.parametrize("scheme", ["light", *more(["dark"], NIGHTLY)])
 @pytest.mark.parametrize("width", [*more([1280]), 390])
 def test_axe_finds_nothing(browser: Browser, results: Path, scheme: str, width: int) -> None:

@@ -228,7 +228,7 @@ def test_what_cannot_be_used_is_not_sent(tmp_path: Path) -> None:
     assert packed.status.state is State.REFUSED
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.ros
 def test_the_package_of_the_page_works(tmp_path: Path) -> None:

@@ -406,6 +406,7 @@ def test_what_is_bad_in_a_folder_around_everything_spoils_nobody_else(tmp_path: 
     assert again == intake
 
 
+@pytest.mark.breadth(1, 2)
 @pytest.mark.parametrize("size", [9 << 20, MAX_ARCHIVE_BYTES + 1])
 def test_a_large_file_is_left_out_in_each_way_of_handing_in(tmp_path: Path, size: int) -> None:
     """With the note that it gets in a folder which is graded by itself."""
@@ -449,6 +450,7 @@ def test_a_large_file_is_left_out_in_each_way_of_handing_in(tmp_path: Path, size
     assert used < size  # nothing but a size is kept of what nobody reads
 
 
+@pytest.mark.long
 def test_an_archive_that_is_too_large_is_refused_as_by_itself(tmp_path: Path) -> None:
     """The limit of an archive is larger than that of a file in it."""
     noise = os.urandom(MAX_ARCHIVE_BYTES + 1)

@@ -94,6 +94,7 @@ def test_a_changed_scenario_is_recorded_again(folder: Path) -> None:
     assert (graded.now.judged, graded.now.run) == (0, 3)
 
 
+@pytest.mark.breadth(2, 6)
 @pytest.mark.parametrize(
     "change",
     [
@@ -127,6 +128,7 @@ def test_recordings_of_other_files_are_not_used(folder: Path) -> None:
     assert {c.name for c in graded.changes} == {"ada", "cleo"}  # with other files there is nothing to compare
 
 
+@pytest.mark.breadth(1, 3)
 @pytest.mark.parametrize("damage", ["recording", "manifest", "seed"])
 def test_damaged_recordings_are_made_again(folder: Path, damage: str) -> None:
     """Only that submission runs."""
@@ -169,7 +171,7 @@ def test_a_killed_run_goes_on_and_tells_all_changes(folder: Path) -> None:
     assert not list(folder.rglob(BEFORE))
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_many_are_judged_by_several_processes(folder: Path) -> None:
     """With the same results, also if the recordings of one are damaged."""
     grade(folder)

@@ -68,6 +68,7 @@ def test_the_order_of_the_class_changes_nothing() -> None:
     assert there.pairs[0].share == back.pairs[0].share
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_process_changes_nothing() -> None:
     """The library's digests differ from process to process; what is found does not."""
@@ -211,6 +212,7 @@ HOSTILE = {
 }
 
 
+@pytest.mark.breadth(2, 3)
 @pytest.mark.slow
 @pytest.mark.parametrize("what", each(HOSTILE, 5))
 def test_whatever_is_handed_in_the_others_are_compared(what: str) -> None:

@@ -33,6 +33,8 @@ def results(tmp_path: Path) -> Path:
     return tmp_path / "out"
 
 
+@pytest.mark.breadth(0, 1)
+@pytest.mark.long
 @pytest.mark.parametrize("width", [1280, *more([390])])
 def test_two_submissions_side_by_side(browser: Browser, results: Path, width: int) -> None:
     """From the class to the pair by links; side by side where there is room; nothing runs, nothing is loaded."""

@@ -144,6 +144,7 @@ def test_a_machine_that_tells_no_memory_is_no_problem() -> None:
     assert machine.memory(None) == Fact("memory", "unknown")
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_a_real_machine_is_examined() -> None:
     """The real command: versions, ten messages over DDS, all tiers; the exit code is the verdict's."""

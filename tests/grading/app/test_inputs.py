@@ -163,7 +163,7 @@ def test_messages_are_spread_over_the_time_that_is_left() -> None:
     assert (stream.start_ns, stream.period_ns, len(stream.values)) == (1_000_000_000, 700_000_000, 3)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_a_reference_is_observed_in_its_simulation(desk: Path) -> None:
     """The robot drives to the distance that a message sets, and the reference meets the rubric that is made of it."""

@@ -277,6 +277,7 @@ def a_package(folder: Path, name: str, **files: str) -> None:
 LOGS = "import rclpy\n{}\ndef main():\n    rclpy.init()\n    rclpy.create_node('n').get_logger().info({})\n"
 
 
+@pytest.mark.breadth(1, 3)
 @pytest.mark.long
 @pytest.mark.ros
 @pytest.mark.parametrize("above", each(["src/repository", "src", "anything"], 3))
@@ -362,6 +363,7 @@ rclpy.spin(node)
 """
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_both_clocks_show_services_clients_and_parameters(tmp_path: Path) -> None:
     """The same ones."""
@@ -424,6 +426,7 @@ def test_where_the_machine_is_too_busy_for_the_wall_clock_virtual_time_is_shown(
     assert problem or found.notes == (f"{observing._TOO_BUSY} clock: a.py: it works",)
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.ros
 @pytest.mark.parametrize("given", [(), (("kind", "five"),)])
 def test_a_launch_file_gets_its_arguments(tmp_path: Path, given: tuple[tuple[str, str], ...]) -> None:
@@ -544,6 +547,7 @@ def test_a_fault_has_the_hint_of_the_report(tmp_path: Path, clock: str) -> None:
     assert not any("site-packages" in line or "and 1" in line for line in shown)
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.long
 @pytest.mark.ros
 @CLOCKS
@@ -553,6 +557,7 @@ def test_a_package_that_is_not_installed_is_no_mistake(tmp_path: Path, clock: st
     assert seen(tmp_path, clock, node=f"import rclpy\nimport {package}\n").hints == (hint,)
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.long
 @pytest.mark.ros
 @CLOCKS
@@ -596,6 +601,7 @@ OUTSIDE = {
 }
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.ros
 @pytest.mark.parametrize(("statement", "said"), each(OUTSIDE.items(), 4))
 def test_the_note_on_the_wall_clock_names_the_line(tmp_path: Path, statement: str, said: str) -> None:

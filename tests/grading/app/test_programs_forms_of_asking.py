@@ -426,6 +426,7 @@ def generate_launch_description():
 """
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.ros
 @pytest.mark.parametrize("process", each(["*/talker.py", "talk/talker.py", "talk.launch.py", "talker.py"], 4))
 def test_programs_of_cmake_packages_are_graded(tmp_path: Path, process: str) -> None:
@@ -452,7 +453,7 @@ def test_programs_of_cmake_packages_run(tmp_path: Path, shape: str, clock: str) 
     assert summary.faults == ()
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_more_programs_than_a_scenario_has_by_default_are_all_heard(tmp_path: Path) -> None:
     """A limit for stray participants does not count the programs themselves."""

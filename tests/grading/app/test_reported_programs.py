@@ -49,6 +49,7 @@ HINTS = {
 }
 
 
+@pytest.mark.breadth(1, 3)
 @pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 @pytest.mark.parametrize("name", each(HINTS, 2))
 def test_the_hint_names_the_cause(name: str, clock: str, tmp_path: Path) -> None:
@@ -63,7 +64,7 @@ def test_the_hint_names_the_cause(name: str, clock: str, tmp_path: Path) -> None
     assert code in (tmp_path / wanted).read_text().splitlines()[first.location.line - 1]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_one_processor_is_as_good_as_several(tmp_path: Path) -> None:
     """A client that calls a service in a callback, with threads of an executor of its own: the whole report."""
     shutil.copy(REPORTED / "one_cpu/battery_service_client.py", tmp_path)
@@ -101,7 +102,7 @@ def test_there_is_a_user(clock: str) -> None:
     assert [fault.exit_code for fault in summary.faults] == [0]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 def test_an_executor_that_virtual_time_cannot_hold_runs_on_the_wall_clock(clock: str) -> None:
     """At once, with the line that makes it as the reason."""

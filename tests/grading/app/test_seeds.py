@@ -145,6 +145,7 @@ def test_nothing_of_the_key_leaves_the_grader(tmp_path: Path, given: str) -> Non
     assert PRACTICE_NOTE not in done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_a_run_without_a_key_says_that_its_values_can_be_known() -> None:
     """A student's own run; with a seed of its own there is nothing to say."""
@@ -174,7 +175,7 @@ for path in map(Path, sys.argv[1:]):
 """
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_what_is_drawn_does_not_depend_on_the_hashes_of_the_grader() -> None:
     """Python draws them anew for each process, and a set of names has another order then."""
     examples = [path for path in ROOT.glob("examples/*/*.yaml") if path.stem == path.parent.name]

@@ -20,12 +20,13 @@ def logged(key: SeedKey) -> str:
     return next(v.outcome.value for v in report.exercises[0].verdicts if v.id == "logs_fan_speed")
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_who_knows_the_key_knows_the_questions() -> None:
     """So a run with the practice key is nobody's mark; and the program below is able to do what it tries."""
     assert logged(PRACTICE) == "met"
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.parametrize("key", [b"a key of some class", b"the key of another class"])
 def test_without_the_key_of_the_class_nobody_knows_them(key: bytes) -> None:
     """The files are the same, the values are not."""

@@ -306,6 +306,7 @@ def graded(tmp_path: Path, file: Path, hear: Progress = say_nothing, **options: 
     return grade_until_decided(GradeRequest(str(folder), rubrics=(rubric,), **options), hear)
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.ros
 @pytest.mark.parametrize(
     "file",
@@ -325,6 +326,7 @@ def test_a_program_that_is_right_only_in_virtual_time_loses(tmp_path: Path, file
     assert exercise.clock_reason.startswith("the node behaved differently ")
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.ros
 @pytest.mark.long
 @pytest.mark.parametrize("file", sorted((HERE / "honest").glob("*.py")), ids=lambda file: file.stem)

@@ -135,7 +135,7 @@ RACING = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_programs_that_repeat_are_told_from_those_that_do_not(open_folder: Path) -> None:
     """By recording again, without any other change; those of the wall clock are neither."""
@@ -150,7 +150,7 @@ def test_programs_that_repeat_are_told_from_those_that_do_not(open_folder: Path)
     assert [one["compared"] for one in found["conditions"]] == [found["scenarios"] - len(RACING)]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 @pytest.mark.parametrize("condition", ["executed", "together"])
 def test_what_repeats_does_so_under_other_conditions(open_folder: Path, condition: str) -> None:
@@ -159,7 +159,7 @@ def test_what_repeats_does_so_under_other_conditions(open_folder: Path, conditio
     assert (code, differences(found)) == (0, {})
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_the_first_difference_says_where_it_is(open_folder: Path) -> None:
     """With both events, and with the line that logged."""
@@ -174,7 +174,7 @@ def test_the_first_difference_says_where_it_is(open_folder: Path) -> None:
     assert "  first  t = 0.050 s  INFO [velocity_publisher] 1" in done.stdout
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_only_the_wall_clock_can_decide(open_folder: Path) -> None:
     """Then nothing is verified, and the reason is said."""
@@ -211,7 +211,7 @@ def test_the_result_in_evidence(open_folder: Path) -> None:
     assert not (kept / "verification.json").exists()
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_changed_evidence_differs(open_folder: Path) -> None:
     """What was recorded of another version of the grader or on another machine is compared event by event."""
@@ -227,8 +227,8 @@ def test_changed_evidence_differs(open_folder: Path) -> None:
     assert "one that shows something else" in done.stderr
 
 
+@pytest.mark.nightly
 @pytest.mark.ros
-@pytest.mark.long
 def test_an_ordinary_user(open_folder: Path, ros: RosInstallation) -> None:
     """Who cannot become another one, and has another sandbox than root."""
     if os.geteuid() != 0:
@@ -445,6 +445,7 @@ print(json.dumps({{"number": 0, "sources": {{}}}}))
 """
 
 
+@pytest.mark.breadth(3, 8)
 @pytest.mark.parametrize(
     ("then", "code", "state"),
     [

@@ -56,7 +56,7 @@ def test_submissions_repeat(names: list[str], condition: str) -> None:
     assert tried["compared"] > 0
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "options",
     [

@@ -231,6 +231,7 @@ criteria:
 FIELD = "1.0 / (0 if now.t_s > 1 else 1)}"
 
 
+@pytest.mark.breadth(1, 2)
 @pytest.mark.ros
 @pytest.mark.parametrize(
     ("wrong", "told"),

@@ -133,6 +133,7 @@ def test_what_a_real_clock_does_is_no_difference(check: Check, virtual: Program,
     assert compared(check, virtual, wall) == Comparison()
 
 
+@pytest.mark.breadth(4, 20)
 @pytest.mark.parametrize("tenths", range(40, 60))
 def test_a_recording_may_end_anywhere(tenths: int) -> None:
     """Also between a request and its response."""

@@ -26,6 +26,7 @@ def cost(rec: Recording) -> int:
     return calls_in(lambda: (POSITION.judge(trace), PERIOD.judge(trace)))
 
 
+@pytest.mark.breadth(2, 6)
 @pytest.mark.parametrize("write", LONG.values(), ids=LONG)
 def test_twice_as_many_logs_cost_twice_as_much(write: Writer) -> None:
     """About 430 messages and as many logs; comparing each log with each message would cost four times as much."""

@@ -36,6 +36,7 @@ def run(*words: str) -> tuple[int, str]:
     return result.exit_code, result.output
 
 
+@pytest.mark.breadth(2, 6)
 @pytest.mark.parametrize("named", EARLIER, ids=lambda path: path.name)
 def test_the_name_that_a_built_in_rubric_once_had_is_that_of_its_file(named: Path) -> None:
     """No such file is there, and no copy of the rubric."""
@@ -44,6 +45,7 @@ def test_the_name_that_a_built_in_rubric_once_had_is_that_of_its_file(named: Pat
     assert read_rubric(named) == read_rubric(builtin_rubrics()[read_rubric(named).id])
 
 
+@pytest.mark.breadth(1, 4)
 @pytest.mark.parametrize("named", ["rubrics/one.yaml", "rubrics/one", "rubrics/one/", "rubrics/one/rubric.yaml"])
 def test_a_rubric_has_several_names(course: Path, named: str) -> None:
     """Each is read, checked, explained and packed as the same file."""

@@ -77,6 +77,7 @@ def test_no_name_is_taken_twice() -> None:
     assert len(ids) == len(set(ids))
 
 
+@pytest.mark.breadth(2, 7)
 @pytest.mark.parametrize("name", SHARED)
 def test_it_lies_beside_its_rubric(name: str) -> None:
     """The rubric of the exercise names the file, as an author's does, and uses the same class."""
@@ -97,7 +98,8 @@ def test_a_rubric_elsewhere_uses_it_by_name(elsewhere: Path) -> None:
     assert verdict(read_rubric(FAN)) == verdict(exercise)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
+@pytest.mark.breadth(1, 1)
 @pytest.mark.parametrize("name", sorted({kind.parent.name for kind in shipped("rubrics").glob("*/checks.py")}))
 def test_a_rubric_that_names_no_files_judges_every_recording_the_same(tmp_path: Path, name: str) -> None:
     """As rubrics did before the checks lay beside the exercises: points, reasons, hints and charts are equal."""

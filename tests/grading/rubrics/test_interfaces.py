@@ -116,6 +116,7 @@ def interfaces() -> Interfaces:
     return Interfaces(find_ros().share)
 
 
+@pytest.mark.breadth(5, 20)
 @pytest.mark.parametrize(("old", "new", "place", "expected", "hint"), MISTAKES, ids=[new for _, new, *_ in MISTAKES])
 def test_a_mistake_about_a_type_is_told_before_anything_runs(
     tmp_path: Path, interfaces: Interfaces, old: str, new: str, place: str, expected: str, hint: str

@@ -308,6 +308,7 @@ def refusal(rubric: Callable[..., Any], text: str) -> RubricError | None:
     return None
 
 
+@pytest.mark.long
 def test_no_accident_gives_a_traceback(rubric: Callable[..., Any]) -> None:
     """Three hundred damaged rubrics: each is read, or refused with a place."""
     random_ = random.Random(7)

@@ -53,7 +53,8 @@ def of_twins(report: Report, exercise: Exercise) -> list[Verdict]:
     return [verdict for part in report.exercises for verdict in part.verdicts if verdict.id in ids]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
+@pytest.mark.breadth(0, 1)
 @pytest.mark.parametrize("name", TWINS)
 def test_twins_judge_every_recording_alike(tmp_path: Path, name: str) -> None:
     """The same outcome, points and problem."""
@@ -67,7 +68,7 @@ def test_twins_judge_every_recording_alike(tmp_path: Path, name: str) -> None:
     assert compared > lost > 10
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_each_name_keeps_the_form_of_its_evidence(tmp_path: Path) -> None:
     """Of `graph_edges`, edges are texts; of `bidirectional_graph`, each is a list of node, topic and node."""
     usual = read_rubric(shipped("rubrics") / "exercise_3" / "rubric.yaml")

@@ -96,6 +96,7 @@ def refusal(tmp_path: Path, data: bytes, name: str = "alice.zip") -> tuple[str, 
     return caught.value.message[len(where) :].lstrip(": "), caught.value.hint
 
 
+@pytest.mark.breadth(12, 60)
 @pytest.mark.parametrize("kind", EVERY)
 @pytest.mark.parametrize("name", ["alice.zip", "alice.tar.gz", "alice", "alice.py", "alice.txt"])
 def test_an_archive_is_staged_like_the_folder_it_holds(tmp_path: Path, kind: str, name: str) -> None:
@@ -140,6 +141,7 @@ def test_what_a_folder_is_copied_without_is_passed_over(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.breadth(2, 6)
 @pytest.mark.parametrize("outer", ["zip", "tar.gz"])
 @pytest.mark.parametrize("inner", ["zip", "tar.xz", pytest.param("rar", marks=needs_libarchive)])
 def test_an_archive_in_an_archive_is_opened_once(tmp_path: Path, outer: str, inner: str) -> None:
@@ -328,6 +330,7 @@ def test_a_file_that_is_too_large_is_left_out_with_a_note(tmp_path: Path) -> Non
         assert submission.notes == ("not copied: bag.mcap (larger than 8 MiB)",)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_bombs_are_refused_after_little_work(tmp_path: Path) -> None:
     """Much from little, in one member, in many and in streams; what is counted are real bytes."""
@@ -372,6 +375,7 @@ def test_an_xz_that_asks_for_gigabytes_of_memory_is_refused(tmp_path: Path) -> N
     assert "damaged or incomplete" in refusal(tmp_path, bytes(data))[0]
 
 
+@pytest.mark.breadth(3, 13)
 @pytest.mark.parametrize("kind", EVERY)
 def test_an_archive_cut_off_anywhere_is_refused(tmp_path: Path, kind: str) -> None:
     """At any byte: never a part of the files."""
@@ -427,6 +431,7 @@ def test_a_7z_of_another_program_is_read(tmp_path: Path) -> None:
     assert staged(hand_in(tmp_path, BY_PY7ZR["plain"], "a.7z").root) == {"velocity_publisher.py": b"x = 1\n"}
 
 
+@pytest.mark.breadth(6, 27)
 @needs_libarchive
 @pytest.mark.parametrize(
     ("data", "found"),
@@ -459,6 +464,7 @@ def test_what_is_unusable_in_a_rar_or_7z_is_told(tmp_path: Path, data: bytes, fo
     assert refusal(tmp_path, data, "a.rar")[0].startswith(found)
 
 
+@pytest.mark.long
 @needs_libarchive
 @pytest.mark.slow
 def test_bombs_and_noise_in_a_rar_or_7z_are_refused(tmp_path: Path) -> None:

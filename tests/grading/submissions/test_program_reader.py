@@ -56,6 +56,7 @@ def dump(tree: ast.AST) -> str:
         sys.set_int_max_str_digits(limit)
 
 
+@pytest.mark.breadth(3, 17)
 @pytest.mark.parametrize("shape", each(SHAPES, 5))
 def test_no_shape_of_a_program_takes_more_than_its_size_allows(shape: str) -> None:
     """At any depth it is examined, or is one that Python cannot compile, or is said to be too long or too deep."""
@@ -72,6 +73,7 @@ def test_no_shape_of_a_program_takes_more_than_its_size_allows(shape: str) -> No
             assert dump(tree) == dump(ast.parse(content))
 
 
+@pytest.mark.breadth(4, 17)
 @pytest.mark.parametrize("shape", each(SHAPES, 5))
 def test_no_shape_of_a_program_makes_a_rule_raise(shape: str, caplog: pytest.LogCaptureFixture) -> None:
     """All hint rules look at the deepest trees that there are, in bounded work."""
@@ -87,6 +89,7 @@ def test_no_shape_of_a_program_makes_a_rule_raise(shape: str, caplog: pytest.Log
     assert not caplog.records
 
 
+@pytest.mark.breadth(6, 30)
 @pytest.mark.parametrize("encoding", ENCODINGS)
 def test_no_encoding_costs_more_than_its_size(encoding: str) -> None:
     """Only those of editors, and some of other systems, are decoded; a program in any other is suspicious."""

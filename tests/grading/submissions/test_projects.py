@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from places import TESTS
+from tiers import NIGHTLY
 
 from grader.grading.submissions import contained_reader, projects
 from grader.grading.submissions.contained_reader import told_by_process
@@ -21,6 +22,8 @@ from grader.runtime.programs.executables import executables, find_executable
 from grader.runtime.programs.shares import install_shares
 from grader.runtime.ros_installation import RosInstallation
 
+#: What a reader of TOML needs too long for.
+COSTLY_KEY = "a key of very many parts"
 COSTLY = "setup.py: not read, because that would take too much memory or time"
 INVALID = "setup.py: not valid, so what is declared there is not used"
 NAMES = "setup.py: names of files or programs that no package can have are left out"
@@ -146,7 +149,7 @@ HOSTILE: dict[str, tuple[dict[str, str | bytes], list[str]]] = {
         {"package.xml": "<name>own</name>", "pyproject.toml": "a" + ".a" * 18_000 + " = 1\n"},
         ["pyproject.toml: not read, because that would take too much memory or time"],
     ),
-    "a key of very many parts": (
+    COSTLY_KEY: (
         {"package.xml": "<name>own</name>", "pyproject.toml": "a" + ".a" * 120_000 + " = 1\n"},
         ["pyproject.toml: not read, because that would take too much memory or time"],
     ),
@@ -186,7 +189,10 @@ HOSTILE: dict[str, tuple[dict[str, str | bytes], list[str]]] = {
 }
 
 
-@pytest.mark.parametrize(("files", "notes"), HOSTILE.values(), ids=HOSTILE)
+@pytest.mark.parametrize(
+    ("files", "notes"),
+    [pytest.param(*row, marks=NIGHTLY if name == COSTLY_KEY else (), id=name) for name, row in HOSTILE.items()],
+)
 def test_what_a_hostile_file_holds_becomes_a_note(
     tmp_path: Path, ros: RosInstallation, files: Mapping[str, str | bytes], notes: list[str]
 ) -> None:
@@ -205,6 +211,7 @@ def test_what_a_hostile_file_holds_becomes_a_note(
     assert {path.name for path in tmp_path.iterdir()} == {"ws", "prefix"}
 
 
+@pytest.mark.nightly
 def test_a_trusted_process_stays_small_whatever_the_files_are(tmp_path: Path) -> None:
     """All hostile files, one after the other, in a process that does nothing else."""
     roots = [str(made(tmp_path / str(number), files)) for number, (files, _) in enumerate(HOSTILE.values())]

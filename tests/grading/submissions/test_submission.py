@@ -71,6 +71,7 @@ def test_of_several_the_one_nearest_the_top_is_taken(work: Path, into: Path) -> 
     )
 
 
+@pytest.mark.breadth(4, 14)
 @pytest.mark.parametrize(
     "name",
     [

@@ -23,6 +23,7 @@ def test_sleeping_is_exact() -> None:
     """) == ["51500 (500002000, 5150000)", "51500 end"]
 
 
+@pytest.mark.breadth(5, 20)
 @pytest.mark.parametrize("clock", ["time.time", "time.monotonic", "time.perf_counter", "now"])
 @pytest.mark.parametrize(("compare", "pause"), [(">=", 0.01), (">", 0.01), (">=", 0.025), (">", 0.05), (">", 0.002)])
 def test_a_loop_that_compares_clocks_after_each_pause_keeps_its_pace(clock: str, compare: str, pause: float) -> None:

@@ -263,6 +263,7 @@ POLLING = {
 }
 
 
+@pytest.mark.breadth(1, 2)
 @pytest.mark.parametrize("loop", but([POLLING["spin_once"]], POLLING.values()), ids=POLLING)
 def test_a_timer_that_is_polled_fires_on_time(run: Callable[..., Trace], loop: str) -> None:
     """Although time passes in larger steps for a program that polls: never beyond its next timer."""

@@ -252,6 +252,7 @@ def test_entry_points_may_stand_elsewhere(start: Callable[..., Any], files: Mapp
     assert found == ("entry_point, robot.node, go", ["go", "exit 3"])
 
 
+@pytest.mark.breadth(5, 18)
 @pytest.mark.parametrize(
     "code",
     [

@@ -117,6 +117,7 @@ def test_what_a_replaced_function_raises_is_the_program_s(run: Run) -> None:
         assert place is None, (mistake, place)
 
 
+@pytest.mark.breadth(1, 2)
 @pytest.mark.parametrize(
     ("module", "name", "value", "where"),
     each(

@@ -359,6 +359,7 @@ def test_all_names_of_ros_can_be_imported(described: Callable[..., Described]) -
 GATHERED = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
 
 
+@pytest.mark.breadth(30, 100)
 @pytest.mark.parametrize("key", launch_names.CLASSES)
 def test_a_class_takes_what_that_of_ros_takes(described: Callable[..., Described], key: str) -> None:
     """All required arguments by name; without one, or with another one, it raises what ROS does."""
@@ -575,6 +576,7 @@ MISTAKES = (
 )
 
 
+@pytest.mark.breadth(25, 80)
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_of_a_launch_file_is_its_own(
     described: Callable[..., Described], tmp_path: Path, mistake: str

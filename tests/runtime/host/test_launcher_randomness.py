@@ -34,6 +34,7 @@ for _ in range(3): threading.Thread(target=work).start()
 }
 
 
+@pytest.mark.breadth(4, 19)
 @pytest.mark.parametrize("source", SOURCES)
 def test_randomness_repeats_for_a_seed_and_differs_for_another(source: str) -> None:
     """The same submission gets the same run, whatever its nodes draw from."""

@@ -92,6 +92,7 @@ def text(name: str) -> str:
 DEFAULT = [("a spin", "virtual"), ("a timer of Python", "virtual"), ("print_stack", "virtual")]
 
 
+@pytest.mark.breadth(2, 6)
 @rows_of(plan)
 @pytest.mark.parametrize(
     ("name", "clock"),

@@ -506,6 +506,7 @@ def test_the_low_level_module_is_virtual_as_well() -> None:
     """) == ["500 work", "500 True", "500 end"]
 
 
+@pytest.mark.breadth(6, 20)
 @pytest.mark.rule(5)
 @pytest.mark.parametrize("name", ORDERS)
 def test_who_goes_on_first(name: str) -> None:

@@ -85,6 +85,7 @@ def sampled(cases: Sequence[str]) -> list[Any]:
     return [pytest.param(share, marks=mark, id=f"{n}/5") for n, (share, mark) in enumerate(shares, 1)]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("names", sampled([f"{body}, {executor}" for body in BODIES for executor in EXECUTORS]))
 def test_what_a_program_does(open_folder: Path, names: list[str]) -> None:
     """Each message and each log record at the same time."""
@@ -96,6 +97,7 @@ def test_what_a_program_does(open_folder: Path, names: list[str]) -> None:
     assert (code, differences(found), found["not_comparable"]) == (0, {}, [])
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("names", sampled(with_threads()))
 def test_what_a_submission_does(names: list[str]) -> None:
     """So that outcomes, reasons, hints and charts are the same as well."""

@@ -49,6 +49,7 @@ def plan(folder: Path, does: str, **_: object) -> Plan:
     return planned(folder, PROGRAM.format(does=does or "pass"), duration_ns=NS_PER_S)
 
 
+@pytest.mark.breadth(2, 6)
 @rows_of(plan, session="session_in_tier")
 @pytest.mark.usefixtures("session_in_tier")
 @pytest.mark.parametrize(("does", "told"), but(DEFAULT, DOES.values()), ids=DOES)

@@ -56,6 +56,7 @@ def kept(trace: Trace) -> dict[tuple[str, str], bytes]:
     return {(file.process, file.name): base64.b64decode(file.content) for file in trace.written}
 
 
+@pytest.mark.breadth(1, 2)
 @pytest.mark.ros
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"])])
 def test_a_program_writes_beside_itself_and_it_is_kept(run: Run, clock: str) -> None:

@@ -24,6 +24,7 @@ HEADER = b"\x00\x01\x00\x00"
 CLASSES = [getattr(msg, name) for name in dir(msg) if hasattr(getattr(msg, name), "SLOT_TYPES")]
 
 
+@pytest.mark.breadth(6, 21)
 @pytest.mark.parametrize("package", installed_packages())
 def test_bytes_are_those_of_the_compiled_type_support(package: str) -> None:
     chance = random.Random(package)

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -70,6 +71,7 @@ def assert_as_installed(built: BuiltInterfaces) -> None:
     assert len(written) > len(described) > 0
 
 
+@pytest.mark.long
 def test_classes_and_descriptions_are_those_of_the_installed_package(built: BuiltInterfaces) -> None:
     assert_as_installed(built)
 
@@ -89,7 +91,7 @@ PUBLISHED = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_shipped_packages_have_the_hashes_of_the_releases(tmp_path: Path) -> None:
     made = build(shipped_packages(), tmp_path, [SHARE])
     assert made.names == ("example_interfaces", "tf2_msgs", "turtlesim")
@@ -103,21 +105,24 @@ def test_shipped_packages_have_the_hashes_of_the_releases(tmp_path: Path) -> Non
     assert printed.startswith("turtlesim.msg.Pose(x=1.0,")
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.ros
 @pytest.mark.parametrize("both", [False, *more([True])])
 def test_exchanges_with_the_compiled_type_support(built: BuiltInterfaces, *, both: bool) -> None:
     sides = (("ours", "theirs", [built]), ("theirs", "ours", [built] if both else []))
-    processes = [
-        subprocess.Popen(
-            [sys.executable, str(HERE / "exchange.py"), own, other],
-            env=environment(*packages),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        for own, other, packages in sides
-    ]
-    results = [process.communicate(timeout=600) for process in processes]
+    with ExitStack() as ended:
+        processes = []
+        for own, other, packages in sides:
+            process = subprocess.Popen(
+                [sys.executable, str(HERE / "exchange.py"), own, other],
+                env=environment(*packages),
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+            processes.append(ended.enter_context(process))
+            ended.callback(process.kill)
+        results = [process.communicate(timeout=600) for process in processes]
     for process, (printed, errors) in zip(processes, results, strict=True):
         assert process.returncode == 0, errors
         told = json.loads(printed)
@@ -228,6 +233,7 @@ print(refused > 100, heard[0].string_value, faults)
 """
 
 
+@pytest.mark.long
 @pytest.mark.ros
 def test_hostile_bytes_and_wrong_values_raise_in_python_and_kill_nothing(built: BuiltInterfaces) -> None:
     assert run(HOSTILE, built).split() == ["True", "after", "11"]

@@ -97,6 +97,7 @@ def test_a_cmake_package_shares_its_files_and_a_loose_file_nothing(tmp_path: Pat
     assert install_shares(loose, read_projects(loose)[0], tmp_path / "none", ros) == ((), ())
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.ros
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"]), "bare"])
 def test_a_node_finds_what_its_package_shares(tmp_path: Path, clock: str) -> None:

@@ -581,6 +581,7 @@ PROGRAMS = {
 }
 
 
+@pytest.mark.breadth(1, 3)
 @pytest.mark.ros
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 @pytest.mark.parametrize(

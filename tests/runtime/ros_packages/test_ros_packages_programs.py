@@ -55,6 +55,7 @@ def test_there_are_ten_programs_for_each_package() -> None:
     assert all(told((PROGRAMS / file).read_text(), "logs") for file in FILES)
 
 
+@pytest.mark.breadth(1, 4)
 @pytest.mark.parametrize(("file", "clock"), CASES)
 def test_a_program_does_what_the_documentation_promises(file: str, clock: str) -> None:
     """It logs what it says, ends in peace, and needs no wall clock."""

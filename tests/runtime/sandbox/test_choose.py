@@ -440,6 +440,7 @@ def graded(start: tuple[str, ...], tmp_path: Path, *options: str) -> subprocess.
     return subprocess.run(argv, env=environment, capture_output=True, text=True, check=False, timeout=200, cwd=ROOT)
 
 
+@pytest.mark.nightly
 @pytest.mark.ros
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.long if n == "landlock" else pytest.mark.nightly) for n in ISOLATING]
@@ -475,6 +476,7 @@ def container(request: pytest.FixtureRequest, ros: RosInstallation) -> Callable[
     return start
 
 
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_a_container_without_a_network_is_graded_in(container: Callable[..., tuple[str, ...]], tmp_path: Path) -> None:
     """No namespace can be made there, and none is needed: Landlock and the missing network do."""

@@ -66,7 +66,7 @@ def test_the_page_lists_what_the_program_prints(usual: dict[str, str]) -> None:
     assert usual.keys() == documented()
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_on_one_processor_from_an_odd_shell(program: Path, usual: dict[str, str], open_folder: Path) -> None:
     """Affinity, priority, umask, limits, signals, time zone, locale, folders and variables are the caller's."""
     before = ("taskset", "-c", "0", "bash", "-c", ODD_SHELL, "bash")
@@ -75,13 +75,14 @@ def test_on_one_processor_from_an_odd_shell(program: Path, usual: dict[str, str]
     assert rows(program, before=before, **variables) == usual
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("tier", more([FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME]))
 def test_in_another_tier(program: Path, usual: dict[str, str], tier: str) -> None:
     """The tiers without a view of files of their own answer alike."""
     assert rows(program, "--isolation", tier) == usual
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_for_another_user(program: Path, usual: dict[str, str], open_folder: Path) -> None:
     """An ordinary user, whose sandbox has a user namespace, sees what root sees."""
     if os.geteuid() != 0:

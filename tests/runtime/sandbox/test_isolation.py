@@ -479,6 +479,7 @@ print(json.dumps([resource.getrlimit(getattr(resource, name)) for name in names]
     assert said(any_tier.run(code, limits=limits)) == [[2036 * MIB] * 2, [MIB] * 2, [50] * 2, [0] * 2]
 
 
+@pytest.mark.breadth(1, 1)
 def test_processor_time_is_bounded(any_tier: Sandbox) -> None:
     """A loop without end is ended by the kernel, as a last resort."""
     done = any_tier.run("while True: pass", limits=Limits(processor_ns=1_000_000_000))
@@ -649,7 +650,8 @@ print(json.dumps([readable, writable]))
 """
 
 
-@pytest.mark.long
+@pytest.mark.nightly
+@pytest.mark.breadth(0, 1)
 def test_a_worker_opens_nothing_of_the_instructor(sandbox: Sandbox, tmp_path: Path, ros: RosInstallation) -> None:
     """It sees Python, ROS, its own modules and its folder: no other folder, no rubric, no key, no other submission."""
     beside = sandbox.submission.parent / "another-submission.py"
@@ -769,6 +771,7 @@ print(json.dumps(sorted(set(heard), key=heard.index)))
 """
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.ros
 def test_nodes_on_both_sides_of_the_walls_talk(any_tier: Sandbox) -> None:
     """Twenty messages go from the worker's node to the student's and come back."""

@@ -133,6 +133,7 @@ def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Pa
     return sandbox_or_skip(request.param, ros, submission)
 
 
+@pytest.mark.breadth(0, 1)
 def test_each_call_that_sets_up_a_fork_ends_it_when_it_fails(sandbox: Sandbox) -> None:
     """Sessions, descriptors, folders, limits, users, privileges, namespaces, Landlock and the filter, one by one."""
     module = sandbox.submission / "injecting.py"
@@ -160,6 +161,7 @@ def test_each_call_that_sets_up_a_fork_ends_it_when_it_fails(sandbox: Sandbox) -
     assert {"w 1", "s 20", *(f"{role} {most}" for role, most in told["beside"].items())} <= set(results)
 
 
+@pytest.mark.long
 def test_a_fork_that_cannot_be_sandboxed_is_no_fault_of_the_node(session: RecordingSession, tmp_path: Path) -> None:
     """Nothing is judged; the reason is the grader's, and the next recording is as usual."""
     tmp_path.chmod(0o755)

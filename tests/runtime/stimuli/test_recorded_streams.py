@@ -176,8 +176,8 @@ def test_a_node_gets_what_was_recorded(
     assert grade(wrong, "--rubric", rubric, "--clock", clock)["score"] == 5
 
 
+@pytest.mark.nightly
 @pytest.mark.ros
-@pytest.mark.long
 def test_another_recording_can_be_played(tmp_path: Path) -> None:
     """By its topic or its type; the report tells the command that plays it again."""
     rubric = course(tmp_path / "course")

@@ -162,6 +162,7 @@ def of_each(programs: dict[str, str]) -> list[object]:
     return [pytest.param(program, id=name, marks=marks[name]) for name, program in programs.items()]
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.long
 @pytest.mark.parametrize("program", of_each(RELATIVE))
 def test_a_loop_that_pauses_after_its_work_is_as_slow_as_it_is(run: Record, program: str) -> None:
@@ -172,6 +173,8 @@ def test_a_loop_that_pauses_after_its_work_is_as_slow_as_it_is(run: Record, prog
     assert trace.clock is ClockKind.WALL or CHARGED_NOTE in trace.notes
 
 
+@pytest.mark.breadth(0, 1)
+@pytest.mark.long
 @pytest.mark.parametrize("program", of_each(UNTIL))
 def test_a_loop_that_sleeps_until_a_deadline_keeps_its_pace(run: Record, program: str) -> None:
     """It makes up for its work: it stays in virtual time, at exactly 20 Hz."""

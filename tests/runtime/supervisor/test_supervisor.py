@@ -568,6 +568,7 @@ def test_a_worn_worker_is_not_replaced_while_others_go_on(make: Callable[..., tu
     assert stage.forks == [2, 0, 0, 2]
 
 
+@pytest.mark.long
 def test_callers_at_the_same_time_wear_workers_and_lose_no_place(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """While the places of one are filled again, nobody else takes or drops one of them: all would wait for it."""
     recorder, _ = make("is worn", workers=2)
@@ -606,6 +607,7 @@ LIMITS = {
 }
 
 
+@pytest.mark.breadth(1, 3)
 @pytest.mark.parametrize("behaviour", LIMITS)
 def test_two_workers_at_a_limit_of_theirs_are_the_nodes_doing(
     make: Callable[..., tuple[Recorder, Stage]], behaviour: str
@@ -618,6 +620,7 @@ def test_two_workers_at_a_limit_of_theirs_are_the_nodes_doing(
     assert (trace.harness_problem, trace.stop_ns, len(stage.pids())) == ("", 5, 2)
 
 
+@pytest.mark.breadth(1, 3)
 @pytest.mark.parametrize("behaviour", LIMITS)
 def test_one_worker_at_a_limit_decides_nothing(make: Callable[..., tuple[Recorder, Stage]], behaviour: str) -> None:
     """The plan is tried again."""
@@ -625,6 +628,7 @@ def test_one_worker_at_a_limit_decides_nothing(make: Callable[..., tuple[Recorde
     assert note(recorder.record(jobs("alone"), nothing)[0]).startswith("worker 1")
 
 
+@pytest.mark.breadth(1, 4)
 @pytest.mark.parametrize("first", [*LIMITS, "dies"])
 def test_different_ends_of_workers_decide_nothing(make: Callable[..., tuple[Recorder, Stage]], first: str) -> None:
     """A limit and a failure without one, in any order."""

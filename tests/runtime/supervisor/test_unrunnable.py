@@ -44,6 +44,7 @@ def _known(plan: Plan) -> Trace | None:
     return trace_without_run(plan, read_programs(Path(plan.root))[0])
 
 
+@pytest.mark.breadth(3, 12)
 @pytest.mark.parametrize("name", BROKEN | INERT)
 def test_the_trace_is_the_one_that_a_run_records(name: str, session: RecordingSession, tmp_path: Path) -> None:
     """All but the text that Python prints, which the report takes from the fault."""

@@ -121,6 +121,7 @@ def rows(programs: dict[str, str], default: str) -> pytest.MarkDecorator:
     return pytest.mark.parametrize(("program", "clock"), [*virtual, *more(often), *more(others, NIGHTLY)])
 
 
+@pytest.mark.breadth(1, 4)
 @rows_of(plan)
 @rows(EARLY, "beside a spinning thread")
 def test_a_message_without_a_wait_is_early(trace: Trace, program: str, clock: str) -> None:

@@ -85,6 +85,7 @@ def burst_and_end(folder: Path, ending: str) -> Plan:
     return planned(folder, BEFORE + program, duration_ns=3 * NS_PER_S)
 
 
+@pytest.mark.breadth(2, 4)
 @pytest.mark.rule(16)
 @rows_of(burst_and_end)
 @pytest.mark.parametrize("ending", but(["destroy_node", "hard_exit", "killed", "exit_in_thread"], ENDINGS))
@@ -335,6 +336,7 @@ rclpy.spin(Server())
 """
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.long
 @pytest.mark.parametrize("program", but([ANEW["collected"]], ANEW.values()), ids=ANEW)
 def test_a_client_made_anew_for_each_question_finds_the_graders_server(run: Callable[..., Trace], program: str) -> None:
@@ -344,6 +346,7 @@ def test_a_client_made_anew_for_each_question_finds_the_graders_server(run: Call
     assert [request.t_ns // NS_PER_S for request in trace.requests("/status", "student")] == [0, 1, 2]
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.rule(18)
 @pytest.mark.parametrize("program", but([ANEW["context"]], ANEW.values()), ids=ANEW)
 def test_a_client_made_anew_for_each_question_finds_another_students_server(

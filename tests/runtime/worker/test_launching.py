@@ -67,7 +67,7 @@ def test_a_launch_file_starts_its_nodes(graded: Callable[..., ExerciseReport]) -
     assert {start.process for start in report.starts} == {"robot.launch.py"}
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_wall_clock_starts_the_same(graded: Callable[..., ExerciseReport], tmp_path: Path) -> None:
     """The same command lines, in real time, where a busy machine delays some of the few messages."""
     text = (HERE / "rubrics" / "launched.yaml").read_text()
@@ -209,6 +209,7 @@ LACKING = {
 }
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.parametrize(("line", "said"), each(LACKING.items(), 3), ids=LACKING.values())
 def test_what_ros_has_and_the_grader_lacks_costs_no_points(
     graded: Callable[..., ExerciseReport], line: str, said: str
@@ -302,6 +303,7 @@ def row(name: str, values: tuple[str, str]) -> Any:
     return pytest.param(*values, marks=[] if name == "exits_hard" else LONG if name in often else NIGHTLY)
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.parametrize(("harm", "said"), [row(name, values) for name, values in HOSTILE.items()], ids=HOSTILE)
 def test_a_launch_file_that_does_harm_is_a_fault(graded: Callable[..., ExerciseReport], harm: str, said: str) -> None:
     """It ends in its sandbox, and costs what it describes nothing of."""
@@ -358,6 +360,7 @@ WORDS = [
 ]
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.long
 @pytest.mark.parametrize("words", each(WORDS, 5, NIGHTLY), ids=lambda words: words.get("code", "none"))
 def test_a_launch_file_says_nothing_in_the_graders_voice(
@@ -400,7 +403,7 @@ def test_arguments_without_end_are_a_fault_of_the_launch_file(graded: Callable[.
     assert report.faults[0].text == "stopped: its arguments and parameter files have more than 64 KiB"
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_an_endless_launch_file_is_ended(graded: Callable[..., ExerciseReport]) -> None:
     """By its processor time."""
     report = graded((LAUNCH, '    share = get_package_share_directory("robot")\n', "    while True: pass\n"))

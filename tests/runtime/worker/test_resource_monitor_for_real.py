@@ -142,7 +142,7 @@ def test_a_large_message_is_counted_but_not_read(run: Callable[..., Trace]) -> N
     assert trace.notes == ("/big: the content of messages larger than 32 KiB was ignored (1 in all)",)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_output_without_end_is_cut_and_the_run_goes_on(run: Callable[..., Trace]) -> None:
     """A gigabyte costs the student nothing but the output."""
     trace = run("for _ in range(1000): os.write(1, b'y\\n' * (1 << 19))", Limits(output_bytes=MIB, lines=1000))

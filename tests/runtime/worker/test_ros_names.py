@@ -106,6 +106,7 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
 FORGED = ["//bad__name/", "/1", "/a//b", "/a/", "/" + "a" * 250]
 
 
+@pytest.mark.breadth(1, 2)
 @pytest.mark.ros
 @pytest.mark.parametrize("name", each(FORGED, len(FORGED)))
 @pytest.mark.parametrize("kind", ["client", *more(["service"], NIGHTLY)])
@@ -149,8 +150,8 @@ def of_types(first: int, end: int) -> str:
     return hostile(harm=harm)
 
 
+@pytest.mark.nightly
 @pytest.mark.ros
-@pytest.mark.long
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 def test_too_many_types_on_a_topic_are_a_limit_of_the_node(run: Callable[..., Trace], clock: str) -> None:
     """Which is judged; no failure of the grader."""

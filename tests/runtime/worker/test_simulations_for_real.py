@@ -186,6 +186,7 @@ def test_a_loop_is_closed_on_the_wall_clock(tmp_path: Path) -> None:
     assert {v.outcome for v in verdicts(report).values()} == {Outcome.MET}, verdicts(report)
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     each(

@@ -191,6 +191,7 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     return run_one
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.ros
 @pytest.mark.parametrize(
     ("harm", "words"),
@@ -219,8 +220,8 @@ def test_memory_in_sockets_and_pipes_ends_the_node(
     assert not trace.harness_problem
 
 
+@pytest.mark.nightly
 @pytest.mark.ros
-@pytest.mark.long
 def test_a_node_beside_it_goes_on(run: Callable[..., Trace]) -> None:
     """Memory is charged to the one that holds it."""
     other = hostile().replace("/cmd_vel", "/other").replace("velocity_publisher", "other")

@@ -85,7 +85,7 @@ def arrivals(evidence: Path, topic: str = "/target") -> list[tuple[int, float]]:
         return [((at - reader.start_time) // 1_000_000, data) for at, data in found]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_who_copes_with_lost_messages_keeps_the_point(tmp_path: Path) -> None:
     """The evidence holds what arrived; judged again it gives the same report. Another seed loses others."""
     copes, evidence = grade(tmp_path, COPES, "copes")

@@ -90,6 +90,7 @@ FLOODS = [
 JUNK = ["send(b'x' * 100 + b'\\n')", "send(b'[' * 100000 + b'\\n')", "send(b'\\xff\\xfe\\n')"]
 
 
+@pytest.mark.breadth(1, 2)
 @pytest.mark.parametrize(
     ("said", "clock"),
     [
@@ -127,7 +128,7 @@ def test_absurd_reports_change_nothing_that_counts(run: Callable[..., Trace], re
     assert all(len(o.text) <= 500 and 0 <= o.t_ns <= 10 * NS_PER_S for o in trace.faults())
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_report_of_the_far_future_only_ends_the_senders_own_time(run: Callable[..., Trace]) -> None:
     """Its process sleeps for ever, as it asked; the other one is stepped as before."""
     report = (
@@ -260,7 +261,7 @@ for info in self.get_publishers_info_by_topic("/temperature"):
     assert [d.value["data"] for d in trace.deliveries("/temperature")] == [21.0, 26.0] * 5
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_forged_farewell_of_the_grader_ends_no_grading(run: Callable[..., Trace]) -> None:
     """A student who has other nodes believe that the grader left loses what they would have been heard to say."""
     farewell = listener("""
@@ -278,7 +279,7 @@ print(len(self.get_node_names()), flush=True)
     assert len(trace.messages("/cmd_vel")) <= 59
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_flood_on_the_wall_clock_is_a_limit_and_no_failure_of_the_machine(run: Callable[..., Trace]) -> None:
     """The reference beside the nodes is not held up by what they send."""
     flood = hostile(
@@ -386,7 +387,7 @@ ledger.Ledger.claims = lambda it, domain: [
 """
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", ["publisher", pytest.param("client", marks=pytest.mark.nightly)])
 def test_endpoints_that_do_not_exist_are_soon_waited_for_only_briefly(run: Callable[..., Trace], kind: str) -> None:
     """One more at each tick: in full patience the nodes' real time would be over before the scenario is."""

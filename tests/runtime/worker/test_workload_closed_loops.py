@@ -45,14 +45,14 @@ def limits(trace: Trace) -> list[str]:
     return [mark.detail for mark in trace.marks("limit")]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_node_that_hears_itself_goes_on(session: RecordingSession, tmp_path: Path) -> None:
     """It takes more messages than nodes may take from each other without a rest, and rests between them."""
     trace = record(session, tmp_path / "s", BEFORE + ITSELF, duration_ns=24 * NS_PER_S)
     assert (limits(trace), len(trace.messages("/n"))) == ([], 4799)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_nodes_that_answer_each_other_without_a_rest_are_ended(session: RecordingSession, tmp_path: Path) -> None:
     """No time would ever pass."""
     both = [BEFORE + SERVES.format(mine=mine, theirs=theirs) for mine, theirs in ("ab", "ba")]

@@ -82,6 +82,7 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     return run_one
 
 
+@pytest.mark.breadth(1, 4)
 @pytest.mark.parametrize(("once", "later"), but([WAITS["usleep"]], WAITS.values()), ids=WAITS)
 def test_waiting_outside_of_virtual_time_is_for_the_wall_clock(
     run: Callable[..., Trace], once: str, later: str
@@ -89,6 +90,7 @@ def test_waiting_outside_of_virtual_time_is_for_the_wall_clock(
     assert run(once, later).clock_reason.startswith(OUTSIDE)  # and then what the program did, at which line
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.parametrize(("once", "later"), but([WORK["computing"]], WORK.values()), ids=WORK)
 def test_long_computing_is_for_the_wall_clock(run: Callable[..., Trace], once: str, later: str) -> None:
     assert run(once, later).clock_reason == BUSY
@@ -176,6 +178,7 @@ threading.Thread(target=run, daemon=True).start()
 """
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.long
 @pytest.mark.parametrize(("later", "reason"), [("", ""), ("sum(range(12_000_000))", BUSY)], ids=["polls", "works"])
 def test_polls_of_a_busy_loop_are_no_work_but_work_among_them_is(
@@ -209,7 +212,7 @@ def test_ordinary_nodes_stay_in_virtual_time(run: Callable[..., Trace], later: s
     assert len(trace.messages("/cmd_vel")) >= 59
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_slow_start_delays_nothing(run: Callable[..., Trace]) -> None:
     """What a node does before it first waits is no lateness."""
     assert run("end = os.times().user + 1.5\nwhile os.times().user < end: pass", "").clock_reason == ""

@@ -42,6 +42,7 @@ def outcomes(folder: Path, rubric: str) -> tuple[list[tuple[str, str]], dict[str
     return [(name, v.outcome.value) for name, v in zip(asked_in(REAL / rubric), verdicts, strict=True)], told
 
 
+@pytest.mark.breadth(1, 2)
 @pytest.mark.ros
 @pytest.mark.parametrize(
     ("folder", "rubric"), [(REAL / "right", "guide.yaml"), (NODES, "living.yaml"), (NODES, "counting.yaml")]

@@ -114,6 +114,7 @@ def test_any_fixed_way_of_writing_shows_the_speed(write: Write) -> None:
     assert SPEED.judge(speeds(write, printed=True).trace()).credit == Fraction(1, 2)
 
 
+@pytest.mark.breadth(2, 10)
 @pytest.mark.parametrize("write", WRONG.values(), ids=WRONG)
 def test_numbers_that_are_written_whatever_comes_show_no_speed(write: Write) -> None:
     """The reason counts the other numbers, and the hint tells what to do; printing does not help."""

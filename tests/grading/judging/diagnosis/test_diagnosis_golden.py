@@ -401,6 +401,7 @@ def right_programs(file: str) -> dict[str, str]:
     return texts
 
 
+@pytest.mark.breadth(2, 6)
 @pytest.mark.slow
 @pytest.mark.parametrize(("file", "name", "arguments"), each(OTHERWISE, 6))
 def test_right_programs_are_not_blamed(file: str, name: str, arguments: dict[str, Any]) -> None:

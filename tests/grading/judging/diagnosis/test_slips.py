@@ -96,6 +96,7 @@ def test_an_edit_changes_the_program() -> None:
             assert obeyed(row, spoilt(row["file"], row["change"])) != RIGHT[row["file"]], row["name"]
 
 
+@pytest.mark.breadth(1, 4)
 @pytest.mark.ros
 @pytest.mark.parametrize("row", each(SLIPS[::_SAMPLE], _SHORT), ids=lambda row: row["name"])
 def test_a_slip_gets_its_hint(session: RecordingSession, tmp_path: Path, row: dict[str, Any]) -> None:
@@ -103,6 +104,7 @@ def test_a_slip_gets_its_hint(session: RecordingSession, tmp_path: Path, row: di
     check_hint(session, tmp_path, row)
 
 
+@pytest.mark.breadth(1, 4)
 @pytest.mark.ros
 @pytest.mark.parametrize("row", each(EDITED[:: _SAMPLE // 3], _SHORT), ids=lambda row: row["name"])
 def test_a_hint_that_is_obeyed_gets_further(session: RecordingSession, tmp_path: Path, row: dict[str, Any]) -> None:

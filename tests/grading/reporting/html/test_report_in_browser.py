@@ -91,7 +91,7 @@ def test_every_figure_is_drawn_without_a_complaint_or_a_request(visit: Open, nam
     assert [url for url in asked if not url.endswith("/report.html")] == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_shared_files_beside_the_report_draw_the_same(visit: Open, tmp_path: Path) -> None:
     """A class keeps one copy of the scripts."""
     (tmp_path / "assets").mkdir()
@@ -139,7 +139,7 @@ def test_a_pointer_over_a_chart_is_told_the_value(visit: Open) -> None:
     assert said == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_pointer_over_answers_is_told_what_was_expected(visit: Open) -> None:
     """What was said long ago and still holds is in the tooltip as well."""
     page, _, _ = visit(render_html(graded.perfect()))
@@ -153,7 +153,7 @@ def test_a_pointer_over_answers_is_told_what_was_expected(visit: Open) -> None:
     assert {part.split(" ")[1] for part in said.split(";")} == {"0.7", "/temperature", "expected", "/fan_speed"}
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_pointer_over_a_timeline_is_told_what_was_logged(visit: Open) -> None:
     """The text of the record, as it was written."""
     page, said, _ = visit(render_html(graded.perfect()))
@@ -248,7 +248,7 @@ def test_buttons_keys_and_the_wheel_zoom(visit: Open) -> None:
     assert said == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_wheel_alone_scrolls_the_page(visit: Open) -> None:
     """A chart under the pointer is no trap."""
     page, _, _ = visit(render_html(graded.perfect()))
@@ -257,7 +257,7 @@ def test_the_wheel_alone_scrolls_the_page(visit: Open) -> None:
     assert window_of(page, "velocity_publisher-1") == [0, 100]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_graph_lights_up_and_grows(visit: Open) -> None:
     """Hovering or focusing a node shows what it is connected to; the buttons enlarge the drawing."""
     page, said, _ = visit(render_html(graded.perfect()))
@@ -273,7 +273,7 @@ def test_the_graph_lights_up_and_grows(visit: Open) -> None:
     assert said == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_both_directions_are_in_the_graph(visit: Open) -> None:
     """The last situation shows temperature going one way and the fan speed the other."""
     page, _, _ = visit(render_html(graded.perfect()))
@@ -309,6 +309,7 @@ def test_every_chart_can_be_read_as_a_table(visit: Open) -> None:
     assert rows.count() > 300
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.parametrize("width", [320, *more([390], NIGHTLY)])
 @pytest.mark.parametrize("name", each(MADE, len(MADE)))
 def test_nothing_sticks_out_on_a_phone(visit: Open, name: str, width: int) -> None:
@@ -336,7 +337,7 @@ def test_charts_stand_in_their_criterion_and_are_folded_with_it(visit: Open) -> 
     assert said == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_charts_of_one_run_share_their_cursor_and_their_zoom(visit: Open) -> None:
     """What is under the pointer in one chart is told in the others, at the same moment."""
     page, said, _ = visit(render_html(graded.perfect()))
@@ -355,7 +356,7 @@ def test_charts_of_one_run_share_their_cursor_and_their_zoom(visit: Open) -> Non
     assert said == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_every_series_of_a_chart_has_a_look_of_its_own(visit: Open) -> None:
     """No two entries of a legend look the same, and what is expected is grey."""
     page, _, _ = visit(render_html(graded.wrong()))
@@ -401,7 +402,7 @@ def scrub(page: Page, exercise: str, time_s: float) -> dict[str, Any]:
     return moment_of(page, exercise)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_slider_shows_each_moment_of_the_run(visit: Open) -> None:
     """Robot, values, log and graph as they were then; charts of the run show where that is."""
     page, said, _ = visit(render_html(graded.perfect()))
@@ -444,7 +445,7 @@ def test_a_run_plays_until_it_is_paused_and_from_the_start_after_its_end(visit: 
     assert said == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_graph_of_a_moment_lacks_what_came_later(visit: Open) -> None:
     """A publisher that appears after four seconds is faint until then."""
     report = graded.perfect()
@@ -514,6 +515,7 @@ def test_a_page_on_a_web_server_opens_its_recordings_in_foxglove(browser: Browse
     assert f"https://app.foxglove.dev/~/view?ds=remote-file&ds.url={quote(address, safe='')}" in links
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.parametrize(("scheme", "width"), each([("dark", 390), ("light", 1280)], 2))
 def test_axe_finds_nothing(visit: Open, scheme: str, width: int) -> None:
     """As the page opens, and with everything unfolded; axe-core knows the WCAG and good practice."""
@@ -527,7 +529,7 @@ def test_axe_finds_nothing(visit: Open, scheme: str, width: int) -> None:
     assert said == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_headings_landmarks_and_names_are_there(visit: Open) -> None:
     """For whoever listens to the page: one h1, no level left out, every control and picture named."""
     page, _, _ = visit(render_html(graded.wrong()))

@@ -56,6 +56,7 @@ def plan(folder: Path, place: str, look: str, clock: str) -> Plan:
     return planned(folder, program, duration_ns=2 * NS_PER_S, **CLOCKS[clock])
 
 
+@pytest.mark.breadth(1, 2)
 @rows_of(plan)
 @pytest.mark.parametrize(("place", "look", "clock"), [*but(DEFAULT, [*VIRTUAL, *DEFAULT[2:]]), *more(REAL, NIGHTLY)])
 def test_a_log_is_a_log_whatever_it_looks_like(trace: Trace, place: str, look: str, clock: str) -> None:

@@ -135,6 +135,7 @@ def says(texts: list[str], logged: list[str], clock: str) -> bool:
     return late_enough and [TIME.sub("", t) for t in texts[: len(logged)]] == [TIME.sub("", t) for t in logged]
 
 
+@pytest.mark.breadth(0, 2)
 @pytest.mark.parametrize("clock", ["auto", *more(["wall"], NIGHTLY)])
 @pytest.mark.parametrize(("text", "logged"), but([PLOTTING["a window stays open"]], PLOTTING.values()), ids=PLOTTING)
 def test_a_program_that_plots(text: str, logged: list[str], clock: str, tmp_path: Path) -> None:
@@ -176,6 +177,7 @@ def test_importing_a_library_that_plots_is_no_reason_for_the_wall_clock(clock: s
     assert summary.faults == ()
 
 
+@pytest.mark.breadth(1, 1)
 @pytest.mark.parametrize(
     ("code", "said"),
     each(
