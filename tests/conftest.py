@@ -6,12 +6,12 @@ import logging
 import os
 import signal
 import sys
-from collections import defaultdict
 from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
 from process_table import processor_time_s
+from tiers import spread
 
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import RosInstallation, find_ros
@@ -117,34 +117,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.xdist_group(f"tier {tier}"))  # one process opens it, once
         if not any(item.get_closest_marker(kind) for kind in NOT_FAST):
             item.add_marker("fast")
-    _spread(items)
+    spread(items)
     everything, long = config.getoption("--everything"), config.getoption("--long")
     left_out = {name for name, asked in (("nightly", everything), ("long", everything or long)) if not asked}
     unwanted = {item for item in items if any(item.get_closest_marker(name) for name in left_out)}
     config.hook.pytest_deselected(items=[item for item in items if item in unwanted])
     items[:] = [item for item in items if item not in unwanted]
     items.sort(key=lambda item: item.get_closest_marker("ros") is None)
-
-
-def _spread(items: list[pytest.Item]) -> None:
-    """Leave to the later tiers the rows of tables beyond those that `breadth` gives to the earlier ones.
-
-    Those that stay are spread over the table. Rows that are marked already count for their own tier.
-    """
-    tables: dict[str, list[pytest.Item]] = defaultdict(list)
-    for item in items:
-        if item.get_closest_marker("breadth"):
-            tables[item.nodeid.partition("[")[0]].append(item)
-    for rows in tables.values():
-        marker = rows[0].get_closest_marker("breadth")
-        assert marker is not None
-        for count, tier, later in zip(marker.args, ("", "long"), ("long", "nightly"), strict=True):
-            there = [row for row in rows if _tier(row) == tier]
-            share = count / max(len(there), 1)
-            for number, row in enumerate(there):
-                if not count or (number and int(number * share) == int((number - 1) * share)):
-                    row.add_marker(later)
-
-
-def _tier(item: pytest.Item) -> str:
-    return next((name for name in ("nightly", "long") if item.get_closest_marker(name)), "")

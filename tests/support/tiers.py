@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from collections.abc import Collection, Iterable
 from typing import Any
 
@@ -40,3 +41,27 @@ def tiers(*names: str, usual: str = USUAL_TIER) -> list[ParameterSet]:
     """Return tiers of isolation as parameters: one by default, each kind as long tests, other users nightly."""
     marks = {name: (NIGHTLY,) if name.endswith("-user") else (LONG,) for name in names if name != usual}
     return [pytest.param(name, marks=marks.get(name, ())) for name in names]
+
+
+def spread(items: list[pytest.Item]) -> None:
+    """Leave to the later tiers the rows of tables beyond those that `breadth` gives to the earlier ones.
+
+    Those that stay are spread over the table. Rows that are marked already count for their own tier.
+    """
+    tables: dict[str, list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("breadth"):
+            tables[item.nodeid.partition("[")[0]].append(item)
+    for rows in tables.values():
+        marker = rows[0].get_closest_marker("breadth")
+        assert marker is not None
+        for count, tier, later in zip(marker.args, ("", "long"), ("long", "nightly"), strict=True):
+            there = [row for row in rows if _tier(row) == tier]
+            share = count / max(len(there), 1)
+            for number, row in enumerate(there):
+                if not count or (number and int(number * share) == int((number - 1) * share)):
+                    row.add_marker(later)
+
+
+def _tier(item: pytest.Item) -> str:
+    return next((name for name in ("nightly", "long") if item.get_closest_marker(name)), "")
