@@ -7,8 +7,6 @@ runs it in another process; a helper, the tests that import it; any other file, 
 `--list` prints the files and runs nothing. Exit codes: pytest's; 0 for no test.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess
@@ -33,18 +31,18 @@ READ = {
 }
 
 
-def changed(base: str) -> list[str]:
+def changed(base: str) -> set[str]:
     """Return the paths of what differs from a commit, from the repository's root."""
     asked = (["git", "diff", "--name-only", base], ["git", "ls-files", "--others", "--exclude-standard"])
-    texts = [subprocess.run(each, cwd=ROOT, check=True, capture_output=True, text=True).stdout for each in asked]
-    return sorted({line for text in texts for line in text.splitlines()})
+    return {line for each in asked for line in subprocess.check_output(each, cwd=ROOT, text=True).splitlines()}
 
 
 @cache
 def imports(path: Path) -> frozenset[str]:
-    """Return what a file of tests imports, helpers by their bare names; the commands if it starts programs."""
-    found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    """Return what a file of tests imports or reads, helpers by their bare names; the commands if it starts programs."""
+    text = path.read_text(encoding="utf-8")
+    found = {re.sub(r"\W+", ".", place) + ".*" for place in re.findall(r'ROOT / "(grader(?:(?:/|" / ")\w+)*)', text)}
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -80,6 +78,7 @@ def breakable(paths: Iterable[str]) -> list[Path]:
         else:
             readers |= {TESTS / each for each in next((READ[row] for row in READ if re.match(row, str(path))), ("",))}
     tests = {path: needs(path, helpers, set()) for path in TESTS.rglob("test_*.py") if "workspace" not in path.parts}
+    far |= {name[: dot.start()] + ".*" for name in far & graph.modules for dot in re.finditer(r"\.|$", name)}
     chosen = [path for path in tests if tests[path] & far or readers & {path, *path.parents}]
     return sorted(chosen, key=lambda path: (not tests[path] & near, path))
 

@@ -30,6 +30,12 @@ def test_what_runs_in_another_process_breaks_what_starts_it(module: str) -> None
     assert {"runtime/host/test_clock_for_real.py", "cli/test_end_to_end.py", "world/test_world.py"} <= set(found)
 
 
+def test_a_module_breaks_what_reads_its_folder() -> None:
+    """A test may import it by its place, and others look into all sources."""
+    found = named("grader/runtime/host/ledger.py")
+    assert {"runtime/host/test_ledger_arrivals.py", "test_architecture.py"} <= set(found)
+
+
 def test_a_helper_breaks_the_tests_that_import_it() -> None:
     """However many helpers are between them."""
     found = named("tests/support/tracing.py")
