@@ -52,3 +52,19 @@ def test_the_rows_of_a_tier_are_spread(pytester: pytest.Pytester) -> None:
     assert [name for name in tiers_of(items)["default"] if "table" in name] == [
         f"test_table[{n}]" for n in (0, 5, 10, 15)
     ]
+
+
+@pytest.mark.slow
+def test_a_group_runs_in_one_process(pytester: pytest.Pytester) -> None:
+    """Else each process opens sessions and browsers, and records tables, that one should open for all."""
+    pytester.makepyfile("""
+        import pytest
+
+        @pytest.mark.xdist_group("one")
+        @pytest.mark.parametrize("n", range(8))
+        def test_it(n, worker_id):
+            print(f"in {worker_id}.")
+    """)
+    result = pytester.runpytest_subprocess("-n", "2", "--dist=loadgroup", "-p", "no:grader.pytest_plugin", "-rP")
+    result.assert_outcomes(passed=8)
+    assert len({line for line in result.outlines if line.startswith("in gw")}) == 1
