@@ -88,11 +88,11 @@ def text(name: str) -> str:
     return BEGIN + PROGRAMS[name] + "\n"
 
 
-#: By default: from a callback, from a thread beside it, and where Python prints a stack itself.
-DEFAULT = [("a spin", "virtual"), ("a timer of Python", "virtual"), ("print_stack", "virtual")]
+#: By default: from a callback, from a thread beside it, and one that the grader cannot add to.
+DEFAULT = [("a spin", "virtual"), ("a timer of Python", "virtual"), ("an exception that cannot be changed", "virtual")]
 
 
-@pytest.mark.breadth(2, 6)
+@pytest.mark.breadth(3, 6)
 @rows_of(plan)
 @pytest.mark.parametrize(
     ("name", "clock"),

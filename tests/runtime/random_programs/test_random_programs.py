@@ -41,7 +41,7 @@ def test_random_programs_do_what_the_model_says(session: RecordingSession, part:
     assert not wrong, "\n\n".join([*wrong, f"python benchmarks/programs.py {EACH} --seed {part} makes them smaller"])
 
 
-@pytest.mark.breadth(2, 6)
+@pytest.mark.breadth(2, 20)
 @pytest.mark.parametrize("program", each(COUNTER_EXAMPLES.values(), 3), ids=COUNTER_EXAMPLES)
 def test_what_once_was_a_counter_example_is_none(session: RecordingSession, tmp_path: Path, program: Program) -> None:
     """Each was one until the grader, or the model, was corrected."""
