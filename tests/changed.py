@@ -42,11 +42,11 @@ def imports(path: Path) -> frozenset[str]:
     """Return what a file of tests imports or reads, helpers by their bare names; the commands if it starts programs."""
     text = path.read_text(encoding="utf-8")
     found = {re.sub(r"\W+", ".", place) + ".*" for place in re.findall(r'ROOT / "(grader(?:(?:/|" / ")\w+)*)', text)}
+    found.update(re.findall(r"\bgrader(?:\.\w+)+", text))  # also in a command or a program
     for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import):
-            found.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            found.update((node.module, *(f"{node.module}.{alias.name}" for alias in node.names)))
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            module = getattr(node, "module", None) or ""
+            found.update((module, *(f"{module}.{alias.name}".lstrip(".") for alias in node.names)))
     return frozenset(found | ({"grader.cli.main"} if "places.GRADE" in found else set()))
 
 

@@ -36,6 +36,11 @@ def test_a_module_breaks_what_reads_its_folder() -> None:
     assert {"runtime/host/test_ledger_arrivals.py", "test_architecture.py"} <= set(found)
 
 
+def test_a_module_breaks_the_tests_of_programs_that_name_it() -> None:
+    """Such as pytest with the grader's plugin."""
+    assert {"world/test_plugin.py", "world/test_races.py"} <= set(named("grader/pytest_plugin.py"))
+
+
 def test_a_helper_breaks_the_tests_that_import_it() -> None:
     """However many helpers are between them."""
     found = named("tests/support/tracing.py")
