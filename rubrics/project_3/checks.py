@@ -811,9 +811,10 @@ class NoGoWithoutAnswer(_Decides):
     of them, or else some of them, and come neither before the first response, nor after a number at or below the
     threshold, nor after a useless response of another kind. None of these may come between a useless response and the
     next request, nor may the call that writes them write a text that begins and ends alike, as with the name of another
-    mission, or one more text of its own where it writes another one each time. If there are no such words, nothing shows whether the client continues. A crash at a useless response
-    is reported and costs nothing. The server should respond with a delay, to separate output before and after a
-    response, and one of its responses should be of another kind; without these, unclear cases are accepted.
+    mission, or one more text of its own where it writes another one each time. If there are no such words, nothing
+    shows whether the client continues. A crash at a useless response is reported and costs nothing. The server should
+    respond with a delay, to separate output before and after a response, and one of its responses should be of another
+    kind; without these, unclear cases are accepted.
 
     Attributes:
         process: File name of the client.
