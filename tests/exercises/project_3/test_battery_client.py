@@ -369,6 +369,26 @@ def test_a_start_without_a_common_word_is_known_by_what_the_client_does(
     assert finding.credit == credit, finding.reason
 
 
+@pytest.mark.parametrize("start", ["INFO", "WARN"])
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize(("unknown", "credit"), [("no charge, nothing starts", 1), (None, 1), ("START", 0)])
+def test_whether_a_client_starts_without_a_charge_is_a_question_of_its_own(
+    start: str, swapped: bool, unknown: str | None, credit: int
+) -> None:
+    """A client with its branches the wrong way round, or with a wrong level, may start without a charge or not."""
+    begun, aborted = (start, "mission starts"), ("WARN", "mission is off")
+
+    def write(answer: Answer) -> Said:
+        level = level_of(answer)
+        if level is None:
+            above = aborted if swapped else begun  # what it does above the limit, whatever that is
+            return [above] if unknown == "START" else [("ERROR", unknown)] if unknown else []
+        return [begun if (level > 20) is not swapped else aborted]
+
+    finding = STILL.judge(asking(write, (battery(84.5), FAILED, battery(63.0), battery(15.0))).trace())
+    assert finding.credit == credit, finding.reason
+
+
 def test_a_crash_at_an_unreadable_answer_is_told_and_free() -> None:
     """The client did not go on."""
     answers = (battery(84.5), battery(15.0), UNREADABLE)
