@@ -25,7 +25,7 @@ _IN_C = {
 
 
 class _Builtin:
-    """A function that shows of itself what a function in C does, and is no method where a class has it.
+    """A function that shows of itself what a function in C does, and does not become a method in a class.
 
     Args:
         function: What a call calls, without a frame in between.
