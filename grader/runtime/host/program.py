@@ -208,6 +208,7 @@ def evaluate(request: dict[str, Any]) -> None:
         found = {"nodes": nodes, "left_out": left_out}
     except BaseException as error:  # whatever the launch file raises becomes a fault
         found = {"fault": describer.exception(error)}
+    flush()
     link.send({"kind": "launched", **found})
     originals.exit_now(0)
 

@@ -425,6 +425,20 @@ def test_where_the_machine_is_too_busy_for_the_wall_clock_virtual_time_is_shown(
 
 
 @pytest.mark.ros
+def test_what_a_launch_file_prints_is_shown_with_its_error(tmp_path: Path) -> None:
+    """Whoever prints to find a mistake sees it, also in a line without an end."""
+    text = f"print('at the top')\n{NEEDS}".replace(
+        "def generate_launch_description():\n",
+        "def generate_launch_description():\n    print('here', end='')\n    1 / 0\n",
+    )
+    (tmp_path / "needs.launch.py").write_text(text)
+    request = ObserveRequest((tmp_path / "needs.launch.py",), NS_PER_S, clock="virtual")
+    summary = observe(request, quiet)
+    assert [line.text for line in summary.lines] == ["at the top", "here"]
+    assert "ZeroDivisionError" in summary.faults[0].text
+
+
+@pytest.mark.ros
 @pytest.mark.parametrize("given", [(), (("kind", "five"),)])
 def test_a_launch_file_gets_its_arguments(tmp_path: Path, given: tuple[tuple[str, str], ...]) -> None:
     """One that is missing is named, with the option that gives it."""
