@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from archive import recordings
 from diagnosis_samples import (
+    LAUNCH_SLIPS,
     RECORDINGS,
     RIGHT,
     crashed,
@@ -25,7 +26,6 @@ from diagnosis_samples import (
     submission_to,
 )
 from sample_folders import folders_in
-from test_launch_mistakes import SLIPS as LAUNCH_SLIPS
 from tiers import each, more
 
 from grader.grading.judging.diagnosis import CAUSE_KEY, RULES, cases_of, diagnose, rules_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from diagnosis_samples import LAUNCH_SLIPS
 
 from grader.grading.judging.diagnosis import RULES, hint_for
 from grader.grading.judging.diagnosis.launch_mistakes import NAMES, TAKES
@@ -10,96 +11,9 @@ from grader.runtime.host import launch_names
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Trace
 
 FILE = "robot.launch.py"
-#: A line of a launch file, its error, the hint, and the rule that gives it.
-SLIPS = [
-    (
-        "from launch.substitutions import LaunchConfigurtion",
-        "ImportError: cannot import name 'LaunchConfigurtion' from 'launch.substitutions' (unknown location)",
-        "from launch.substitutions import LaunchConfiguration, not LaunchConfigurtion",
-        "launch_import",
-    ),
-    (
-        "from launch import Node",
-        "ImportError: cannot import name 'Node' from 'launch' (unknown location)",
-        "Node is in another module: from launch_ros.actions import Node",
-        "launch_import",
-    ),
-    (
-        "from launch import DeclareLaunchArgumnt",
-        "ImportError: cannot import name 'DeclareLaunchArgumnt' from 'launch' (unknown location)",
-        "there is no DeclareLaunchArgumnt: from launch.actions import DeclareLaunchArgument",
-        "launch_import",
-    ),
-    (
-        "from ament_index_python.packages import get_package_share_dir",
-        "ImportError: cannot import name 'get_package_share_dir' from 'ament_index_python.packages' (unknown location)",
-        "from ament_index_python.packages import get_package_share_directory, not get_package_share_dir",
-        "launch_import",
-    ),
-    (
-        "import launch",
-        "AttributeError: module 'launch' has no attribute 'LaunchDescripton'",
-        "launch.LaunchDescripton should be launch.LaunchDescription",
-        "launch_attribute",
-    ),
-    (
-        "import launch_ros",
-        "AttributeError: module 'launch_ros' has no attribute 'action'",
-        "launch_ros.action should be launch_ros.actions",
-        "launch_attribute",
-    ),
-    (
-        "import launch",
-        "AttributeError: module 'launch' has no attribute 'TimerAction'",
-        "TimerAction is in another module: from launch.actions import TimerAction",
-        "launch_attribute",
-    ),
-    (
-        "import launch.condition",
-        "ModuleNotFoundError: No module named 'launch.conditon'",
-        "the module is called launch.conditions, not launch.conditon",
-        "launch_module",
-    ),
-    (
-        "x = LaunchDescription()",
-        "NameError: name 'LaunchDescription' is not defined",
-        "the import is missing: from launch import LaunchDescription",
-        "launch_name",
-    ),
-    (
-        "x = Node(package='a', executable='b')",
-        "NameError: name 'Node' is not defined",
-        "the import is missing: from launch_ros.actions import Node",
-        "launch_name",
-    ),
-    (
-        "from launch.actions import GroupAction\nx = GroupActon()",
-        "NameError: name 'GroupActon' is not defined",
-        "GroupActon should be GroupAction",
-        "launch_name",
-    ),
-    (
-        "x = Node(package='a', executible='b')",
-        "TypeError: Node.__init__() missing a required argument: 'executable'",
-        "write executable=, not executible=",
-        "launch_argument",
-    ),
-    (
-        "x = Node(package='a')",
-        "TypeError: Node.__init__() missing a required argument: 'executable'",
-        "give Node its executable: Node(executable=...)",
-        "launch_argument",
-    ),
-    (
-        "x = DeclareLaunchArgument('a', defualt_value='b')",
-        "TypeError: DeclareLaunchArgument.__init__() got an unexpected keyword argument 'defualt_value'",
-        "write default_value=, not defualt_value=",
-        "launch_argument",
-    ),
-]
 
 
-@pytest.mark.parametrize(("code", "text", "hint", "cause"), SLIPS, ids=[text for _, text, _, _ in SLIPS])
+@pytest.mark.parametrize(("code", "text", "hint", "cause"), LAUNCH_SLIPS, ids=[text for _, text, _, _ in LAUNCH_SLIPS])
 def test_a_misspelt_name_is_told_with_the_right_one(code: str, text: str, hint: str, cause: str) -> None:
     """As a Python error writes it."""
     fault = Fault(0, FILE, FaultKind.EXCEPTION, text, FILE, 1)
